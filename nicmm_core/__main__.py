@@ -1,0 +1,119 @@
+"""Command line: ``python -m nicmm_core design | pretrain | shapes``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from . import Status, design_curve
+from .design import METHODS
+from .errors import ArgumentError, NicmmError
+from .files import check_curve_path, read_mesh, write_curve, write_mesh
+from .initial_loop import ORDERS
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; 0 when it succeeded, 2 with a message on standard error when it did not."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except NicmmError as error:
+        print(f"nicmm: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m nicmm_core", description="Smooth curves on triangle meshes."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    design = commands.add_parser("design", help="design a curve through vertices of a mesh")
+    design.add_argument("mesh", metavar="MESH", help="OBJ, OFF, PLY or STL")
+    design.add_argument("--points", required=True, metavar="A,B,C", help="vertex indices, from 0")
+    design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
+    design.add_argument("--open", action="store_true", help="end at the last point")
+    design.add_argument("--order", choices=ORDERS, default="given")
+    design.add_argument("--method", choices=METHODS, default="nicmm")
+    design.add_argument("--smoothness", type=float, default=1.0)
+    design.set_defaults(run=_design)
+
+    pretrain = commands.add_parser("pretrain", help="train the network (stage 1 of the paper)")
+    pretrain.add_argument("meshes", nargs="+", metavar="MESH")
+    pretrain.add_argument("-o", "--output", required=True, metavar="WEIGHTS.npz")
+    pretrain.add_argument("--sets", type=int, default=1000, help="sets of control points in all")
+    pretrain.add_argument("--epochs", type=int, default=10)
+    pretrain.add_argument("--seed", type=int, default=0)
+    pretrain.add_argument("--no-attention", action="store_true", help="ablation: without ECA")
+    pretrain.add_argument("--no-gating", action="store_true", help="ablation: without Light GLU")
+    pretrain.set_defaults(run=_pretrain)
+
+    shapes = commands.add_parser("shapes", help="write generated meshes to train on")
+    shapes.add_argument("folder", metavar="FOLDER")
+    shapes.add_argument("--count", type=int, default=20)
+    shapes.set_defaults(run=_shapes)
+    return parser
+
+
+def _design(options: argparse.Namespace) -> None:
+    check_curve_path(options.output)
+    mesh = read_mesh(options.mesh)
+    try:
+        points = [int(index) for index in options.points.split(",")]
+    except ValueError as error:
+        raise ArgumentError(
+            f"--points is {options.points!r}; give vertex indices with commas, such as 12,80,41"
+        ) from error
+    design = design_curve(
+        mesh,
+        points,
+        closed=not options.open,
+        order=options.order,
+        method=options.method,
+        smoothness=options.smoothness,
+    )
+    if design.status is Status.NOT_ONE_CURVE:
+        raise NicmmError(str(design.status))
+    write_curve(options.output, design.curves[0])
+
+
+def _pretrain(options: argparse.Namespace) -> None:
+    from tqdm import tqdm
+
+    from .network import NetworkConfig
+    from .pretraining import PretrainingConfig, pretrain
+
+    bars: dict[str, tqdm] = {}
+
+    def report(stage: str, done: int, total: int, loss: float) -> None:
+        if stage not in bars:
+            bars[stage] = tqdm(total=total, desc=stage, unit="set")
+        bar = bars[stage]
+        if loss:
+            bar.set_postfix(loss=f"{loss:.4f}", refresh=False)
+        bar.update(done - bar.n)
+        if done == total:
+            bar.close()
+
+    pretrain(
+        [read_mesh(path) for path in options.meshes],
+        options.output,
+        NetworkConfig(attention=not options.no_attention, gating=not options.no_gating),
+        PretrainingConfig(sets=options.sets, epochs=options.epochs, seed=options.seed),
+        progress=report,
+    )
+
+
+def _shapes(options: argparse.Namespace) -> None:
+    from .shapes import creature
+
+    folder = Path(options.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in range(options.count):
+        write_mesh(folder / f"creature-{seed:03d}.obj", creature(seed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,174 @@
+"""The zero level set of φ as curves on the input mesh.
+
+φ is linear in every working face, so its zero set crosses each face in one straight segment and
+the polyline lies on the surface by construction. Control points are vertices where φ is exactly
+zero. No other vertex counts as zero: a value of 0 is read as just positive, or the contour would
+shatter at it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .array_types import FloatArray, IntArray
+from .curve import SurfaceCurve, curve_on_mesh
+from .mesh import Mesh
+from .virtual_splits import WorkingMesh
+
+CROSSING_MARGIN = 1e-6
+"""Closest that a crossing comes to the end of its edge, as a fraction of the edge.
+
+Keeps neighbouring points of the polyline apart where φ is almost zero at a vertex.
+"""
+
+
+def signs_with_controls(field: FloatArray, control_vertices: IntArray) -> IntArray:
+    """Sign of φ at every vertex: 0 at the control vertices, +1 or -1 elsewhere, shape (n,)."""
+    sign = np.where(field >= 0.0, 1, -1)
+    sign[control_vertices] = 0
+    return sign
+
+
+def extract_curves(
+    mesh: Mesh, working: WorkingMesh, field: FloatArray, control_vertices: IntArray
+) -> list[SurfaceCurve]:
+    """Zero level set of a field that is linear in each face.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The input mesh.
+    working : WorkingMesh
+    field : (n,) float array
+        φ at the working vertices; its values at the control vertices count as zero.
+    control_vertices : (k,) int array
+        Working vertices of the control points, in the order visited, no two of them neighbours.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        Those with most control points first, then the longest. A curve that ends at the mesh's
+        boundary is open.
+    """
+    nodes, segments, segment_face = _segments(working, field, control_vertices)
+    chains = _chains(segments, len(nodes))
+    curves = []
+    for chain, along, closed in chains:
+        if closed:
+            chain, along = _from_first_control(chain, along, nodes, control_vertices)
+        parent = working.parent_face[segment_face[along]]
+        # The last point of an open chain has no segment after it and lies on the one before.
+        parent = parent if closed else np.append(parent, parent[-1])
+        barycentric = _barycentric(mesh, working, field, nodes[chain], parent)
+        visited = _positions_in(nodes[chain], control_vertices)
+        curves.append(curve_on_mesh(mesh, closed, parent, barycentric, visited))
+    curves.sort(key=lambda curve: (-(curve.control_index >= 0).sum(), -curve.length))
+    return curves
+
+
+def _segments(
+    working: WorkingMesh, field: FloatArray, control_vertices: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Contour nodes, the segments between them and the face of each segment.
+
+    Returns
+    -------
+    nodes : (p, 2) int array
+        The working edge that φ changes sign on, negative end first, or a control vertex twice.
+    segments : (s, 2) int array
+        Node indices.
+    segment_face : (s,) int array
+        Working face of each segment.
+    """
+    sign = signs_with_controls(field, control_vertices)
+    corner_sign = sign[working.faces]
+    crossed = (corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1)
+    segment_face = np.flatnonzero(crossed)
+    faces, corner_sign = working.faces[crossed], corner_sign[crossed]
+
+    ends = []
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        changes = corner_sign[:, first] * corner_sign[:, second] < 0
+        edge = faces[:, [first, second]]
+        edge = np.where(corner_sign[:, [first]] > 0, edge[:, ::-1], edge)
+        ends.append(np.where(changes[:, None], edge, -1))
+    for corner in range(3):
+        at_control = corner_sign[:, [corner]] == 0
+        ends.append(np.where(at_control, faces[:, [corner, corner]], -1))
+    candidates = np.stack(ends, axis=1)  # (s, 6, 2), exactly two of the six are ends
+    valid = candidates[:, :, 0] >= 0
+    pairs = candidates[valid].reshape(-1, 2)
+    nodes, index = np.unique(pairs, axis=0, return_inverse=True)
+    return nodes, index.reshape(-1, 2), segment_face
+
+
+def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
+    """Join segments into paths: (nodes, segments in between, closed), each node used once.
+
+    Where more than two segments meet, a path ends; on a manifold that happens only at control
+    vertices that two strands pass.
+    """
+    at_node: list[list[int]] = [[] for _ in range(n_nodes)]
+    for segment, (a, b) in enumerate(segments.tolist()):
+        at_node[a].append(segment)
+        at_node[b].append(segment)
+    unused = np.ones(len(segments), dtype=bool)
+    chains = []
+
+    def walk(start: int, segment: int) -> tuple[list[int], list[int]]:
+        chain, along = [start], []
+        while True:
+            unused[segment] = False
+            along.append(segment)
+            a, b = segments[segment]
+            chain.append(int(b if a == chain[-1] else a))
+            onward = [s for s in at_node[chain[-1]] if unused[s]]
+            if chain[-1] == start or len(at_node[chain[-1]]) != 2 or not onward:
+                return chain, along
+            segment = onward[0]
+
+    irregular = [node for node in range(n_nodes) if len(at_node[node]) != 2]
+    for start in [*irregular, *range(n_nodes)]:
+        for segment in at_node[start]:
+            if unused[segment]:
+                chain, along = walk(start, segment)
+                closed = chain[0] == chain[-1]
+                nodes = chain[:-1] if closed else chain
+                chains.append((np.array(nodes), np.array(along), closed))
+    return chains
+
+
+def _from_first_control(
+    chain: IntArray, along: IntArray, nodes: IntArray, control_vertices: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Start a closed chain at its first control point and walk towards the second."""
+    where = _positions_in(nodes[chain], control_vertices)
+    where = where[where >= 0]
+    if not len(where):
+        return chain, along
+    chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
+    if len(where) > 2 and (where[1] - where[0]) % len(chain) > (where[2] - where[0]) % len(chain):
+        chain, along = np.roll(chain[::-1], 1), along[::-1]
+    return chain, along
+
+
+def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
+    """Index among the nodes of each control vertex, -1 when it is none of them, shape (k,)."""
+    at_control = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
+    found = {int(nodes[i, 0]): int(i) for i in at_control}
+    return np.array([found.get(int(vertex), -1) for vertex in control_vertices], dtype=np.int64)
+
+
+def _barycentric(
+    mesh: Mesh, working: WorkingMesh, field: FloatArray, nodes: IntArray, parent: IntArray
+) -> FloatArray:
+    """Coordinates of contour nodes in the input faces given, shape (p, 3)."""
+    below, above = nodes.T
+    # At a control vertex both ends are the same and any fraction gives its own weights.
+    rise = np.where(below == above, 1.0, field[above] - field[below])
+    fraction = np.clip(-field[below] / rise, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]
+    corners = mesh.faces[parent]
+    weights = working.interpolation
+    start = np.asarray(weights[below[:, None], corners].todense()).reshape(-1, 3)
+    end = np.asarray(weights[above[:, None], corners].todense()).reshape(-1, 3)
+    return np.where((below == above)[:, None], start, (1.0 - fraction) * start + fraction * end)

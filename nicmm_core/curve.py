@@ -1,0 +1,100 @@
+"""A curve on a mesh: a polyline whose every segment lies in one face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .array_types import FloatArray, IntArray
+from .mesh import Mesh
+
+
+@dataclass(frozen=True)
+class SurfaceCurve:
+    """A polyline exactly on the surface.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether the last point joins the first, which is not repeated.
+    faces : (n,) int array
+        The input mesh's face that carries each point.
+    barycentric : (n, 3) float array
+        Coordinates in that face: not negative, sum 1.
+    points : (n, 3) float array
+        Positions, ``sum_j barycentric[:, j] * vertices[faces[:, j]]``. Two consecutive points
+        lie on one common face.
+    control_index : (k,) int array
+        Which point is each control point, in the order visited; -1 for one that this curve
+        does not pass (never when the design has converged).
+    """
+
+    closed: bool
+    faces: IntArray
+    barycentric: FloatArray
+    points: FloatArray
+    control_index: IntArray
+
+    @property
+    def length(self) -> float:
+        """Length in mesh units."""
+        return float(np.linalg.norm(self.steps, axis=1).sum())
+
+    @property
+    def steps(self) -> FloatArray:
+        """Vectors from each point to the next; (n, 3) when closed, else (n - 1, 3)."""
+        if self.closed:
+            return np.roll(self.points, -1, axis=0) - self.points
+        return np.diff(self.points, axis=0)
+
+
+def curve_on_mesh(
+    mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray, control_index: IntArray
+) -> SurfaceCurve:
+    """Build a curve whose positions are those that its barycentrics give."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    points = (barycentric[:, :, None] * corners).sum(axis=1)
+    return SurfaceCurve(closed, faces, barycentric, points, control_index)
+
+
+def geodesic_curvature(points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Geodesic curvature at the points of a closed polyline on a surface (Eq. 10).
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Evenly spaced, or the values of short segments are noise: see `resample`.
+    normals : (n, 3) float array
+        Unit surface normals at the points.
+
+    Returns
+    -------
+    (n,) float array
+        Signed, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i); positive
+        where the curve turns left seen against the normal.
+    """
+    before = np.roll(points, 1, axis=0) - points
+    after = np.roll(points, -1, axis=0) - points
+    before -= (before * normals).sum(axis=1, keepdims=True) * normals
+    after -= (after * normals).sum(axis=1, keepdims=True) * normals
+    across = np.linalg.norm(after - before, axis=1)
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    sine = (np.cross(-before, after) * normals).sum(axis=1) / lengths
+    return 2.0 * sine / across
+
+
+def resample(points: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
+    """Points at equal distances along a closed polyline, and the segment that each lies on.
+
+    Returns
+    -------
+    (count, 3) float array
+    (count,) int array
+    """
+    ring = np.concatenate([points, points[:1]])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    wanted = np.arange(count) * arc[-1] / count
+    even = np.stack([np.interp(wanted, arc, ring[:, axis]) for axis in range(3)], axis=1)
+    segment = np.clip(np.searchsorted(arc, wanted, side="right") - 1, 0, len(points) - 1)
+    return even, segment.astype(np.int64)

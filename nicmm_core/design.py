@@ -1,0 +1,332 @@
+"""The main path: from a mesh and control points to a curve. Read this file first.
+
+control points → initial loop → signed distance → features (`problem`) → network, pretrained
+→ prediction → one loop through the points → contour.
+"""
+
+from __future__ import annotations
+
+import enum
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .array_types import FloatArray
+from .contour import extract_curves
+from .curve import SurfaceCurve
+from .errors import ArgumentError, MissingPackageError, UnreachableError
+from .initial_loop import ORDERS
+from .mesh import Mesh
+from .problem import Problem, build_problem
+from .surface_points import SurfacePoints, locate_control_points
+from .topology import keep_topology
+
+if TYPE_CHECKING:
+    from .network import CurveNetwork
+
+METHODS = ("nicmm", "nicmm-paper")
+"""``"nicmm"`` is the same as ``"nicmm-paper"`` until the fast method lands."""
+
+PROGRESS_INTERVAL = 0.25
+"""Least seconds between two calls of a caller's progress function."""
+
+Progress = Callable[[float, FloatArray], object]
+
+
+class Status(enum.Enum):
+    """How a design ended; ``str()`` says what to change."""
+
+    CONVERGED = "converged: one curve through all control points"
+    ITERATION_LIMIT = (
+        "stopped at the iteration limit before the energy came to rest; the curve is usable, a "
+        "finer mesh or other control points may make it fairer"
+    )
+    DIVERGED = (
+        "the energy left the range of numbers and the best curve before is returned; look for "
+        "faces without area, or merge vertices by distance"
+    )
+    CANCELLED = "cancelled by the progress function; the curve is the best one so far"
+    NOT_ONE_CURVE = (
+        "the level set is not one simple curve through all control points; the mesh may branch "
+        "there (edges of three faces): repair it, or move the control points"
+    )
+
+    def __str__(self) -> str:
+        """What happened and what to change."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Design:
+    """The result of a design.
+
+    Attributes
+    ----------
+    status : Status
+    curves : list of SurfaceCurve
+        One entry when all is well.
+    field : (V,) float array
+        Level-set values in mesh units at the input mesh's vertices, negative inside. Vertices
+        that are not connected to the control points get the largest value: they are outside.
+    iterations : int
+        Of the prediction stage.
+    seconds : float
+    energy : dict of str to float
+        The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
+        square roots of the surface's area.
+    breaking_vertices : int
+        Vertices whose predicted sign would have split the curve or missed a point, so that the
+        initial level set replaces the predicted one around them; 0 when it was one loop by itself.
+    """
+
+    status: Status
+    curves: list[SurfaceCurve]
+    field: FloatArray
+    iterations: int
+    seconds: float
+    energy: dict[str, float]
+    breaking_vertices: int
+
+
+class Designer:
+    """A surface that will be asked for many curves.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        if not isinstance(mesh, Mesh):
+            raise ArgumentError(
+                f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
+            )
+        self.mesh = mesh
+        self._networks: dict[int, CurveNetwork] = {}
+
+    def design(
+        self,
+        control_points: ArrayLike | SurfacePoints,
+        *,
+        closed: bool = True,
+        order: str = "given",
+        method: str = "nicmm",
+        obstacles: ArrayLike | None = None,
+        alignment: ArrayLike | None = None,
+        smoothness: float = 1.0,
+        progress: Progress | None = None,
+    ) -> Design:
+        """Design a curve; arguments, result and errors are those of `design_curve`."""
+        started = time.perf_counter()
+        _check_choices(order, method, closed)
+        points = locate_control_points(self.mesh, control_points, closed)
+        problem = build_problem(
+            self.mesh,
+            points,
+            order,
+            _checked_map("obstacles", obstacles, self.mesh),
+            _checked_map("alignment", alignment, self.mesh),
+            _checked_smoothness(smoothness),
+        )
+        return self._solve(problem, float(smoothness), progress, started)
+
+    def _solve(
+        self, problem: Problem, smoothness: float, progress: Progress | None, started: float
+    ) -> Design:
+        # Imported here so that everything but solving works without PyTorch.
+        try:
+            from . import losses, prediction
+        except ImportError as error:
+            raise MissingPackageError(
+                f"method needs PyTorch, which cannot be imported ({error}); install it into this "
+                "Python with 'pip install torch'"
+            ) from error
+
+        prediction_result = prediction.predict(
+            self._network(problem.features.shape[1]),
+            problem,
+            losses.LossWeights(smooth=smoothness * losses.LossWeights.smooth),
+            prediction.PredictionConfig(),
+            None if progress is None else self._watcher(problem, progress),
+        )
+        field, breaking, curves = self._curves(problem, prediction_result.field)
+        status = _STATUS[prediction_result.stopped]
+        if not is_one_curve(curves):
+            status = Status.NOT_ONE_CURVE
+        return Design(
+            status=status,
+            curves=curves,
+            field=_at_input_vertices(self.mesh, problem, field),
+            iterations=prediction_result.iterations,
+            seconds=time.perf_counter() - started,
+            energy=prediction_result.terms,
+            breaking_vertices=breaking,
+        )
+
+    def _network(self, channels: int) -> CurveNetwork:
+        if channels not in self._networks:
+            from .weights_file import load_network
+
+            self._networks[channels] = load_network(channels=channels)
+        return self._networks[channels]
+
+    def _curves(
+        self, problem: Problem, field: FloatArray
+    ) -> tuple[FloatArray, int, list[SurfaceCurve]]:
+        """Make φ exactly zero at the control points and one loop, and take its contour."""
+        controls = problem.loop.control_vertices
+        field, breaking = keep_topology(
+            problem.working,
+            problem.initial_distance,
+            problem.smoother.interpolating(field),
+            controls,
+        )
+        return field, breaking, extract_curves(self.mesh, problem.working, field, controls)
+
+    def _watcher(self, problem: Problem, progress: Progress) -> Callable[[float, FloatArray], bool]:
+        last_call = -np.inf
+
+        def watch(fraction: float, field: FloatArray) -> bool:
+            nonlocal last_call
+            if time.perf_counter() - last_call < PROGRESS_INTERVAL:
+                return True
+            last_call = time.perf_counter()
+            curves = self._curves(problem, field)[2]
+            points = curves[0].points if curves else np.zeros((0, 3))
+            return progress(fraction, points) is not False
+
+        return watch
+
+
+def design_curve(
+    mesh: Mesh,
+    control_points: ArrayLike | SurfacePoints,
+    *,
+    closed: bool = True,
+    order: str = "given",
+    method: str = "nicmm",
+    obstacles: ArrayLike | None = None,
+    alignment: ArrayLike | None = None,
+    smoothness: float = 1.0,
+    progress: Progress | None = None,
+) -> Design:
+    """Design a smooth curve on a mesh through control points.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
+        Vertex indices, points on the surface, or faces with barycentric coordinates; at least
+        three.
+    closed : bool, default True
+        A closed curve. Open curves are not available yet.
+    order : {"given", "shortest"}
+        Visit the points in this order, or in the shortest cyclic order.
+    method : {"nicmm", "nicmm-paper"}
+        The network of the paper; both are the same for now.
+    obstacles, alignment : (V,) array_like of weights in [0, 1], optional
+        What the curve shall avoid and what it shall follow.
+    smoothness : float, default 1
+        Larger gives a fairer curve that follows the shortest way less closely.
+    progress : callable, optional
+        Called with the fraction done and the points of the curve so far, a few times a second at
+        most; the design stops when it returns False.
+
+    Returns
+    -------
+    Design
+
+    Raises
+    ------
+    ControlPointError
+        If there are too few points, or one is repeated, out of range or off the surface.
+    UnreachableError
+        If no such curve exists on the surface.
+    ArgumentError
+        If another argument cannot be used.
+    MissingPackageError
+        If PyTorch cannot be imported.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(3)
+    >>> design = nicmm.design_curve(mesh, [12, 80, 41], order="shortest")
+    >>> len(design.curves)
+    1
+    """
+    return Designer(mesh).design(
+        control_points,
+        closed=closed,
+        order=order,
+        method=method,
+        obstacles=obstacles,
+        alignment=alignment,
+        smoothness=smoothness,
+        progress=progress,
+    )
+
+
+_STATUS = {
+    "converged": Status.CONVERGED,
+    "cap": Status.ITERATION_LIMIT,
+    "cancelled": Status.CANCELLED,
+    "diverged": Status.DIVERGED,
+}
+
+
+def is_one_curve(curves: list[SurfaceCurve]) -> bool:
+    """Whether curves are a single closed one through all control points."""
+    return len(curves) == 1 and curves[0].closed and bool((curves[0].control_index >= 0).all())
+
+
+def _check_choices(order: str, method: str, closed: bool) -> None:
+    if method not in METHODS:
+        raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
+    if order not in ORDERS:
+        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+    if not closed:
+        raise UnreachableError(
+            "closed is False, and this version makes closed curves only; pass closed=True"
+        )
+
+
+def _checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
+    if weights is None:
+        return None
+    try:
+        checked = np.array(weights, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
+    if checked.shape != (len(mesh.vertices),):
+        raise ArgumentError(
+            f"{name} has shape {checked.shape}; pass one weight a vertex, ({len(mesh.vertices)},)"
+        )
+    bad = ~((checked >= 0.0) & (checked <= 1.0))
+    if bad.any():
+        first = int(bad.argmax())
+        raise ArgumentError(f"{name}[{first}] is {checked[first]}; weights must lie in 0 … 1")
+    return checked
+
+
+def _checked_smoothness(smoothness: float) -> float:
+    try:
+        value = float(smoothness)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
+    if not (np.isfinite(value) and value > 0.0):
+        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number")
+    return value
+
+
+def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
+    """φ in mesh units at the input vertices."""
+    inputs = problem.working.input_vertex
+    values = np.full(len(mesh.vertices), field.max() * problem.unit)
+    values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit
+    return values

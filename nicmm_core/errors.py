@@ -1,0 +1,30 @@
+"""What can go wrong, by type: one root, and a message that says what to change.
+
+Every message names the argument, says what was found and what would mend it.
+"""
+
+from __future__ import annotations
+
+
+class NicmmError(Exception):
+    """Root of every error that this package raises for what it was given."""
+
+
+class MeshError(NicmmError):
+    """The vertex or face array cannot be a triangle mesh."""
+
+
+class ControlPointError(NicmmError):
+    """The control points cannot be used: too few, repeated, out of range or off the surface."""
+
+
+class UnreachableError(NicmmError):
+    """No curve on this surface can do what was asked."""
+
+
+class ArgumentError(NicmmError):
+    """Another argument (a method, a map, a weight, a file) has a value that cannot be used."""
+
+
+class MissingPackageError(NicmmError):
+    """A method needs a package that is not installed."""

@@ -1,0 +1,277 @@
+"""The initial loop (section 3.1): a closed path of mesh edges through the control points.
+
+Plain shortest paths between consecutive points share edges and cross, and then no signed
+distance belongs to them. Here each path avoids every vertex that an earlier one took, and where
+vertices are too few it runs through the midpoints of edges, which are then split virtually.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .array_types import FloatArray, IntArray
+from .errors import ArgumentError, UnreachableError
+from .mesh import Mesh
+from .surface_points import SurfacePoints
+from .virtual_splits import SplitMesh, WorkingMesh
+from .visiting_order import shortest_order
+
+ORDERS = ("given", "shortest")
+
+MIDPOINT_DETOUR = 2.0
+"""Length of a way through edge midpoints, relative to the same length along edges.
+
+Above 1 so that the mesh is split only where edges alone would make a long detour.
+"""
+
+STRAND_CLEARANCE = 0.1
+"""Distance, in square roots of the component's area, within which a path shuns earlier ones."""
+
+STRAND_PENALTY = 4.0
+"""How much longer a way right beside an earlier path counts.
+
+Two strands of a loop then pass a thin limb on opposite sides instead of side by side, which
+leaves the level set room on both sides.
+"""
+
+
+@dataclass(frozen=True)
+class InitialLoop:
+    """A simple closed path of edges of a working mesh.
+
+    Attributes
+    ----------
+    vertices : (l,) int array
+        Working vertices in order, the first not repeated at the end. No two of them are joined
+        by an edge that is not part of the loop.
+    control_vertices : (k,) int array
+        The working vertex of each control point, in the order visited.
+    order : (k,) int array
+        Which of the caller's control points each of them is.
+    """
+
+    vertices: IntArray
+    control_vertices: IntArray
+    order: IntArray
+
+
+def build_initial_loop(
+    mesh: Mesh, points: SurfacePoints, order: str
+) -> tuple[WorkingMesh, InitialLoop]:
+    """Insert the control points and join them by edge paths that do not touch one another.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        At least three, on one component.
+    order : {"given", "shortest"}
+        Visit the points as given, or in the shortest cyclic order.
+
+    Returns
+    -------
+    WorkingMesh
+        The component of the points, split so that the loop runs along edges.
+    InitialLoop
+
+    Raises
+    ------
+    UnreachableError
+        If the paths so far cut the surface between two consecutive points.
+    ArgumentError
+        If ``order`` is neither of the two.
+    """
+    if order not in ORDERS:
+        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+    split = SplitMesh(mesh)
+    component = int(mesh.face_component[points.faces[0]])
+    controls = split.insert_points(points)
+    visit = np.arange(len(points))
+    if order == "shortest":
+        visit = shortest_order(_edge_distances(split, component, controls), closed=True)
+    controls = controls[visit]
+    _separate_controls(split, controls)
+
+    path: list[int] = [int(controls[0])]
+    for leg in range(len(controls)):
+        target = int(controls[(leg + 1) % len(controls)])
+        blocked = (set(path) | {int(control) for control in controls}) - {path[-1], target}
+        nodes = _shortest_free_path(split, component, path[-1], target, path, blocked)
+        if nodes is None:
+            here, there = int(visit[leg]), int(visit[(leg + 1) % len(visit)])
+            raise UnreachableError(
+                f"control_points[{here}] cannot be joined to control_points[{there}] without "
+                "crossing the curve through the points before them; visit the points in another "
+                'order, for example with order="shortest"'
+            )
+        path += _split_along(split, nodes)[1:]
+    loop = path[:-1]
+
+    _separate_strands(split, loop)
+    working, renumbered = split.assemble(component)
+    return working, InitialLoop(renumbered[loop], renumbered[controls], visit)
+
+
+def _edge_distances(split: SplitMesh, component: int, controls: IntArray) -> FloatArray:
+    """Distances along edges between control points, shape (k, k)."""
+    working, renumbered = split.assemble(component)
+    start, end = working.edges.T
+    length = np.linalg.norm(working.vertices[start] - working.vertices[end], axis=1)
+    n_vertices = len(working.vertices)
+    graph = sparse.coo_array((length, (start, end)), shape=(n_vertices, n_vertices)).tocsr()
+    sources = renumbered[controls]
+    return csgraph.dijkstra(graph, directed=False, indices=sources)[:, sources]
+
+
+def _shortest_free_path(
+    split: SplitMesh,
+    component: int,
+    start: int,
+    target: int,
+    taken: list[int],
+    blocked: set[int],
+) -> list[int | tuple[int, int]] | None:
+    """Dijkstra's path over vertices and edge midpoints that are free.
+
+    Returns
+    -------
+    list or None
+        Vertices, and edges (pairs of vertices) for their midpoints, from start to target; None
+        when there is no way.
+    """
+    working, renumbered = split.assemble(component)
+    n_vertices = len(working.vertices)
+    edges = working.edges
+    path_vertices = renumbered[np.array(taken, dtype=np.int64)]
+    graph = _vertex_and_midpoint_graph(working, edges)
+    clearance = STRAND_CLEARANCE * working.face_areas.sum() ** 0.5
+    avoided = np.concatenate([path_vertices, renumbered[sorted(blocked)]])
+    graph = _shunning(graph, avoided, path_vertices[[0, -1]], clearance)
+
+    free = np.ones(graph.shape[0], dtype=bool)
+    free[renumbered[list(blocked)]] = False
+    # The midpoint of an edge of the path so far would cross it, and so would the edge itself,
+    # whose ends are blocked anyway unless it is the last one.
+    on_path = np.sort(np.stack([path_vertices[:-1], path_vertices[1:]], axis=1), axis=1)
+    free[n_vertices + _rows_in(edges, on_path, n_vertices)] = False
+    keep = np.flatnonzero(free)
+    position = np.full(len(free), -1)
+    position[keep] = np.arange(len(keep))
+    reduced = graph[keep][:, keep]
+    source, sink = position[renumbered[start]], position[renumbered[target]]
+    _, previous = csgraph.dijkstra(reduced, indices=source, return_predecessors=True)
+    if previous[sink] < 0:
+        return None
+    nodes = [sink]
+    while nodes[-1] != source:
+        nodes.append(previous[nodes[-1]])
+
+    original = np.flatnonzero(renumbered >= 0)
+    path: list[int | tuple[int, int]] = []
+    for node in keep[nodes[::-1]]:
+        if node < n_vertices:
+            path.append(int(original[node]))
+        else:
+            a, b = original[edges[node - n_vertices]]
+            path.append((int(a), int(b)))
+    return path
+
+
+def _vertex_and_midpoint_graph(working: WorkingMesh, edges: IntArray) -> sparse.csr_array:
+    """Graph whose nodes are the vertices and then the midpoints of the edges.
+
+    Arcs are edges, halves of edges, and the three lines between midpoints in every face. Lines
+    from a vertex to the midpoint opposite are left out: with them, splitting the edges of a path
+    one after the other would not always leave the path's own lines as edges.
+    """
+    n_vertices, n_edges = len(working.vertices), len(edges)
+    middle = working.vertices[edges].mean(axis=1)
+    node_position = np.concatenate([working.vertices, middle])
+    sides = np.sort(working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    side_node = n_vertices + _rows_in(edges, sides, n_vertices).reshape(-1, 3)
+    midpoint = n_vertices + np.arange(n_edges)
+    through_midpoints = np.concatenate(
+        [
+            np.stack([edges[:, 0], midpoint], axis=1),
+            np.stack([edges[:, 1], midpoint], axis=1),
+            side_node[:, [0, 1]],
+            side_node[:, [1, 2]],
+            side_node[:, [2, 0]],
+        ]
+    )
+    arcs = np.concatenate([edges, through_midpoints])
+    length = np.linalg.norm(node_position[arcs[:, 0]] - node_position[arcs[:, 1]], axis=1)
+    length[n_edges:] *= MIDPOINT_DETOUR
+    both_ways = np.concatenate([arcs, arcs[:, ::-1]])
+    size = n_vertices + n_edges
+    entries = (np.concatenate([length, length]), (both_ways[:, 0], both_ways[:, 1]))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+
+
+def _shunning(
+    graph: sparse.csr_array, taken: IntArray, ends: IntArray, clearance: float
+) -> sparse.csr_array:
+    """Lengthen the arcs that come nearer to the nodes taken than the clearance.
+
+    Around the ends of the path so far only the side that the path lies on is shunned: there the
+    nearest taken node is not the end itself. So the curve goes on through its control points
+    instead of turning back at them.
+    """
+    to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)
+    to_ends = csgraph.dijkstra(graph, indices=ends, min_only=True)
+    beside = np.zeros(graph.shape[0])
+    near = np.isfinite(to_taken) & (to_taken < to_ends)
+    beside[near] = (1.0 - to_taken[near] / clearance) * (1.0 - to_taken[near] / to_ends[near])
+    arcs = graph.tocoo()
+    stretch = 1.0 + STRAND_PENALTY * 0.5 * (beside[arcs.row] + beside[arcs.col])
+    entries = (arcs.data * stretch, (arcs.row, arcs.col))
+    return sparse.csr_array(sparse.coo_array(entries, shape=graph.shape))
+
+
+def _rows_in(edges: IntArray, wanted: IntArray, n_vertices: int) -> IntArray:
+    """Row of each wanted edge in the sorted edge array."""
+    keys = edges[:, 0] * n_vertices + edges[:, 1]
+    return np.searchsorted(keys, wanted[:, 0] * n_vertices + wanted[:, 1])
+
+
+def _split_along(split: SplitMesh, nodes: list[int | tuple[int, int]]) -> list[int]:
+    """Split the edges whose midpoints a path uses; the path as vertices."""
+    return [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
+
+
+def _separate_controls(split: SplitMesh, controls: IntArray) -> None:
+    """Split the edges that join two control points, so that no two of them are neighbours."""
+    wanted = {int(control) for control in controls}
+    for control in sorted(wanted):
+        for face in sorted(split.faces_around(control)):
+            for other in sorted(wanted.intersection(split.corners(face)) - {control}):
+                if split.faces_around(control) & split.faces_around(other):
+                    split.split_edge(control, other)
+
+
+def _separate_strands(split: SplitMesh, loop: list[int]) -> None:
+    """Give both sides of the loop vertices of their own wherever two strands are neighbours.
+
+    An edge that joins two loop vertices without being part of the loop is split, and so is a face
+    whose three edges all are. Afterwards the two sides of the loop are components of the
+    remaining vertices, so flood fill can tell them apart.
+    """
+    on_loop = set(loop)
+    loop_edges = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
+    for vertex in loop:
+        for face in sorted(split.faces_around(vertex)):
+            if face not in split.faces_around(vertex):
+                continue
+            a, b, c = split.corners(face)
+            sides = {frozenset(side) for side in ((a, b), (b, c), (c, a))}
+            if sides <= loop_edges:
+                split.split_face(face)
+                continue
+            for side in sorted(tuple(sorted(s)) for s in sides - loop_edges):
+                if on_loop.issuperset(side):
+                    split.split_edge(*side)
+                    break

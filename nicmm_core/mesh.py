@@ -1,0 +1,159 @@
+"""The input mesh: checked once, never changed."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .array_types import BoolArray, FloatArray, IntArray
+from .errors import MeshError
+
+
+class Mesh:
+    """A triangle mesh with checked arrays and the adjacency that the pipeline asks for.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array_like of float
+        Positions, in any unit.
+    faces : (F, 3) array_like of int
+        Corner indices of each triangle.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+        A read-only copy.
+    faces : (F, 3) int array
+        A read-only copy.
+
+    Raises
+    ------
+    MeshError
+        If an array has the wrong shape or type, a position is not finite, an index is out of
+        range, a face names one vertex twice, or there are no faces.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        self.vertices = _checked_vertices(vertices)
+        self.faces = _checked_faces(faces, len(self.vertices))
+        self.vertices.setflags(write=False)
+        self.faces.setflags(write=False)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box of the vertices that faces use, in mesh units."""
+        corners = self.vertices[np.unique(self.faces)]
+        return float(np.linalg.norm(np.ptp(corners, axis=0)))
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """Area of each face, shape (F,), in square mesh units."""
+        return triangle_areas(self.vertices, self.faces)
+
+    @cached_property
+    def vertex_faces(self) -> sparse.csr_array:
+        """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
+        n_faces = len(self.faces)
+        rows = self.faces.ravel()
+        columns = np.repeat(np.arange(n_faces), 3)
+        ones = np.ones(rows.size, dtype=np.int8)
+        return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
+
+    @cached_property
+    def face_component(self) -> IntArray:
+        """Which connected component each face belongs to, shape (F,).
+
+        Faces are connected when they share a vertex.
+        """
+        n_vertices = len(self.vertices)
+        edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]]])
+        ones = np.ones(len(edges), dtype=np.int8)
+        graph = sparse.coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
+        _, label = csgraph.connected_components(graph, directed=False)
+        return label[self.faces[:, 0]]
+
+    @cached_property
+    def referenced(self) -> BoolArray:
+        """Which vertices at least one face uses, shape (V,)."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.faces] = True
+        return used
+
+
+def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Area of each triangle, shape (F,)."""
+    corner = vertices[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return 0.5 * np.linalg.norm(normal, axis=1)
+
+
+def unique_edges(faces: IntArray) -> IntArray:
+    """Undirected edges of the faces, shape (E, 2), smaller index first, sorted."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    return np.unique(np.sort(edges, axis=1), axis=0)
+
+
+def mean_edge_length(vertices: FloatArray, faces: IntArray) -> float:
+    """Mean length of the undirected edges, the h of the method's narrow band."""
+    edges = unique_edges(faces)
+    return float(np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1).mean())
+
+
+def _checked_vertices(vertices: ArrayLike) -> FloatArray:
+    try:
+        checked = np.array(vertices, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MeshError(
+            f"vertices cannot be read as numbers ({error}); pass an array of shape (V, 3)"
+        ) from error
+    if checked.ndim != 2 or checked.shape[1] != 3:
+        raise MeshError(f"vertices has shape {checked.shape}; pass positions of shape (V, 3)")
+    bad = ~np.isfinite(checked).all(axis=1)
+    if bad.any():
+        raise MeshError(
+            f"vertices has {bad.sum()} positions that are NaN or infinite, the first at index "
+            f"{bad.argmax()}; remove or repair them"
+        )
+    return checked
+
+
+def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
+    try:
+        given = np.array(faces)
+        if given.size and not np.issubdtype(given.dtype, np.integer):
+            checked = given.astype(np.float64).astype(np.int64)
+            if not np.array_equal(checked, given):
+                raise ValueError("some are not whole numbers")
+        else:
+            checked = given.astype(np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise MeshError(
+            f"faces cannot be read as vertex indices ({error}); pass an integer array of shape "
+            "(F, 3), with quads and larger faces triangulated"
+        ) from error
+    if checked.size == 0:
+        raise MeshError("faces is empty; a curve needs a surface of at least one triangle")
+    if checked.ndim != 2 or checked.shape[1] != 3:
+        raise MeshError(
+            f"faces has shape {checked.shape}; pass triangles of shape (F, 3), with quads and "
+            "larger faces triangulated"
+        )
+    outside = ((checked < 0) | (checked >= n_vertices)).any(axis=1)
+    if outside.any():
+        first = int(outside.argmax())
+        raise MeshError(
+            f"faces[{first}] = {checked[first].tolist()} refers to vertices that do not exist; "
+            f"indices must lie in 0 … {n_vertices - 1}"
+        )
+    repeated = (checked == np.roll(checked, 1, axis=1)).any(axis=1)
+    if repeated.any():
+        first = int(repeated.argmax())
+        raise MeshError(
+            f"faces[{first}] = {checked[first].tolist()} names a vertex twice "
+            f"({repeated.sum()} such faces); remove degenerate faces"
+        )
+    return checked

@@ -1,0 +1,164 @@
+"""Stage 2 (section 4.1): optimise the pretrained network for one problem, with early stopping."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .array_types import FloatArray
+from .losses import (
+    LossWeights,
+    SurfaceTensors,
+    loss_terms,
+    squared_slope,
+    surface_tensors,
+    total_loss,
+)
+from .network import CurveNetwork, NetworkInput
+from .problem import Problem
+
+BAND_WIDTH = 3.0
+"""Width of the narrow band about the curve, in mean edge lengths (section 4.1)."""
+
+
+@dataclass(frozen=True)
+class PredictionConfig:
+    """How stage 2 runs.
+
+    Attributes
+    ----------
+    learning_rate : float
+        The paper's.
+    patience : int
+        Iterations over which the narrow-band energy must stay still.
+    fluctuation : float
+        How still: its spread over those iterations, relative to its value. The paper says
+        "minimal fluctuations"; at 0.01 the later change of the curve is below what is seen.
+    iterations : int
+        The cap.
+    """
+
+    learning_rate: float = 0.001
+    patience: int = 5
+    fluctuation: float = 0.01
+    iterations: int = 200
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What stage 2 found.
+
+    Attributes
+    ----------
+    field : (n,) float array
+        φ of the iteration with the least loss, in units of the problem.
+    terms : dict of str to float
+        The unweighted terms of the loss there.
+    iterations : int
+    stopped : {"converged", "cap", "cancelled", "diverged"}
+    """
+
+    field: FloatArray
+    terms: dict[str, float]
+    iterations: int
+    stopped: str
+
+
+def predict(
+    network: CurveNetwork,
+    problem: Problem,
+    weights: LossWeights,
+    config: PredictionConfig,
+    watch: Callable[[float, FloatArray], bool] | None = None,
+) -> Prediction:
+    """Optimise a copy of the network for one problem.
+
+    Parameters
+    ----------
+    network : CurveNetwork
+        As pretrained; not changed.
+    problem : Problem
+    weights : LossWeights
+    config : PredictionConfig
+    watch : callable, optional
+        Called with the fraction of the cap that is done and φ after every iteration; prediction
+        stops when it returns False.
+    """
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    surface = surface_tensors(problem, device)
+    given = network_input(problem, device)
+    network = copy.deepcopy(network).to(device)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+
+    best_loss, best_field, best_terms = np.inf, problem.initial_distance, _as_floats({})
+    energies: list[float] = []
+    stopped = "cap"
+    iteration = 0
+    for iteration in range(1, config.iterations + 1):
+        optimiser.zero_grad()
+        phi = network(given)  # (n,)
+        terms = loss_terms(surface, phi)
+        loss = total_loss(terms, weights)
+        value = loss.item()
+        if not np.isfinite(value):
+            stopped = "diverged"
+            break
+        if value < best_loss:
+            best_loss, best_terms = value, _as_floats(terms)
+            best_field = phi.detach().cpu().numpy().astype(np.float64)
+        energies.append(narrow_band_energy(surface, phi.detach(), weights, problem.edge_length))
+        if watch is not None and not watch(iteration / config.iterations, best_field):
+            stopped = "cancelled"
+            break
+        if _is_still(energies, config):
+            stopped = "converged"
+            break
+        loss.backward()
+        optimiser.step()
+    return Prediction(best_field, best_terms, iteration, stopped)
+
+
+def network_input(problem: Problem, device: torch.device) -> NetworkInput:
+    """Move what the network sees of a problem to a device in single precision."""
+
+    def tensor(array: FloatArray) -> Tensor:
+        return torch.as_tensor(array, dtype=torch.float32, device=device)
+
+    areas = problem.elements.vertex_areas
+    return NetworkInput(
+        features=tensor(problem.features),
+        initial_distance=tensor(problem.initial_distance),
+        area_share=tensor(areas / areas.sum()),
+        response=tensor(problem.smoother.response),
+        control_vertices=torch.as_tensor(problem.loop.control_vertices, device=device),
+    )
+
+
+@torch.no_grad()
+def narrow_band_energy(
+    surface: SurfaceTensors, phi: Tensor, weights: LossWeights, edge_length: float
+) -> float:
+    """Mean density of the level-set and smoothness terms in the band about the zero set."""
+    inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)
+    eikonal = 0.5 * (squared_slope(surface, phi) - 1.0) ** 2
+    bending = 0.5 * surface.centroid(surface.laplacian(phi)) ** 2
+    # The delta function's value over the band is its mean there, 1 / width.
+    density = weights.sdf * eikonal + weights.smooth * bending / (BAND_WIDTH * edge_length)
+    area = surface.face_areas * inside
+    return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
+
+
+def _is_still(energies: list[float], config: PredictionConfig) -> bool:
+    recent = energies[-config.patience :]
+    if len(recent) < config.patience:
+        return False
+    return max(recent) - min(recent) <= config.fluctuation * abs(recent[-1])
+
+
+def _as_floats(terms: dict[str, Tensor]) -> dict[str, float]:
+    return {name: float(value.item()) for name, value in terms.items()}

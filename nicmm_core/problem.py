@@ -1,0 +1,134 @@
+"""One design problem, ready for the network: everything up to the features, in one place.
+
+This is the paper's pipeline as far as section 3.1: control points, initial loop, signed distance
+and input features. Pretraining and prediction both start from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .array_types import FloatArray
+from .features import control_indicator, feature_map, input_features, vertex_normals
+from .finite_elements import FiniteElements, build_finite_elements
+from .initial_loop import InitialLoop, build_initial_loop
+from .mesh import Mesh
+from .signed_distance import signed_distance
+from .smoothing import Smoother, build_smoother
+from .surface_points import SurfacePoints
+from .topology import keep_topology
+from .virtual_splits import WorkingMesh
+
+SMOOTHING_LENGTH = 1.5
+"""ℓ of the smoothing of φ₀ at smoothness 1, in mean edge lengths.
+
+Less leaves the zigzag of the edge path in the curve; more makes thin regions vanish, where the
+topology then falls back on the jagged distance.
+"""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A curve to be designed, in lengths relative to the square root of the surface's area.
+
+    Attributes
+    ----------
+    working : WorkingMesh
+        In the input mesh's units.
+    unit : float
+        Square root of the area of the working mesh, the unit of all that follows.
+    elements : FiniteElements
+    loop : InitialLoop
+    distance : (n,) float array
+        Signed distance to the initial loop.
+    smoother : Smoother
+    initial_distance : (n,) float array
+        φ₀: the distance smoothed. Its zero set is one simple loop through the control points.
+    feature_map : (n,) float array or None
+        φ_fea.
+    features : (n, 8) or (n, 9) float array
+        The network's input.
+    """
+
+    working: WorkingMesh
+    unit: float
+    elements: FiniteElements
+    loop: InitialLoop
+    distance: FloatArray
+    smoother: Smoother
+    initial_distance: FloatArray
+    feature_map: FloatArray | None
+    features: FloatArray
+
+    @property
+    def edge_length(self) -> float:
+        """Mean edge length h, relative to the unit."""
+        return self.working.mean_edge_length / self.unit
+
+
+def build_problem(
+    mesh: Mesh,
+    points: SurfacePoints,
+    order: str = "given",
+    obstacles: FloatArray | None = None,
+    alignment: FloatArray | None = None,
+    smoothness: float = 1.0,
+) -> Problem:
+    """Everything that comes before the network.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        As `locate_control_points` gives them.
+    order : {"given", "shortest"}
+    obstacles, alignment : (V,) float array or None
+        Weights in [0, 1] at the input mesh's vertices.
+    smoothness : float
+        Multiplies the smoothing length of φ₀.
+
+    Raises
+    ------
+    UnreachableError
+        If no simple loop that bounds a region passes the points in this order.
+    """
+    working, loop = build_initial_loop(mesh, points, order)
+    unit = float(np.sqrt(working.face_areas.sum()))
+    vertices = (working.vertices - working.vertices.mean(axis=0)) / unit
+    edge_length = working.mean_edge_length / unit
+    elements = build_finite_elements(vertices, working.faces, working.on_boundary)
+    distance = signed_distance(working, elements, loop) / unit
+    smoother = build_smoother(
+        elements, loop.control_vertices, smoothness * SMOOTHING_LENGTH * edge_length
+    )
+    initial_distance, _ = keep_topology(
+        working, distance, smoother.smoothed(distance), loop.control_vertices
+    )
+    importance = None
+    if obstacles is not None or alignment is not None:
+        importance = feature_map(
+            vertices,
+            None if obstacles is None else working.interpolation @ obstacles,
+            None if alignment is None else working.interpolation @ alignment,
+            edge_length,
+        )
+    features = input_features(
+        vertices,
+        vertex_normals(vertices, working.faces),
+        control_indicator(smoother.response),
+        initial_distance,
+        importance,
+    )
+    return Problem(
+        working=working,
+        unit=unit,
+        elements=elements,
+        loop=loop,
+        distance=distance,
+        smoother=smoother,
+        initial_distance=initial_distance,
+        feature_map=importance,
+        features=features,
+    )

@@ -1,0 +1,139 @@
+"""Generated shapes: what pretraining, tests and examples run on without any file.
+
+`creature` makes random bodies with limbs, coarse as scanned collections are, so that a network
+trained on them has seen thin parts, saddles and tips.
+"""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+from scipy.spatial import ConvexHull, Delaunay
+
+from .array_types import FloatArray, IntArray
+from .mesh import Mesh
+
+
+def sphere(subdivisions: int = 4) -> Mesh:
+    """Unit sphere from an icosahedron, each level with four times the faces."""
+    golden = 0.5 * (1.0 + 5.0**0.5)
+    corners = [(0, 1, golden), (0, -1, golden), (0, 1, -golden), (0, -1, -golden)]
+    vertices = np.array([np.roll(corner, shift) for shift in range(3) for corner in corners])
+    faces = _hull_faces(vertices)
+    for _ in range(subdivisions):
+        vertices, faces = igl.upsample(vertices, faces)
+    return Mesh(vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces)
+
+
+def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int = 48) -> Mesh:
+    """Torus about the z axis."""
+    u, v = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around,
+        np.arange(across) * 2 * np.pi / across,
+        indexing="ij",
+    )
+    radius = major + minor * np.cos(v)
+    vertices = np.stack([radius * np.cos(u), radius * np.sin(u), minor * np.sin(v)], axis=-1)
+    index = np.arange(around * across).reshape(around, across)
+    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    corner = np.roll(right, -1, axis=1)
+    faces = np.concatenate(
+        [np.stack([index, right, corner], axis=-1), np.stack([index, corner, up], axis=-1)]
+    )
+    return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def disc(rings: int = 24) -> Mesh:
+    """Flat unit disc in the xy plane: rings of 6, 12, 18 … vertices round a centre."""
+    points = [np.zeros((1, 2))]
+    for ring in range(1, rings + 1):
+        angle = np.arange(6 * ring) * 2 * np.pi / (6 * ring)
+        points.append(np.stack([np.cos(angle), np.sin(angle)], axis=1) * ring / rings)
+    flat = np.concatenate(points)
+    faces = Delaunay(flat).simplices
+    return Mesh(np.pad(flat, ((0, 0), (0, 1))), _counter_clockwise(flat, faces))
+
+
+def creature(seed: int, resolution: int = 48, faces: int = 500, subdivisions: int = 2) -> Mesh:
+    """A random body with two to five limbs, decimated and Loop subdivided.
+
+    Parameters
+    ----------
+    seed : int
+    resolution : int
+        Grid cells along the longest side of the implicit surface.
+    faces : int
+        Faces after decimation, before subdivision.
+    subdivisions : int
+        Loop steps, each with four times the faces.
+    """
+    generator = np.random.default_rng(seed)
+    starts, ends, radii = [], [], []
+    body = generator.normal(size=3)
+    body *= generator.uniform(0.3, 0.7) / np.linalg.norm(body)
+    starts.append(-body)
+    ends.append(body)
+    radii.append(generator.uniform(0.25, 0.4))
+    for _ in range(generator.integers(2, 6)):
+        joint = generator.uniform(-1.0, 1.0) * body
+        for _ in range(generator.integers(1, 3)):
+            bone = generator.normal(size=3)
+            bone *= generator.uniform(0.4, 0.8) / np.linalg.norm(bone)
+            starts.append(joint)
+            ends.append(joint + bone)
+            radii.append(generator.uniform(0.09, 0.18))
+            joint = joint + bone
+    vertices, triangles = _capsules(np.array(starts), np.array(ends), np.array(radii), resolution)
+    vertices, triangles = _largest_component(vertices, triangles)
+    vertices, triangles = igl.decimate(vertices, triangles, faces)[:2]
+    return Mesh(*igl.loop(vertices, triangles, subdivisions))
+
+
+def _capsules(
+    starts: FloatArray, ends: FloatArray, radii: FloatArray, resolution: int
+) -> tuple[FloatArray, IntArray]:
+    """Smooth union of capsules as the zero set of a distance on a grid."""
+    low = np.minimum(starts, ends).min(axis=0) - 2 * radii.max()
+    high = np.maximum(starts, ends).max(axis=0) + 2 * radii.max()
+    cell = (high - low).max() / resolution
+    counts = np.ceil((high - low) / cell).astype(int) + 1
+    axes = [low[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
+    # libigl runs through a grid with x fastest.
+    z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
+    grid = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    blend = 12.0 / radii.mean()
+    total = np.zeros(len(grid))
+    for start, end, radius in zip(starts, ends, radii, strict=True):
+        axis = end - start
+        along = np.clip((grid - start) @ axis / (axis @ axis), 0.0, 1.0)
+        distance = np.linalg.norm(grid - start - along[:, None] * axis, axis=1) - radius
+        total += np.exp(-blend * np.clip(distance, -1.0, 1.0) / 6.0)
+    smooth_minimum = -np.log(total)
+    vertices, faces = igl.marching_cubes(smooth_minimum, grid, *counts.tolist(), 0.0)[:2]
+    return vertices, faces
+
+
+def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    mesh = Mesh(vertices, faces)
+    largest = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
+    kept = faces[mesh.face_component == largest]
+    used, kept = np.unique(kept, return_inverse=True)
+    return vertices[used], kept.reshape(-1, 3).astype(np.int64)
+
+
+def _hull_faces(vertices: FloatArray) -> IntArray:
+    """Triangles of a convex polyhedron about the origin, seen anticlockwise from outside."""
+    faces = ConvexHull(vertices).simplices.astype(np.int64)
+    corner = vertices[faces]
+    inward = np.linalg.det(corner) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return faces
+
+
+def _counter_clockwise(flat: FloatArray, faces: IntArray) -> IntArray:
+    faces = faces.astype(np.int64)
+    corner = flat[faces]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
+    faces[clockwise] = faces[clockwise][:, ::-1]
+    return faces

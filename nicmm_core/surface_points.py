@@ -1,0 +1,213 @@
+"""Control points: vertices, points in space or faces with barycentrics, brought to one form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import tolerances
+from .array_types import FloatArray, IntArray
+from .errors import ControlPointError, UnreachableError
+from .mesh import Mesh
+
+FEWEST_POINTS_CLOSED = 3
+FEWEST_POINTS_OPEN = 2
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on a mesh, each in one of its faces.
+
+    Attributes
+    ----------
+    faces : (k,) int array
+        The face that carries each point.
+    barycentric : (k, 3) float array
+        Coordinates in that face, in the order of its corners; not negative, sum 1.
+    """
+
+    faces: IntArray
+    barycentric: FloatArray
+
+    def positions(self, mesh: Mesh) -> FloatArray:
+        """Where the points are in space, shape (k, 3)."""
+        return np.einsum("kc,kcd->kd", self.barycentric, mesh.vertices[mesh.faces[self.faces]])
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+
+def locate_control_points(
+    mesh: Mesh, control_points: ArrayLike | SurfacePoints, closed: bool
+) -> SurfacePoints:
+    """Bring any accepted form of control points to faces and barycentrics, and check them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
+        Vertex indices, points on the surface, or faces with barycentrics.
+    closed : bool
+        Whether a closed curve is wanted; it needs three points, an open one two.
+
+    Returns
+    -------
+    SurfacePoints
+        With coordinates below `tolerances.SNAP` set to exactly zero.
+
+    Raises
+    ------
+    ControlPointError
+        If there are too few points, or one is repeated, out of range or off the surface.
+    UnreachableError
+        If the points lie on different components of the mesh.
+    """
+    if isinstance(control_points, SurfacePoints):
+        points = _checked_surface_points(mesh, control_points)
+    else:
+        try:
+            given = np.asarray(control_points)
+        except ValueError as error:
+            raise ControlPointError(f"control_points is ragged ({error}); {_FORMS}") from error
+        if given.size == 0:
+            points = SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
+        elif given.ndim == 1 and np.issubdtype(given.dtype, np.integer):
+            points = _points_at_vertices(mesh, given.astype(np.int64))
+        elif given.ndim == 2 and given.shape[1] == 3 and np.issubdtype(given.dtype, np.number):
+            points = _points_in_space(mesh, given.astype(np.float64))
+        else:
+            raise ControlPointError(
+                f"control_points has shape {given.shape} and type {given.dtype}; {_FORMS}"
+            )
+    _check_count(len(points), closed)
+    points = _snapped(points)
+    _check_distinct(mesh, points)
+    _check_one_component(mesh, points)
+    return points
+
+
+_FORMS = "pass vertex indices (k,), points on the surface (k, 3) or SurfacePoints"
+
+
+def _checked_surface_points(mesh: Mesh, given: SurfacePoints) -> SurfacePoints:
+    try:
+        faces = np.asarray(given.faces)
+        barycentric = np.asarray(given.barycentric, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ControlPointError(f"control_points cannot be read ({error}); {_FORMS}") from error
+    if faces.ndim != 1 or not (faces.size == 0 or np.issubdtype(faces.dtype, np.integer)):
+        raise ControlPointError(
+            f"control_points.faces has shape {faces.shape} and type {faces.dtype}; pass face "
+            "indices of shape (k,)"
+        )
+    if barycentric.shape != (len(faces), 3):
+        raise ControlPointError(
+            f"control_points.barycentric has shape {barycentric.shape}; pass ({len(faces)}, 3), "
+            "one row a face"
+        )
+    _check_range("control_points.faces", faces, len(mesh.faces), "faces")
+    sums = barycentric.sum(axis=1)
+    bad = (
+        ~np.isfinite(barycentric).all(axis=1)
+        | (barycentric < -tolerances.SNAP).any(axis=1)
+        | ~(np.abs(sums - 1.0) <= tolerances.BARYCENTRIC_SUM)
+    )
+    if bad.any():
+        first = int(bad.argmax())
+        raise ControlPointError(
+            f"control_points.barycentric[{first}] = {barycentric[first].tolist()} is no point of "
+            "its face; coordinates must not be negative and must sum to 1"
+        )
+    return SurfacePoints(faces.astype(np.int64), barycentric)
+
+
+def _points_at_vertices(mesh: Mesh, indices: IntArray) -> SurfacePoints:
+    _check_range("control_points", indices, len(mesh.vertices), "vertices")
+    loose = ~mesh.referenced[indices]
+    if loose.any():
+        raise ControlPointError(
+            f"control_points[{int(loose.argmax())}] = {indices[loose][0]} is a vertex that no "
+            "face uses, so it is off the surface; choose a vertex of a face"
+        )
+    around = mesh.vertex_faces
+    faces = around.indices[around.indptr[indices]].astype(np.int64)
+    barycentric = (mesh.faces[faces] == indices[:, None]).astype(np.float64)
+    return SurfacePoints(faces, barycentric)
+
+
+def _points_in_space(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
+    bad = ~np.isfinite(positions).all(axis=1)
+    if bad.any():
+        raise ControlPointError(
+            f"control_points[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
+        )
+    squared, faces, nearest = igl.point_mesh_squared_distance(positions, mesh.vertices, mesh.faces)
+    distance = np.sqrt(np.atleast_1d(squared))
+    off = distance > tolerances.ON_SURFACE * mesh.diagonal
+    if off.any():
+        first = int(off.argmax())
+        raise ControlPointError(
+            f"control_points[{first}] is off the surface by {distance[first]:.3g}, more than "
+            f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
+        )
+    faces = np.atleast_1d(faces).astype(np.int64)
+    corners = np.ascontiguousarray(mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2))
+    barycentric = igl.barycentric_coordinates(np.atleast_2d(nearest), *corners)
+    degenerate = ~np.isfinite(barycentric).all(axis=1)
+    if degenerate.any():
+        raise ControlPointError(
+            f"control_points[{int(degenerate.argmax())}] lies in a face without area "
+            f"({int(faces[degenerate][0])}); remove such faces or choose another point"
+        )
+    barycentric = np.clip(barycentric, 0.0, None)
+    return SurfacePoints(faces, barycentric / barycentric.sum(axis=1, keepdims=True))
+
+
+def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:
+    outside = (indices < 0) | (indices >= limit)
+    if outside.any():
+        first = int(outside.argmax())
+        raise ControlPointError(
+            f"{name}[{first}] = {indices[first]} is out of range; the mesh has {limit} {kind}, "
+            f"so indices must lie in 0 … {limit - 1}"
+        )
+
+
+def _check_count(count: int, closed: bool) -> None:
+    fewest = FEWEST_POINTS_CLOSED if closed else FEWEST_POINTS_OPEN
+    if count < fewest:
+        kind = "a closed" if closed else "an open"
+        raise ControlPointError(
+            f"control_points has {count} points, too few; {kind} curve needs at least {fewest}"
+        )
+
+
+def _snapped(points: SurfacePoints) -> SurfacePoints:
+    barycentric = np.where(points.barycentric < tolerances.SNAP, 0.0, points.barycentric)
+    return SurfacePoints(points.faces, barycentric / barycentric.sum(axis=1, keepdims=True))
+
+
+def _check_distinct(mesh: Mesh, points: SurfacePoints) -> None:
+    positions = points.positions(mesh)
+    separation = np.linalg.norm(positions[:, None] - positions[None], axis=2)
+    same = np.triu(separation <= tolerances.COINCIDENT * mesh.diagonal, k=1)
+    if same.any():
+        first, second = (int(i[0]) for i in np.nonzero(same))
+        raise ControlPointError(
+            f"control_points[{first}] and control_points[{second}] are the same point; "
+            "remove one of them (a closed curve returns to its first point by itself)"
+        )
+
+
+def _check_one_component(mesh: Mesh, points: SurfacePoints) -> None:
+    component = mesh.face_component[points.faces]
+    other = component != component[0]
+    if other.any():
+        raise UnreachableError(
+            f"control_points[0] and control_points[{int(other.argmax())}] lie on different "
+            "components of the mesh, so no curve joins them; join the components or merge "
+            "vertices by distance"
+        )

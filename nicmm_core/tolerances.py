@@ -1,0 +1,16 @@
+"""Every tolerance of the package, once; each is relative to a length of the mesh or a pure number.
+
+Lengths are never absolute: a mesh in micrometres and one in kilometres get the same curve.
+"""
+
+ON_SURFACE = 1e-4
+"""Farthest that a control point may lie from the surface, in bounding-box diagonals."""
+
+SNAP = 1e-6
+"""Barycentric coordinates below this count as zero: the point is on an edge or a vertex."""
+
+COINCIDENT = 1e-9
+"""Two control points closer than this, in bounding-box diagonals, are the same point."""
+
+BARYCENTRIC_SUM = 1e-6
+"""How far the barycentric coordinates that a caller gives may be from summing to one."""

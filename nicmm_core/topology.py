@@ -1,0 +1,174 @@
+"""Keep the zero set one loop.
+
+A level set is free to split, merge and miss points (the paper's Fig. 16), and on thin limbs it
+often does. Flipping the sign of one vertex keeps the zero set's topology exactly when the signs
+round its link form one positive and one negative run: a simple vertex. Starting from the signs of
+a field whose zero set is one simple loop through the control points, every vertex that the
+solution wants on the other side is flipped as soon as it is simple. When all can be, the solution
+is isotopic to the start: one simple loop through the control points in the same order. Where some
+cannot, the solution falls back on the start, blended over a few edges.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .array_types import FloatArray, IntArray
+from .contour import signs_with_controls
+from .virtual_splits import WorkingMesh
+
+FALLBACK_RADIUS = 4.0
+"""Distance from a vertex that breaks the topology within which the start replaces the solution,
+in mean edge lengths; the blend reaches as far as twice that again."""
+
+FALLBACK_GROWTH = 1.3
+"""Growth of that radius from one attempt to the next."""
+
+FALLBACK_ATTEMPTS = 12
+"""Attempts before the start replaces the solution everywhere."""
+
+
+def keep_topology(
+    working: WorkingMesh, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
+) -> tuple[FloatArray, int]:
+    """Follow a field as far as its zero set stays isotopic to that of the start.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    start : (n,) float array
+        A field whose zero set is one simple loop through the control vertices.
+    wanted : (n,) float array
+        The field to follow, in the same unit.
+    control_vertices : (k,) int array
+
+    Returns
+    -------
+    (n,) float array
+        ``wanted`` wherever nothing forbids it, else a blend of both.
+    int
+        Number of vertices of ``wanted`` whose sign breaks the topology; 0 means that the field
+        is returned as it came.
+    """
+    links = _Links(working)
+    breaking = _breaking_vertices(links, start, wanted, control_vertices)
+    n_breaking = len(breaking)
+    field, all_breaking = wanted, breaking
+    for attempt in range(FALLBACK_ATTEMPTS):
+        if not len(breaking):
+            return field, n_breaking
+        radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * working.mean_edge_length
+        share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
+        field = start + share * (wanted - start)
+        breaking = _breaking_vertices(links, start, field, control_vertices)
+        all_breaking = np.union1d(all_breaking, breaking)
+    return start, n_breaking
+
+
+def _breaking_vertices(
+    links: _Links, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
+) -> IntArray:
+    """Vertices that no sequence of simple flips brings to the side where they are wanted."""
+    sign = signs_with_controls(start, control_vertices)
+    goal = signs_with_controls(wanted, control_vertices)
+    changes_at_control = {v: links.sign_changes(v, sign) for v in control_vertices.tolist()}
+    queue = deque(np.flatnonzero(sign != goal).tolist())
+    queued = sign != goal
+    while queue:
+        vertex = queue.popleft()
+        queued[vertex] = False
+        if not links.is_simple(vertex, sign):
+            continue
+        sign[vertex] = goal[vertex]
+        around = links.neighbours(vertex)
+        controls_around = [v for v in around if v in changes_at_control]
+        if any(links.sign_changes(v, sign) != changes_at_control[v] for v in controls_around):
+            sign[vertex] = -goal[vertex]
+            continue
+        # A flip can free its neighbours and, beside a control point, those of the point.
+        freed = set(around).union(*(links.neighbours(v) for v in controls_around))
+        for other in sorted(freed):
+            if sign[other] != goal[other] and not queued[other]:
+                queue.append(other)
+                queued[other] = True
+    return np.flatnonzero(sign != goal)
+
+
+def _distance_from(working: WorkingMesh, sources: IntArray) -> FloatArray:
+    """Length along edges to the nearest source, shape (n,)."""
+    start, end = working.edges.T
+    length = np.linalg.norm(working.vertices[start] - working.vertices[end], axis=1)
+    size = len(working.vertices)
+    graph = sparse.coo_array((length, (start, end)), shape=(size, size)).tocsr()
+    return csgraph.dijkstra(graph, directed=False, indices=sources, min_only=True)
+
+
+def _smooth_step(fraction: FloatArray) -> FloatArray:
+    """0 up to 0, 1 from 2 on, and a smooth rise between."""
+    t = np.clip(0.5 * fraction, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+class _Links:
+    """Vertices round each vertex in order, found when first asked for."""
+
+    def __init__(self, working: WorkingMesh) -> None:
+        corners = working.faces.ravel()
+        self._by_vertex = np.argsort(corners, kind="stable") // 3
+        self._start = np.searchsorted(np.sort(corners), np.arange(len(working.vertices) + 1))
+        self._faces = working.faces
+        self._link: dict[int, tuple[list[int], bool] | None] = {}
+
+    def neighbours(self, vertex: int) -> list[int]:
+        """Vertices joined to a vertex by an edge."""
+        faces = self._faces[self._by_vertex[self._start[vertex] : self._start[vertex + 1]]]
+        return [v for v in np.unique(faces).tolist() if v != vertex]
+
+    def is_simple(self, vertex: int, sign: IntArray) -> bool:
+        """Whether one positive and one negative run make up the link."""
+        link = self._ordered(vertex)
+        return link is not None and self.sign_changes(vertex, sign) == (2 if link[1] else 1)
+
+    def sign_changes(self, vertex: int, sign: IntArray) -> int:
+        """Changes of sign round the link, zeros passed over; -1 where the link is no simple path.
+
+        A control vertex in the link is a zero, where the curve passes the link itself.
+        """
+        link = self._ordered(vertex)
+        if link is None:
+            return -1
+        ring, closed = link
+        signs = [int(sign[v]) for v in ring if sign[v] != 0]
+        if closed:
+            signs += signs[:1]
+        return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+
+    def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
+        """The link as a path and whether it closes; None when the surface branches here."""
+        if vertex not in self._link:
+            self._link[vertex] = self._trace(vertex)
+        return self._link[vertex]
+
+    def _trace(self, vertex: int) -> tuple[list[int], bool] | None:
+        joined: dict[int, list[int]] = {}
+        faces = self._faces[self._by_vertex[self._start[vertex] : self._start[vertex + 1]]]
+        for face in faces.tolist():
+            a, b = (v for v in face if v != vertex)
+            joined.setdefault(a, []).append(b)
+            joined.setdefault(b, []).append(a)
+        if max(map(len, joined.values())) > 2:
+            return None
+        ends = [v for v, others in joined.items() if len(others) == 1]
+        ring = [ends[0] if ends else next(iter(joined))]
+        before = -1
+        while True:
+            onward = [v for v in joined[ring[-1]] if v != before and v != ring[0]]
+            if not onward:
+                break
+            before = ring[-1]
+            ring.append(onward[0])
+        return (ring, not ends) if len(ring) == len(joined) else None
