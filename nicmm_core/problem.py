@@ -99,7 +99,7 @@ def build_problem(
     vertices = (working.vertices - working.vertices.mean(axis=0)) / unit
     edge_length = working.mean_edge_length / unit
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
-    distance = signed_distance(working, elements, loop) / unit
+    distance = signed_distance(working, elements, loop, edge_length)
     smoother = build_smoother(
         elements, loop.control_vertices, smoothness * SMOOTHING_LENGTH * edge_length
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -11,36 +10,74 @@ from .array_types import FloatArray, IntArray
 from .errors import UnreachableError
 from .finite_elements import FiniteElements
 from .initial_loop import InitialLoop
+from .sparse_solver import factorise
 from .virtual_splits import WorkingMesh
 
 LEAST_DISTANCE = 1e-3
 """Least distance of a vertex off the loop, in mean edge lengths; the heat method may give zero."""
 
 
+POISSON_SHIFT = 1e-8
+"""Share of the mass matrix in the Poisson system, which alone leaves a constant undetermined."""
+
+
 def signed_distance(
-    working: WorkingMesh, elements: FiniteElements, loop: InitialLoop
+    working: WorkingMesh, elements: FiniteElements, loop: InitialLoop, edge_length: float
 ) -> FloatArray:
     """Distance to the loop along the surface, negative inside, zero on the loop.
 
-    The heat method (Crane et al. 2017) with all loop vertices as sources gives the size.
     Inside is the side with the smaller area.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    elements : FiniteElements
+        Of the working mesh; their unit is the unit of the distance.
+    loop : InitialLoop
+    edge_length : float
+        Mean edge length in the unit of the elements.
 
     Returns
     -------
     (n,) float array
-        In the unit of the working mesh.
 
     Raises
     ------
     UnreachableError
         If the loop does not bound a region, as a loop round a torus's tube.
     """
-    heat = igl.HeatGeodesicsData()
-    igl.heat_geodesics_precompute(working.vertices, working.faces, heat)
-    distance = np.asarray(igl.heat_geodesics_solve(heat, loop.vertices)).ravel()
-    distance = np.maximum(distance, LEAST_DISTANCE * working.mean_edge_length)
+    distance = heat_distance(elements, loop.vertices, edge_length**2)
+    distance = np.maximum(distance, LEAST_DISTANCE * edge_length)
     distance[loop.vertices] = 0.0
     return _side(working, elements, loop) * distance
+
+
+def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> FloatArray:
+    """Distance to source vertices by the heat method (Crane et al. 2017), shape (n,).
+
+    Heat flows from the sources for a short time, its gradient is brought to unit length, and the
+    distance is the function whose gradient comes nearest to that.
+
+    Parameters
+    ----------
+    elements : FiniteElements
+    sources : (l,) int array
+    time : float
+        Of the flow; the square of the mean edge length is usual.
+    """
+    mass = sparse.diags_array(elements.vertex_areas)
+    heat = np.zeros(len(elements.vertex_areas))
+    heat[sources] = 1.0
+    heat = factorise(mass + time * elements.stiffness).solve(heat)
+    gradient = (elements.gradient @ heat).reshape(3, -1)
+    length = np.linalg.norm(gradient, axis=0)
+    # Where no heat arrives within the range of numbers there is no direction either.
+    direction = -gradient / np.where(length > 0.0, length, 1.0)
+    flux = elements.gradient.T @ (elements.face_areas * direction).ravel()
+    area = elements.vertex_areas.sum()
+    poisson = factorise(elements.stiffness + (POISSON_SHIFT / area) * mass)
+    distance = poisson.solve(flux)
+    return distance - distance[sources].mean()
 
 
 def _side(working: WorkingMesh, elements: FiniteElements, loop: InitialLoop) -> IntArray:

@@ -16,6 +16,7 @@ from scipy.sparse import linalg
 
 from .array_types import FloatArray, IntArray
 from .finite_elements import FiniteElements
+from .sparse_solver import factorise
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,7 @@ def build_smoother(elements: FiniteElements, control_vertices: IntArray, length:
     """
     mass = sparse.diags_array(elements.vertex_areas)
     bending = elements.stiffness @ sparse.diags_array(1.0 / elements.vertex_areas)
-    system = sparse.csc_array(mass + length**4 * (bending @ elements.stiffness))
-    factor = linalg.splu(
-        system,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    factor = factorise(mass + length**4 * (bending @ elements.stiffness))
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
     fields = factor.solve(loads)

@@ -1,0 +1,1 @@
+"""Measurements of the method, one command a result; see `__main__`."""

@@ -1,0 +1,342 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Demo, tests and packages of NICMM Curves; needs Python 3.11 and nothing else.
+
+    python3 build.py demo      draw curves on Suzanne in headless Blender and render them
+    python3 build.py test      run every check
+    python3 build.py package   build the installable zips
+
+Each command makes `.venv/` on its first run and installs requirements.txt into it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+VENV = ROOT / ".venv"
+VENV_PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+DIST = ROOT / "dist"
+REQUIREMENTS = ROOT / "requirements.txt"
+MANIFEST = "blender_manifest.toml"
+
+PYTHON = (3, 11)  # of Blender 4.5 and its bpy module
+BLENDER_PYTHONS = ("3.11", "3.13")  # of Blender 4.5 and 5.0, and of later ones
+
+# The wheel tags that each of Blender's platforms takes, the preferred one first.
+PLATFORMS = {
+    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),
+    "windows-x64": ("win_amd64",),
+    "macos-arm64": ("macosx_12_0_arm64", "macosx_14_0_arm64"),  # PyTorch needs the newer one
+}
+
+# Blender brings its own NumPy, which every extension shares: it must not be in the zip.
+BUNDLED = ("libigl", "scipy")
+TORCH_COMPANIONS = (
+    "filelock==4.2.11",
+    "fsspec==2026.9.0",
+    "jinja2==3.1.6",
+    "markupsafe==3.0.4",
+    "mpmath==1.3.0",
+    "networkx==3.6.1",
+    "sympy==1.14.0",
+    "typing_extensions==4.16.0",
+)
+
+EXTENSION_INIT = '''\
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""NICMM Curves: smooth curves on meshes through selected vertices."""
+
+from .nicmm_blender import register, unregister
+
+__all__ = ["register", "unregister"]
+'''
+
+
+class BuildError(Exception):
+    """A step cannot be done; the message says why and what to do."""
+
+
+def say(text: str) -> None:
+    print(f"-- {text}", flush=True)
+
+
+def run(arguments: Sequence[str | Path], environment: dict[str, str] | None = None) -> int:
+    """Run a command in the repository's root, its output shown, and return its exit status."""
+    return subprocess.run(
+        [str(argument) for argument in arguments],
+        cwd=ROOT,
+        env={**os.environ, **(environment or {})},
+        check=False,
+    ).returncode
+
+
+# The environment
+
+
+def pinned(name: str) -> str:
+    """The pin of a package in requirements.txt, such as "scipy==1.17.1"."""
+    for line in REQUIREMENTS.read_text(encoding="utf-8").splitlines():
+        requirement = line.split("#")[0].strip()
+        if requirement.startswith(f"{name}=="):
+            return requirement
+    raise BuildError(f"{REQUIREMENTS.name} has no pin of {name}. Add a line {name}==VERSION")
+
+
+def check_python() -> None:
+    needed = ".".join(map(str, PYTHON))
+    if sys.version_info[:2] != PYTHON:
+        raise BuildError(
+            f"Python {needed} is needed, as Blender 4.5 is built with it; this is Python "
+            f"{platform.python_version()}. Install Python {needed} and run: "
+            f"python{needed} build.py {' '.join(sys.argv[1:])}"
+        )
+    for module in ("venv", "ensurepip"):
+        try:
+            __import__(module)
+        except ImportError:
+            raise BuildError(
+                f"This Python lacks its module {module}. On Debian and Ubuntu run: "
+                f"apt install python{needed}-venv; elsewhere install Python {needed} in full"
+            ) from None
+
+
+def ensure_environment() -> None:
+    """Make `.venv/` with the pinned packages, unless it has them already."""
+    check_python()
+    fingerprint = hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest()
+    stamp = VENV / "installed.sha256"
+    if VENV_PYTHON.exists() and stamp.is_file() and stamp.read_text() == fingerprint:
+        return
+    say(f"Making {VENV.name}/ and installing {REQUIREMENTS.name} (some minutes, once)")
+    if run([sys.executable, "-m", "venv", "--clear", VENV]) != 0:
+        raise BuildError(f"{VENV.name}/ could not be made: see the lines above")
+    if run([VENV_PYTHON, "-m", "pip", "install", "-r", REQUIREMENTS]) != 0:
+        raise BuildError(
+            "A package could not be installed: see pip's lines above, check the network "
+            "connection and run the same command again"
+        )
+    stamp.write_text(fingerprint)
+
+
+# The extension
+
+
+def manifest() -> dict:
+    import tomllib  # here, so that an older Python reaches the message of check_python
+
+    return tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
+
+
+def stage(folder: Path, wheels: Sequence[Path] = (), blender_platform: str = "") -> None:
+    """Lay the extension out in an empty folder, as it stands in the zip."""
+    folder.mkdir(parents=True)
+    for package in ("nicmm_blender", "nicmm_core"):
+        shutil.copytree(
+            ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__", ".*")
+        )
+    shutil.copy(ROOT / "LICENSE", folder)
+    (folder / "__init__.py").write_text(EXTENSION_INIT, encoding="utf-8")
+    text = (ROOT / MANIFEST).read_text(encoding="utf-8")
+    if blender_platform:
+        text += f'\nplatforms = ["{blender_platform}"]\n'
+    if wheels:
+        (folder / "wheels").mkdir()
+        text += "wheels = [\n"
+        for wheel in wheels:
+            shutil.copy(wheel, folder / "wheels")
+            text += f'    "./wheels/{wheel.name}",\n'
+        text += "]\n"
+    (folder / MANIFEST).write_text(text, encoding="utf-8")
+
+
+def download(requirement: str, blender_platform: str, python: str) -> Path:
+    """The wheel of a package for a platform and a Python; each is downloaded once."""
+    name, version = requirement.split("==")
+    folder = DIST / "wheels" / f"{blender_platform}-python{python}"
+    pattern = f"{name}-{version}-*.whl"
+    if not list(folder.glob(pattern)):
+        say(f"Downloading {requirement} for {blender_platform}, Python {python}")
+        command = [str(VENV_PYTHON), "-m", "pip", "download", "--quiet", "--no-deps"]
+        command += ["--only-binary=:all:", "--python-version", python, "--dest", str(folder)]
+        for tag in PLATFORMS[blender_platform]:
+            command += ["--platform", tag]
+        if run([*command, requirement]) != 0 or not list(folder.glob(pattern)):
+            raise BuildError(
+                f"There is no wheel of {requirement} for {blender_platform} and Python {python} "
+                "where pip looks. Check the network connection, or choose other platforms or "
+                "Pythons (--platform, --python)"
+                + ("" if name in BUNDLED else ", or leave out --with-torch")
+            )
+    return next(folder.glob(pattern))
+
+
+def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bool) -> list[Path]:
+    """The wheels of a zip, without repetition."""
+    requirements = [pinned(name) for name in BUNDLED]
+    if with_torch:
+        # The registry's Linux wheel needs gigabytes of CUDA companions; the CPU build does not.
+        local = "+cpu" if blender_platform == "linux-x64" else ""
+        requirements += [pinned("torch") + local, *TORCH_COMPANIONS]
+    wheels = {}
+    for python in pythons:
+        found = [download(requirement, blender_platform, python) for requirement in requirements]
+        # Blender counts a stable-ABI wheel for its major Python version only, and refuses the
+        # extension where no wheel names the minor version as well.
+        tag = f"-cp{python.replace('.', '')}-"
+        if not any(tag in wheel.name for wheel in found):
+            raise BuildError(f"No wheel is built for Python {python} itself ({tag.strip('-')})")
+        wheels.update({wheel.name: wheel for wheel in found})
+    return sorted(wheels.values(), key=lambda wheel: wheel.name)
+
+
+def blender_tool() -> tuple[Path, Path]:
+    """Blender's own packaging tool and its list of tags, from the installed bpy module."""
+    # Found without an import, which would start Blender.
+    search = "import importlib.util as u; print(u.find_spec('bpy').submodule_search_locations[0])"
+    bpy = subprocess.run([VENV_PYTHON, "-c", search], capture_output=True, text=True, check=True)
+    scripts = next(Path(bpy.stdout.strip()).glob("*/scripts"))
+    return (
+        scripts / "addons_core/bl_pkg/cli/blender_ext.py",
+        scripts / "modules/_bpy_internal/extensions/tags.py",
+    )
+
+
+def package(
+    blender_platform: str,
+    pythons: Sequence[str] = BLENDER_PYTHONS,
+    with_torch: bool = False,
+    output: Path = DIST,
+) -> Path:
+    """Build the zip of one platform, let Blender's own tool check it, and return its path."""
+    ensure_environment()
+    wheels = collect_wheels(blender_platform, pythons, with_torch)
+    tool, tags = blender_tool()
+    facts = manifest()
+    name = f"{facts['id']}-{facts['version']}-{blender_platform.replace('-', '_')}"
+    archive = output / f"{name}{'-torch' if with_torch else ''}.zip"
+    output.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        source = Path(temporary) / facts["id"]
+        stage(source, wheels, blender_platform)
+        for arguments in (
+            ["build", "--source-dir", str(source), "--output-filepath", str(archive)],
+            ["validate", str(archive)],
+        ):
+            if run([VENV_PYTHON, tool, *arguments, "--valid-tags", tags]) != 0:
+                raise BuildError("Blender's tool refused the extension: see the lines above")
+    return archive
+
+
+def this_platform() -> str:
+    """Blender's name of the platform that this runs on."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system())
+    machine = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64"}.get(platform.machine().lower())
+    name = f"{system}-{machine}"
+    if name not in PLATFORMS:
+        raise BuildError(
+            f"No zip is built for {platform.system()} on {platform.machine()}; there are "
+            + ", ".join(PLATFORMS)
+        )
+    return name
+
+
+# The commands
+
+
+def command_demo(_arguments: argparse.Namespace) -> int:
+    ensure_environment()
+    with tempfile.TemporaryDirectory() as user_folder:
+        # Blender finds the extension where an installed one stands; its wheels are in .venv.
+        stage(Path(user_folder) / "extensions" / "user_default" / manifest()["id"])
+        return run(
+            [VENV_PYTHON, ROOT / "demo" / "suzanne.py"], {"BLENDER_USER_RESOURCES": user_folder}
+        )
+
+
+def command_test(arguments: argparse.Namespace) -> int:
+    ensure_environment()
+    checks = {
+        "ruff check": ["ruff", "check"],
+        "ruff format": ["ruff", "format", "--check"],
+        "mypy": ["mypy"],
+        "pytest": ["pytest", "--durations=10", *arguments.pytest_arguments],
+    }
+    failed = []
+    for name, command in checks.items():
+        say(name)
+        if run([VENV_PYTHON, "-m", *command]) != 0:
+            failed.append(name)
+    if failed:
+        say(f"Failed: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+def command_package(arguments: argparse.Namespace) -> int:
+    for blender_platform in arguments.platform or PLATFORMS:
+        archive = package(
+            blender_platform,
+            arguments.python or BLENDER_PYTHONS,
+            arguments.with_torch,
+            arguments.output.resolve(),
+        )
+        say(f"{archive} ({archive.stat().st_size / 1e6:.0f} MB)")
+    return 0
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="build.py", description="Demo, tests and packages of NICMM Curves."
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+
+    demo = commands.add_parser("demo", help="draw curves on Suzanne in headless Blender")
+    demo.set_defaults(command=command_demo)
+
+    test = commands.add_parser("test", help="run every check")
+    test.add_argument(
+        "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
+    )
+    test.set_defaults(command=command_test)
+
+    pack = commands.add_parser("package", help="build the installable zips in dist/")
+    pack.add_argument(
+        "--platform", action="append", choices=PLATFORMS, help="default: every platform; repeatable"
+    )
+    pack.add_argument(
+        "--python",
+        action="append",
+        metavar="X.Y",
+        help=f"Python of Blender; default: {' and '.join(BLENDER_PYTHONS)}; repeatable",
+    )
+    pack.add_argument("--with-torch", action="store_true", help="bundle PyTorch where wheels exist")
+    pack.add_argument("--output", type=Path, default=DIST, help="folder of the zips; default: dist")
+    pack.set_defaults(command=command_package)
+
+    parsed = parser.parse_args(arguments)
+    if "command" not in parsed:
+        parser.print_help()
+        parser.exit()
+    return parsed
+
+
+def main() -> int:
+    arguments = parse(sys.argv[1:])
+    try:
+        return arguments.command(arguments)
+    except BuildError as error:
+        print(f"build.py: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

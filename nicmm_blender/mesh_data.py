@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads what the core needs from a mesh object: triangles, selected vertices, vertex groups.
+
+Blender keeps a separate copy of a mesh that is being edited: call `synchronise` first.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import bmesh
+
+
+class InputError(Exception):
+    """The Blender data does not say what was asked for; the message says what to change."""
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A mesh as the core takes it.
+
+    `local` and `solved` hold the (V, 3) positions in the object's own space and in the space where
+    lengths are what the user sees; `faces` holds the (F, 3) vertex indices.
+    """
+
+    local: np.ndarray
+    solved: np.ndarray
+    faces: np.ndarray
+
+    def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Positions in the object's own space of points given by face and barycentrics."""
+        return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal in the object's own space."""
+        return float(np.linalg.norm(np.ptp(self.local, axis=0)))
+
+
+def mesh_object(context):
+    """The mesh to draw on: the active object, or the mesh that the active curve was drawn on.
+
+    Blender shows the redo panel only while the operator could run again, and by then the new curve
+    is the active object.
+    """
+    active = context.active_object
+    if active is not None and active.type == "CURVE":
+        active = active.parent
+    return active if active is not None and active.type == "MESH" else None
+
+
+def synchronise(mesh_object) -> None:
+    """Bring the mesh up to date with what is being edited."""
+    if mesh_object.mode == "EDIT":
+        mesh_object.update_from_editmode()
+
+
+def triangles(mesh_object) -> Triangles:
+    """Positions and triangles; quads and larger faces are cut as Blender draws them."""
+    mesh = mesh_object.data
+    positions = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    mesh.calc_loop_triangles()
+    faces = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+
+    local = positions.astype(np.float64)
+    linear = np.array(mesh_object.matrix_world.to_3x3(), dtype=np.float64)
+    solved = local if _keeps_proportions(linear) else local @ linear.T
+    return Triangles(local, solved, faces.astype(np.int64))
+
+
+def _keeps_proportions(linear: np.ndarray) -> bool:
+    """Whether a transform is a rotation, mirror image or uniform scale, up to rounding.
+
+    Then the curve is the same in the object's own space, and turning the object does not change it.
+    """
+    gram = linear.T @ linear
+    return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))
+
+
+def selected_vertices(mesh_object) -> np.ndarray:
+    """Indices of the selected vertices, ascending."""
+    mesh = mesh_object.data
+    selected = np.empty(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("select", selected)
+    return np.flatnonzero(selected)
+
+
+def selection_history(mesh_object) -> np.ndarray:
+    """Indices of the vertices that Blender remembers as selected one by one, oldest first."""
+    mesh = mesh_object.data
+    if mesh_object.mode == "EDIT":
+        return _history(bmesh.from_edit_mesh(mesh))
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(mesh)
+        return _history(edited)
+    finally:
+        edited.free()
+
+
+def _history(edited) -> np.ndarray:
+    # list() at once: some Blenders give an iterator that a generator expression refuses.
+    elements = list(edited.select_history)
+    vertices = [found.index for found in elements if isinstance(found, bmesh.types.BMVert)]
+    return np.array(vertices, dtype=np.int64)
+
+
+def control_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
+    """Return the selected vertices and the core's order for them, "given" or "shortest".
+
+    Box, circle and lasso selection leave no history and old entries stay in it, so the history
+    counts only where it holds exactly the selected vertices.
+    """
+    selected = selected_vertices(mesh_object)
+    if order == "SHORTEST":
+        return selected, "shortest"
+    history = selection_history(mesh_object)
+    if np.array_equal(np.sort(history), selected):
+        return history, "given"
+    if order == "GIVEN":
+        raise InputError(
+            f"Blender remembers the order of {np.isin(selected, history).sum()} of the "
+            f"{len(selected)} selected vertices. Select them one by one with Shift-click, "
+            "or set Order to Automatic or Shortest"
+        )
+    return selected, "shortest"
+
+
+def group_weights(mesh_object, name: str) -> np.ndarray | None:
+    """Weight of every vertex in a vertex group; None for an empty name."""
+    if not name:
+        return None
+    group = mesh_object.vertex_groups.get(name)
+    if group is None:
+        groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)
+        raise InputError(
+            f'"{mesh_object.name}" has no vertex group "{name}". '
+            + (f"Choose one of {groups}, or leave" if groups else "Add the group, or leave")
+            + " the field empty"
+        )
+    weights = np.zeros(len(mesh_object.data.vertices))
+    for vertex in mesh_object.data.vertices:
+        for membership in vertex.groups:
+            if membership.group == group.index:
+                weights[vertex.index] = membership.weight
+    return weights

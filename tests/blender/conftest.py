@@ -1,0 +1,53 @@
+"""Blender with the extension installed from the zip, never from the source tree."""
+
+import os
+import tempfile
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+
+import build
+
+# Blender reads this when bpy is first imported: the tests keep off the user's own settings.
+_user_folder = tempfile.TemporaryDirectory(prefix="nicmm-blender-")
+os.environ["BLENDER_USER_RESOURCES"] = _user_folder.name
+
+import bpy  # noqa: E402
+
+import addon_utils  # noqa: E402
+
+MODULE = "bl_ext.user_default.nicmm_curves"
+
+
+@pytest.fixture(scope="session")
+def archive(tmp_path_factory):
+    """The zip of this platform, as users get it."""
+    return build.package(build.this_platform(), output=tmp_path_factory.mktemp("package"))
+
+
+@pytest.fixture(scope="session")
+def extension(archive):
+    """The installed extension: its `module`, its `core` and its `folder`."""
+    bpy.ops.extensions.package_install_files(
+        filepath=str(archive), repo="user_default", enable_on_install=False
+    )
+    addon_utils.extensions_refresh()
+    module = addon_utils.enable(MODULE, default_set=True)
+    assert module is not None, "the extension was not installed or did not register"
+    yield SimpleNamespace(
+        name=MODULE,
+        module=module,
+        core=import_module(f"{MODULE}.nicmm_core"),
+        folder=os.path.dirname(module.__file__),
+    )
+    # Blender hangs at exit when classes of a script are left.
+    addon_utils.disable(MODULE, default_set=True)
+
+
+@pytest.fixture
+def empty_scene(extension):
+    """A new file without objects, at the start of the undo history."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.ed.undo_push(message="Start")
+    return extension

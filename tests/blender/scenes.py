@@ -1,0 +1,69 @@
+"""Objects and selections that the tests of the extension share."""
+
+import bpy
+import numpy as np
+
+import bmesh
+
+
+def sphere(subdivisions=3):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=subdivisions)
+    return bpy.context.active_object
+
+
+def nearest_vertices(mesh_object, points):
+    """The vertices nearest to points in the object's own space."""
+    vertices = positions(mesh_object)
+    return [int(np.argmin(np.linalg.norm(vertices - point, axis=1))) for point in points]
+
+
+def ring(mesh_object, count, height=0.0):
+    """Vertices of a unit sphere at equal angles round the z axis, in that order."""
+    radius = np.sqrt(1 - height**2)
+    angles = 2 * np.pi * np.arange(count) / count
+    return nearest_vertices(
+        mesh_object, [(radius * np.cos(a), radius * np.sin(a), height) for a in angles]
+    )
+
+
+def select(mesh_object, vertices, history=None):
+    """Select exactly these vertices in Object Mode, as if clicked one by one in their order.
+
+    With `history`, Blender remembers those vertices instead, as after a box selection.
+    """
+    edited = bmesh.new()
+    edited.from_mesh(mesh_object.data)
+    edited.verts.ensure_lookup_table()
+    edited.select_history.clear()
+    for element in (*edited.verts, *edited.edges, *edited.faces):
+        element.select_set(False)
+    for vertex in vertices:
+        edited.verts[vertex].select_set(True)
+    for vertex in vertices if history is None else history:
+        edited.select_history.add(edited.verts[vertex])
+    edited.to_mesh(mesh_object.data)
+    edited.free()
+    bpy.ops.ed.undo_push(message="Select")
+
+
+def positions(mesh_object):
+    return np.array([vertex.co for vertex in mesh_object.data.vertices], dtype=np.float64)
+
+
+def triangles(mesh_object):
+    mesh_object.data.calc_loop_triangles()
+    return np.array([list(triangle.vertices) for triangle in mesh_object.data.loop_triangles])
+
+
+def curves():
+    return [found for found in bpy.data.objects if found.type == "CURVE"]
+
+
+def points(curve_object, spline=0):
+    """Positions of a curve's points in its own space."""
+    return np.array([point.co[:3] for point in curve_object.data.splines[spline].points])
+
+
+def distances_to(targets, polyline):
+    """Distance of each target to the nearest point of a polyline."""
+    return np.linalg.norm(targets[:, None] - polyline[None], axis=2).min(axis=1)

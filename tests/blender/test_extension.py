@@ -1,0 +1,107 @@
+"""Installing, enabling and disabling."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import addon_utils
+
+import build
+from tests.blender import scenes
+
+MENUS = (
+    "VIEW3D_MT_edit_mesh_vertices",
+    "VIEW3D_MT_edit_mesh_context_menu",
+    "VIEW3D_MT_curve_add",
+)
+ENABLE = """
+import sys
+import addon_utils
+addon_utils.extensions_refresh()
+assert addon_utils.enable("bl_ext.user_default.nicmm_curves", default_set=True) is not None
+loaded = {name.partition(".")[0] for name in sys.modules}
+addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
+print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}))
+"""
+
+
+def entries(menu):
+    """Modules of the functions that were appended to a menu."""
+    return [draw.__module__ for draw in getattr(bpy.types, menu).draw._draw_funcs]
+
+
+def test_runs_from_the_installed_zip(extension):
+    user_folder = os.environ["BLENDER_USER_RESOURCES"]
+    assert extension.folder.startswith(user_folder)
+    assert extension.core.__file__.startswith(extension.folder)
+    (libraries,) = Path(user_folder, "extensions", ".local").rglob("site-packages")
+    assert (libraries / "scipy").is_dir()
+    assert (libraries / "igl").is_dir()
+    assert not (libraries / "numpy").exists()
+
+
+def test_enabling_loads_no_library(tmp_path):
+    build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
+    ran = subprocess.run(
+        [sys.executable, "-c", f"import bpy\n{ENABLE}"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.splitlines()[-1].split() == ["loaded:"]
+
+
+def test_menus_and_panel(extension):
+    for menu in MENUS:
+        assert f"{extension.name}.nicmm_blender.interface" in entries(menu)
+    assert bpy.types.NICMM_PT_design_curve.bl_category == "NICMM"
+
+
+def test_labels_and_tooltips_follow_blender(extension):
+    for name, found in bpy.types.Scene.bl_rna.properties[
+        "nicmm_curves"
+    ].fixed_type.properties.items():
+        if name in ("rna_type", "name"):
+            continue
+        assert found.name[0].isupper()
+        assert found.description
+        assert not found.description.endswith(".")
+    tooltip = bpy.ops.nicmm.design_curve.get_rna_type().description
+    assert tooltip and not tooltip.endswith(".")
+
+
+def test_panel_hands_its_settings_to_the_operator(extension):
+    operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
+    settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
+    assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"}
+
+
+def test_disabling_removes_everything(extension):
+    addon_utils.disable(extension.name, default_set=True)
+    try:
+        assert not hasattr(bpy.types, "NICMM_OT_design_curve")
+        assert not hasattr(bpy.types, "NICMM_PT_design_curve")
+        assert not hasattr(bpy.types, "NICMM_PG_settings")
+        assert not hasattr(bpy.types.Scene, "nicmm_curves")
+        for menu in MENUS:
+            assert not [name for name in entries(menu) if name.startswith(extension.name)]
+    finally:
+        addon_utils.enable(extension.name, default_set=True)
+
+
+@pytest.mark.parametrize("location", [(0, 0, 0), (5, 0, 0)])
+def test_works_after_enabling_again(empty_scene, location):
+    sphere = scenes.sphere()
+    sphere.location = location
+    scenes.select(sphere, scenes.ring(sphere, 3))
+    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert np.isfinite(scenes.points(scenes.curves()[0])).all()

@@ -1,0 +1,350 @@
+"""The operator, in the installed extension, against the core's own answer."""
+
+import sys
+from importlib import import_module
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender import scenes
+
+# Blender keeps positions in single precision.
+ROUNDING = 1e-6
+
+
+def design(core, mesh_object, vertices, scale=(1.0, 1.0, 1.0), **arguments):
+    mesh = core.Mesh(scenes.positions(mesh_object) * scale, scenes.triangles(mesh_object))
+    return core.design_curve(mesh, vertices, **arguments)
+
+
+def reported_error(**arguments):
+    """Run the operator, which must refuse and leave the file as it was; return its report."""
+    before = [(found.name, found.select_get()) for found in bpy.data.objects]
+    active = bpy.context.active_object
+    with pytest.raises(RuntimeError) as caught:
+        bpy.ops.nicmm.design_curve(**arguments)
+    assert [(found.name, found.select_get()) for found in bpy.data.objects] == before
+    assert bpy.context.active_object == active
+    assert not bpy.data.curves
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_equals_the_core(empty_scene, mode):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 5, height=0.4)
+    scenes.select(sphere, vertices)
+    expected = design(empty_scene.core, sphere, vertices)
+    bpy.ops.object.mode_set(mode=mode)
+
+    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+
+    (curve,) = scenes.curves()
+    (spline,) = curve.data.splines
+    assert spline.type == "POLY"
+    assert spline.use_cyclic_u
+    np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("settings", "arguments"),
+    [
+        ({"order": "SHORTEST"}, {"order": "shortest"}),
+        ({"order": "GIVEN"}, {"order": "given"}),
+        ({"smoothness": 3.0}, {"smoothness": 3.0}),
+        ({"method": "NICMM_PAPER"}, {"method": "nicmm-paper"}),
+    ],
+)
+def test_settings_reach_the_core(empty_scene, settings, arguments):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4, height=0.3)
+    scenes.select(sphere, vertices)
+    expected = design(empty_scene.core, sphere, vertices, **arguments)
+
+    bpy.ops.nicmm.design_curve(**settings)
+
+    (curve,) = scenes.curves()
+    np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
+
+
+def test_vertex_groups_are_maps(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4)
+    scenes.select(sphere, vertices)
+    weights = {}
+    for name, centre in (("Walls", (0.7, 0.7, 0.0)), ("Rails", (-0.6, -0.6, 0.5))):
+        distance = np.linalg.norm(scenes.positions(sphere) - centre, axis=1)
+        weights[name] = np.clip(1.2 - 4 * distance, 0, 1).astype(np.float32)
+        group = sphere.vertex_groups.new(name=name)
+        for vertex in np.flatnonzero(weights[name]):
+            group.add([int(vertex)], float(weights[name][vertex]), "REPLACE")
+    expected = design(
+        empty_scene.core, sphere, vertices, obstacles=weights["Walls"], alignment=weights["Rails"]
+    )
+    plain = design(empty_scene.core, sphere, vertices)
+
+    bpy.ops.nicmm.design_curve(obstacle_group="Walls", alignment_group="Rails")
+
+    points = scenes.points(scenes.curves()[0])
+    np.testing.assert_allclose(points, expected.curves[0].points, atol=ROUNDING)
+    assert scenes.distances_to(points, plain.curves[0].points).max() > 0.01
+
+
+def test_complete_history_gives_the_order(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 5)[::-1]
+    scenes.select(sphere, vertices)
+    bpy.ops.nicmm.design_curve()
+    expected = design(empty_scene.core, sphere, vertices, order="given").curves[0]
+    points = scenes.points(bpy.context.active_object)
+    np.testing.assert_allclose(points, expected.points, atol=ROUNDING)
+    np.testing.assert_allclose(
+        points[expected.control_index], scenes.positions(sphere)[vertices], atol=ROUNDING
+    )
+
+
+@pytest.mark.parametrize("remembered", [0, 3])
+def test_incomplete_history_leaves_the_shortest_order(empty_scene, remembered):
+    sphere = scenes.sphere()
+    vertices = sorted(scenes.ring(sphere, 5))
+    scenes.select(sphere, vertices, history=vertices[:remembered])
+    bpy.ops.nicmm.design_curve()
+    expected = design(empty_scene.core, sphere, vertices, order="shortest").curves[0]
+    points = scenes.points(bpy.context.active_object)
+    np.testing.assert_allclose(points, expected.points, atol=ROUNDING)
+
+
+def test_order_as_selected_needs_the_history(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4)
+    scenes.select(sphere, vertices, history=vertices[:1])
+    report = reported_error(order="GIVEN")
+    assert "order of 1 of the 4 selected vertices" in report
+    assert "Shift-click" in report
+
+
+def test_report_says_which_order_was_used(empty_scene, capfd):
+    sphere = scenes.sphere()
+    for history, words in ((None, "in the order of selection"), ([], "in the shortest order")):
+        bpy.context.view_layer.objects.active = sphere
+        scenes.select(sphere, scenes.ring(sphere, 4), history)
+        capfd.readouterr()
+        bpy.ops.nicmm.design_curve()
+        assert words in capfd.readouterr().out
+
+
+def test_curve_object_belongs_to_the_mesh(empty_scene):
+    collection = bpy.data.collections.new("Models")
+    bpy.context.scene.collection.children.link(collection)
+    sphere = scenes.sphere()
+    for other in sphere.users_collection:
+        other.objects.unlink(sphere)
+    collection.objects.link(sphere)
+    sphere.location = (3, 0, 1)
+    sphere.rotation_euler = (0.3, 0.2, 1.0)
+    scenes.select(sphere, scenes.ring(sphere, 3))
+
+    bpy.ops.nicmm.design_curve(thickness=0.01)
+
+    curve = bpy.context.active_object
+    bpy.context.view_layer.update()
+    assert curve.type == "CURVE"
+    assert curve.name == f"{sphere.name} Curve"
+    assert bpy.context.selected_objects == [curve]
+    assert list(curve.users_collection) == [collection]
+    assert curve.matrix_world == sphere.matrix_world
+    assert curve.parent == sphere
+    diagonal = np.linalg.norm(np.ptp(scenes.positions(sphere), axis=0))
+    assert curve.data.bevel_depth == pytest.approx(0.01 * diagonal)
+
+
+def test_runs_again_while_the_new_curve_is_active(empty_scene):
+    """As Blender's redo panel needs it."""
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 3))
+    bpy.ops.nicmm.design_curve()
+    assert bpy.context.active_object.type == "CURVE"
+    assert bpy.ops.nicmm.design_curve.poll()
+    bpy.ops.nicmm.design_curve()
+    assert [curve.parent for curve in scenes.curves()] == [sphere, sphere]
+
+
+def test_edit_mode_stays(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 3))
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.nicmm.design_curve()
+    assert bpy.context.mode == "EDIT_MESH"
+    assert bpy.context.active_object == sphere
+    assert scenes.curves()[0].select_get()
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_undo_takes_the_curve_away(empty_scene, mode):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 3))
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.ed.undo_push(message="Mode")
+    bpy.ops.nicmm.design_curve("EXEC_DEFAULT", True)
+    assert len(scenes.curves()) == 1
+    bpy.ops.ed.undo()
+    assert not scenes.curves()
+    bpy.ops.ed.redo()
+    assert len(scenes.curves()) == 1
+
+
+def test_lengths_are_those_of_the_scaled_object(empty_scene):
+    sphere = scenes.sphere()
+    sphere.scale = (1, 1, 3)
+    bpy.context.view_layer.update()
+    vertices = scenes.ring(sphere, 4, height=0.5)
+    scenes.select(sphere, vertices)
+    expected = design(empty_scene.core, sphere, vertices, scale=(1, 1, 3))
+    unscaled = design(empty_scene.core, sphere, vertices)
+
+    bpy.ops.nicmm.design_curve()
+
+    curve = bpy.context.active_object
+    bpy.context.view_layer.update()
+    world = scenes.points(curve) @ np.array(curve.matrix_world.to_3x3()).T
+    np.testing.assert_allclose(world, expected.curves[0].points, atol=1e-5)
+    assert scenes.distances_to(scenes.points(curve), unscaled.curves[0].points).max() > 1e-3
+
+
+def test_turning_the_object_does_not_change_the_curve(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4, height=0.3)
+    drawn = []
+    for rotation in ((0, 0, 0), (0.4, 1.0, -0.2)):
+        sphere.rotation_euler = rotation
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.objects.active = sphere
+        scenes.select(sphere, vertices)
+        bpy.ops.nicmm.design_curve()
+        drawn.append(scenes.points(bpy.context.active_object))
+    np.testing.assert_array_equal(*drawn)
+
+
+def test_quads_are_cut_into_triangles(empty_scene):
+    bpy.ops.mesh.primitive_torus_add(major_segments=32, minor_segments=12)
+    torus = bpy.context.active_object
+    patch = scenes.nearest_vertices(torus, [(1.0, 0, 0.25), (1.1, 0.6, 0), (1.1, -0.6, 0)])
+    scenes.select(torus, patch)
+    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    points = scenes.points(scenes.curves()[0])
+    assert scenes.distances_to(scenes.positions(torus)[patch], points).max() < ROUNDING
+
+
+def test_unfinished_editing_is_used(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4)
+    scenes.select(sphere, vertices)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.resize(value=(2, 2, 2))
+    bpy.ops.mesh.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    scenes.select(sphere, vertices)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.transform.translate(value=(0, 0, 0.1))  # not yet in the mesh outside Edit Mode
+    bpy.ops.nicmm.design_curve()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    points = scenes.points(scenes.curves()[0])
+    assert scenes.distances_to(scenes.positions(sphere)[vertices], points).max() < ROUNDING
+
+
+def test_poll_gives_reasons(empty_scene):
+    def refusal():
+        with pytest.raises(RuntimeError) as caught:
+            bpy.ops.nicmm.design_curve()
+        return str(caught.value)
+
+    assert "Make a mesh object active" in refusal()
+    sphere = scenes.sphere()
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert "Switch to Object Mode or Edit Mode" in refusal()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    scenes.select(sphere, [])
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Select the vertices" in refusal()
+
+
+@pytest.mark.parametrize("field", ["obstacle_group", "alignment_group"])
+def test_missing_group_is_named(empty_scene, field):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    assert 'no vertex group "Wall"' in (report := reported_error(**{field: "Wall"}))
+    assert "Add the group" in report
+    sphere.vertex_groups.new(name="Walls")
+    assert 'Choose one of "Walls"' in reported_error(**{field: "Wall"})
+
+
+def test_errors_of_the_core_are_reports(empty_scene):
+    core = empty_scene.core
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4)[:1])
+    with pytest.raises(core.NicmmError) as too_few:
+        design(core, sphere, scenes.ring(sphere, 4)[:1])
+    assert str(too_few.value) in reported_error()
+
+
+def test_separate_parts_are_reported(empty_scene):
+    bpy.ops.mesh.primitive_ico_sphere_add(location=(4, 0, 0))
+    sphere = scenes.sphere()
+    bpy.ops.object.select_all(action="SELECT")
+    bpy.ops.object.join()
+    ends = scenes.nearest_vertices(sphere, [(0, 0, 1), (1, 0, 0), (4, 0, 1)])
+    scenes.select(sphere, ends)
+    with pytest.raises(empty_scene.core.UnreachableError) as unreachable:
+        design(empty_scene.core, sphere, ends)
+    assert str(unreachable.value) in reported_error()
+
+
+def test_open_curves_are_refused_for_now(empty_scene):
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4)
+    scenes.select(sphere, vertices)
+    with pytest.raises(empty_scene.core.NicmmError) as refused:
+        design(empty_scene.core, sphere, vertices, closed=False)
+    assert str(refused.value) in reported_error(closed=False)
+
+
+@pytest.mark.parametrize(
+    ("library", "remedy"), [("igl", "Install the zip"), ("torch", "built with --with-torch")]
+)
+def test_missing_library_is_reported(empty_scene, monkeypatch, library, remedy):
+    import_module(f"{empty_scene.name}.nicmm_blender.designers").forget()
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    # As in a new session, where the core has not been loaded yet.
+    for name in list(sys.modules):
+        if name.startswith(f"{empty_scene.name}.nicmm_core"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delattr(empty_scene.module, "nicmm_core")
+    monkeypatch.setitem(sys.modules, library, None)
+    report = reported_error()
+    assert library in report
+    assert remedy in report
+
+
+def test_the_same_mesh_is_factorised_once(empty_scene):
+    designers = import_module(f"{empty_scene.name}.nicmm_blender.designers")
+    designers.forget()
+    sphere = scenes.sphere()
+    kept = []
+    for smoothness in (1.0, 2.0):
+        bpy.context.view_layer.objects.active = sphere
+        scenes.select(sphere, scenes.ring(sphere, 4))
+        bpy.ops.nicmm.design_curve(smoothness=smoothness)
+        kept.append(dict(designers._designers))
+    assert kept[0] == kept[1]
+    assert len(kept[0]) == 1
+
+
+def test_modifiers_are_mentioned(empty_scene, capfd):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    sphere.modifiers.new("Subdivision", "SUBSURF")
+    bpy.ops.nicmm.design_curve()
+    assert "without its modifiers" in capfd.readouterr().out

@@ -1,0 +1,86 @@
+"""The build script and what it puts into a zip."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+
+import pytest
+
+import build
+
+
+def test_manifest_follows_blenders_rules():
+    manifest = build.manifest()
+    assert manifest["id"] == "nicmm_curves"
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert len(manifest["tagline"]) <= 64
+    assert not manifest["tagline"].endswith(".")
+    assert "permissions" not in manifest
+
+
+def test_version_stands_in_the_manifest_only():
+    project = tomllib.loads((build.ROOT / "pyproject.toml").read_text())
+    assert project["project"]["dynamic"] == ["version"]
+    version = build.manifest()["version"]
+    for package in ("nicmm_core", "nicmm_blender"):
+        for source in (build.ROOT / package).rglob("*.py"):
+            assert f'"{version}"' not in source.read_text(), source
+
+
+def test_every_requirement_is_pinned_and_justified():
+    lines = build.REQUIREMENTS.read_text().splitlines()[1:]
+    for line in lines:
+        assert re.fullmatch(r"[a-z]+==[\d.]+  # .+", line)
+    assert build.pinned("scipy") == next(line for line in lines if "scipy" in line).split()[0]
+    with pytest.raises(build.BuildError, match="no pin of blas"):
+        build.pinned("blas")
+
+
+def test_staged_folder_is_clean(tmp_path):
+    build.stage(tmp_path / "stage")
+    staged = {path.relative_to(tmp_path / "stage").as_posix() for path in tmp_path.rglob("*")}
+    assert {"__init__.py", "LICENSE", build.MANIFEST, "nicmm_core", "nicmm_blender"} <= staged
+    assert not [name for name in staged if "__pycache__" in name or name.startswith("tests")]
+    assert not [name for name in staged if "numpy" in name]
+
+
+def test_zip_holds_the_wheels_of_every_blender(archive):
+    assert archive.name.startswith(f"nicmm_curves-{build.manifest()['version']}-")
+    with zipfile.ZipFile(archive) as opened:
+        names = opened.namelist()
+        manifest = tomllib.loads(opened.read(build.MANIFEST).decode())
+    wheels = [name for name in names if name.endswith(".whl")]
+    assert sorted(manifest["wheels"]) == sorted(f"./{wheel}" for wheel in wheels)
+    assert manifest["platforms"] == [build.this_platform()]
+    packages = {wheel.split("/")[1].split("-")[0] for wheel in wheels}
+    assert packages == {"libigl", "scipy"}
+    for python in build.BLENDER_PYTHONS:
+        assert [wheel for wheel in wheels if f"-cp{python.replace('.', '')}-" in wheel]
+    assert {"__init__.py", "nicmm_core/__init__.py", "nicmm_blender/__init__.py"} <= set(names)
+
+
+def test_missing_wheel_says_what_to_do(capfd):
+    with pytest.raises(build.BuildError, match=r"no wheel of scipy==0\.0\.1 .*--platform"):
+        build.download("scipy==0.0.1", "linux-x64", "3.11")
+
+
+def test_wrong_python_says_what_to_do(monkeypatch):
+    monkeypatch.setattr(build, "PYTHON", (3, 99))
+    with pytest.raises(build.BuildError, match=r"Python 3\.99 is needed.*python3\.99 build\.py"):
+        build.check_python()
+
+
+def test_missing_venv_says_what_to_do(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ensurepip", None)
+    with pytest.raises(build.BuildError, match="lacks its module ensurepip.*apt install"):
+        build.check_python()
+
+
+def test_help_without_arguments():
+    ran = subprocess.run(
+        [sys.executable, build.ROOT / "build.py"], capture_output=True, text=True, check=True
+    )
+    for command in ("demo", "test", "package"):
+        assert command in ran.stdout

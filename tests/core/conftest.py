@@ -1,0 +1,48 @@
+"""Small generated surfaces that the tests of the core share."""
+
+import pytest
+import torch
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+
+pytest.register_assert_rewrite("tests.core.checks")
+
+# The matrices here are so small that a second thread costs more time than it saves.
+torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def ball():
+    """Unit sphere of 642 vertices."""
+    return shapes.sphere(3)
+
+
+@pytest.fixture(scope="session")
+def small_ball():
+    """Unit sphere of 162 vertices."""
+    return shapes.sphere(2)
+
+
+@pytest.fixture(scope="session")
+def flat_disc():
+    """Flat unit disc with a boundary."""
+    return shapes.disc(12)
+
+
+@pytest.fixture(scope="session")
+def ring():
+    """Torus about the z axis, radii 1 and 0.4."""
+    return shapes.torus(around=36, across=18)
+
+
+@pytest.fixture(scope="session")
+def body():
+    """A body with limbs: irregular, thin in places, without any symmetry."""
+    return shapes.creature(1, faces=200, subdivisions=1)
+
+
+@pytest.fixture(scope="session", params=["ball", "flat_disc", "ring", "body"])
+def surface(request) -> nicmm.Mesh:
+    """Each of the surfaces above in turn."""
+    return request.getfixturevalue(request.param)

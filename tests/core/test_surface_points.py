@@ -1,0 +1,143 @@
+"""Control points in every accepted form, and every way in which they can be wrong."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core.surface_points import locate_control_points
+from tests.core.checks import joined, random_surface_points
+
+SurfacePoints = nicmm.SurfacePoints
+
+
+def at_corner(mesh, vertices):
+    """Vertices as surface points in some face."""
+    faces, corner = zip(*(np.argwhere(mesh.faces == v)[-1] for v in vertices), strict=True)
+    return SurfacePoints(np.array(faces), np.eye(3)[list(corner)])
+
+
+def test_vertices_positions_and_surface_points_agree(surface):
+    chosen = np.random.default_rng(4).choice(len(surface.vertices), size=5, replace=False)
+    expected = surface.vertices[chosen]
+    for form in (chosen, chosen.tolist(), expected, at_corner(surface, chosen)):
+        found = locate_control_points(surface, form, closed=True)
+        np.testing.assert_allclose(found.positions(surface), expected, rtol=0, atol=1e-12)
+        assert ((found.barycentric == 0.0).sum(axis=1) == 2).all()
+
+
+def test_points_in_space_find_their_faces(surface):
+    points = random_surface_points(surface, 6, seed=5)
+    found = locate_control_points(surface, points.positions(surface), closed=True)
+    np.testing.assert_array_equal(found.faces, points.faces)
+    np.testing.assert_allclose(found.barycentric, points.barycentric, rtol=0, atol=1e-9)
+
+
+def test_points_slightly_off_the_surface_are_projected(ball):
+    centroids = ball.vertices[ball.faces[[3, 300, 900]]].mean(axis=1)
+    found = locate_control_points(ball, centroids * (1 + 1e-5), closed=True)
+    np.testing.assert_allclose(found.positions(ball), centroids, rtol=0, atol=1e-6)
+
+
+def test_integers_in_three_columns_are_positions():
+    mesh = nicmm.Mesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    found = locate_control_points(mesh, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], closed=True)
+    np.testing.assert_allclose(found.positions(mesh)[1], [1, 0, 0], atol=1e-12)
+
+
+def test_coordinates_near_zero_snap_to_edges_and_vertices(ball):
+    nearly = np.array([[1.0, 1e-8, 0.0], [0.5, 0.5, 1e-8], [0.3, 0.3, 0.4]])
+    nearly /= nearly.sum(axis=1, keepdims=True)
+    found = locate_control_points(ball, SurfacePoints(np.array([0, 400, 800]), nearly), closed=True)
+    np.testing.assert_array_equal(found.barycentric[0], [1.0, 0.0, 0.0])
+    assert found.barycentric[1, 2] == 0.0
+    assert (found.barycentric[2] > 0.0).all()
+    np.testing.assert_allclose(found.barycentric.sum(axis=1), 1.0, rtol=0, atol=1e-15)
+
+
+THIRDS = np.full((3, 3), 1 / 3)
+
+BAD_POINTS = {
+    "none at all": ([], "control_points has 0 points"),
+    "one": ([5], "control_points has 1 points"),
+    "two": ([5, 9], "control_points has 2 points"),
+    "past the end": ([5, 9, 642], r"control_points\[2\] = 642"),
+    "negative": ([5, -1, 9], r"control_points\[1\] = -1"),
+    "repeated vertex": ([5, 9, 5], r"control_points\[0\] and control_points\[2\]"),
+    "fractional indices": ([0.5, 1.5, 2.5], "control_points has shape"),
+    "text": (["a", "b", "c"], "control_points has shape"),
+    "none": (None, "control_points has shape"),
+    "booleans": ([True, False, True], "control_points has shape"),
+    "two columns": (np.zeros((4, 2)), "control_points has shape"),
+    "ragged": ([[0, 0, 1], [0, 1]], "control_points"),
+    "complex positions": (np.ones((3, 3)) * 1j, "control_points"),
+    "NaN position": ([[1, 0, 0], [0, np.nan, 0], [0, 0, 1]], r"control_points\[1\]"),
+    "infinite position": ([[1, 0, 0], [0, 1, 0], [0, 0, np.inf]], r"control_points\[2\]"),
+    "off the surface": ([[1, 0, 0], [0, 1, 0], [0, 0, 1.1]], r"control_points\[2\] is off"),
+    "face past the end": (SurfacePoints(np.array([0, 5, 1280]), THIRDS), r"faces\[2\] = 1280"),
+    "negative face": (SurfacePoints(np.array([0, -5, 9]), THIRDS), r"faces\[1\] = -5"),
+    "float faces": (SurfacePoints(np.array([0.0, 5.0, 9.0]), THIRDS), "control_points.faces"),
+    "faces in two dimensions": (SurfacePoints(np.zeros((3, 1), int), THIRDS), "faces has shape"),
+    "too few rows": (SurfacePoints(np.array([0, 5, 9]), THIRDS[:2]), "barycentric has shape"),
+    "negative weight": (
+        SurfacePoints(np.array([0, 5, 9]), np.array([[1, 0, 0], [1.2, -0.2, 0], [0, 0, 1.0]])),
+        r"barycentric\[1\]",
+    ),
+    "sum not one": (SurfacePoints(np.array([0, 5, 9]), 1.1 * THIRDS), r"barycentric\[0\]"),
+    "NaN weight": (SurfacePoints(np.array([0, 5, 9]), np.nan * THIRDS), r"barycentric\[0\]"),
+    "text weights": (SurfacePoints(np.array([0, 5, 9]), "abc"), "control_points"),
+}
+
+
+@pytest.mark.parametrize(("points", "message"), BAD_POINTS.values(), ids=BAD_POINTS.keys())
+def test_bad_control_points_are_refused_by_name(ball, points, message):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(nicmm.ControlPointError, match=message):
+            locate_control_points(ball, points, closed=True)
+
+
+def test_open_curves_need_two_points(ball):
+    assert len(locate_control_points(ball, [5, 9], closed=False)) == 2
+    with pytest.raises(nicmm.ControlPointError, match="control_points has 1 points"):
+        locate_control_points(ball, [5], closed=False)
+
+
+def test_the_same_point_named_from_two_faces_is_a_repetition(ball):
+    first, second = np.argwhere(ball.faces == 17)[:2]
+    points = SurfacePoints(
+        np.array([first[0], 700, second[0]]), np.eye(3)[[first[1], 0, second[1]]]
+    )
+    with pytest.raises(nicmm.ControlPointError, match="same point"):
+        locate_control_points(ball, points, closed=True)
+
+
+def test_vertex_without_a_face_is_off_the_surface():
+    mesh = nicmm.Mesh(np.eye(4, 3), [[0, 1, 2]])
+    with pytest.raises(nicmm.ControlPointError, match=r"control_points\[1\] = 3"):
+        locate_control_points(mesh, [0, 3, 1], closed=True)
+
+
+def test_points_on_two_components_are_unreachable(small_ball, ring):
+    mesh = joined(small_ball, ring)
+    with pytest.raises(nicmm.UnreachableError, match=r"control_points\[0\].*control_points\[2\]"):
+        locate_control_points(mesh, [3, 7, len(small_ball.vertices) + 1], closed=True)
+
+
+def test_point_in_a_face_without_area_is_refused_or_placed():
+    # The third face is a sliver of no area along an edge of the first.
+    mesh = nicmm.Mesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], [[0, 1, 2], [0, 3, 1]]
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            found = locate_control_points(
+                mesh, [[0.25, 0, 0], [0.5, 0.25, 0], [0, 0.5, 0]], closed=True
+            )
+        except nicmm.ControlPointError as error:
+            assert "control_points[0]" in str(error)
+        else:
+            assert np.isfinite(found.barycentric).all()
+            np.testing.assert_allclose(found.positions(mesh)[0], [0.25, 0, 0], atol=1e-9)
