@@ -19,8 +19,18 @@ Around a positive baseline, with alignment lowering it towards 0, the square kee
 alignment < neutral < obstacle, which is what the text asks for.
 """
 
+OBSTACLE_HEIGHT = 3.0
+"""What an obstacle of weight 1 adds to the baseline.
+
+The square of φ_fea, which counts in Eq. 7 and in the length of the initial loop, is then 16 times
+the neutral one: a detour of that ratio is taken. Alignment can lower it to zero and no further.
+"""
+
 FEATURE_WIDTH = 2.0
 """Standard deviation of the Gaussian of a feature vertex of weight 1, in mean edge lengths."""
+
+WEIGHT_LEVELS = 10
+"""Steps into which feature weights are rounded up."""
 
 
 def control_indicator(response: FloatArray) -> FloatArray:
@@ -65,7 +75,7 @@ def feature_map(
     """
     return (
         FEATURE_BASELINE
-        + _spread(vertices, obstacles, edge_length)
+        + OBSTACLE_HEIGHT * _spread(vertices, obstacles, edge_length)
         - FEATURE_BASELINE * _spread(vertices, alignment, edge_length)
     )
 
@@ -88,10 +98,6 @@ def _spread(vertices: FloatArray, weights: FloatArray | None, edge_length: float
         gaussian = levels[index] * np.exp(-0.5 * (distance / sigma) ** 2)
         response = np.maximum(response, gaussian)
     return response
-
-
-WEIGHT_LEVELS = 10
-"""Steps into which feature weights are rounded up."""
 
 
 def input_features(

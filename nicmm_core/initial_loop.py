@@ -38,6 +38,9 @@ Two strands of a loop then pass a thin limb on opposite sides instead of side by
 leaves the level set room on both sides.
 """
 
+LEAST_WEIGHT = 0.1
+"""Least factor that alignment gives to a length; at 0 any detour inside a region would be free."""
+
 
 @dataclass(frozen=True)
 class InitialLoop:
@@ -60,7 +63,7 @@ class InitialLoop:
 
 
 def build_initial_loop(
-    mesh: Mesh, points: SurfacePoints, order: str
+    mesh: Mesh, points: SurfacePoints, order: str, importance: FloatArray | None = None
 ) -> tuple[WorkingMesh, InitialLoop]:
     """Insert the control points and join them by edge paths that do not touch one another.
 
@@ -71,6 +74,9 @@ def build_initial_loop(
         At least three, on one component.
     order : {"given", "shortest"}
         Visit the points as given, or in the shortest cyclic order.
+    importance : (V,) float array, optional
+        φ_fea at the input vertices. Lengths count times its square, as the curve's does in Eq. 7,
+        so the loop goes round obstacles and along alignment from the start.
 
     Returns
     -------
@@ -100,7 +106,7 @@ def build_initial_loop(
     for leg in range(len(controls)):
         target = int(controls[(leg + 1) % len(controls)])
         blocked = (set(path) | {int(control) for control in controls}) - {path[-1], target}
-        nodes = _shortest_free_path(split, component, path[-1], target, path, blocked)
+        nodes = _shortest_free_path(split, component, target, path, blocked, importance)
         if nodes is None:
             here, there = int(visit[leg]), int(visit[(leg + 1) % len(visit)])
             raise UnreachableError(
@@ -119,28 +125,24 @@ def build_initial_loop(
 def _edge_distances(split: SplitMesh, component: int, controls: IntArray) -> FloatArray:
     """Distances along edges between control points, shape (k, k)."""
     working, renumbered = split.assemble(component)
-    start, end = working.edges.T
-    length = np.linalg.norm(working.vertices[start] - working.vertices[end], axis=1)
-    n_vertices = len(working.vertices)
-    graph = sparse.coo_array((length, (start, end)), shape=(n_vertices, n_vertices)).tocsr()
     sources = renumbered[controls]
-    return csgraph.dijkstra(graph, directed=False, indices=sources)[:, sources]
+    return csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources)[:, sources]
 
 
 def _shortest_free_path(
     split: SplitMesh,
     component: int,
-    start: int,
     target: int,
     taken: list[int],
     blocked: set[int],
+    importance: FloatArray | None,
 ) -> list[int | tuple[int, int]] | None:
-    """Dijkstra's path over vertices and edge midpoints that are free.
+    """Dijkstra's path from the last vertex taken over vertices and edge midpoints that are free.
 
     Returns
     -------
     list or None
-        Vertices, and edges (pairs of vertices) for their midpoints, from start to target; None
+        Vertices, and edges (pairs of vertices) for their midpoints, from there to the target; None
         when there is no way.
     """
     working, renumbered = split.assemble(component)
@@ -148,6 +150,8 @@ def _shortest_free_path(
     edges = working.edges
     path_vertices = renumbered[np.array(taken, dtype=np.int64)]
     graph = _vertex_and_midpoint_graph(working, edges)
+    if importance is not None:
+        graph = _weighed(graph, working.interpolation @ importance, edges)
     clearance = STRAND_CLEARANCE * working.face_areas.sum() ** 0.5
     avoided = np.concatenate([path_vertices, renumbered[sorted(blocked)]])
     graph = _shunning(graph, avoided, path_vertices[[0, -1]], clearance)
@@ -162,7 +166,7 @@ def _shortest_free_path(
     position = np.full(len(free), -1)
     position[keep] = np.arange(len(keep))
     reduced = graph[keep][:, keep]
-    source, sink = position[renumbered[start]], position[renumbered[target]]
+    source, sink = position[renumbered[taken[-1]]], position[renumbered[target]]
     _, previous = csgraph.dijkstra(reduced, indices=source, return_predecessors=True)
     if previous[sink] < 0:
         return None
@@ -212,6 +216,20 @@ def _vertex_and_midpoint_graph(working: WorkingMesh, edges: IntArray) -> sparse.
     return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
 
 
+def _weighed(graph: sparse.csr_array, importance: FloatArray, edges: IntArray) -> sparse.csr_array:
+    """Multiply lengths by the square of φ_fea, given at the vertices."""
+    at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
+    square = np.maximum(at_nodes**2, LEAST_WEIGHT)
+    return _stretched(graph, square)
+
+
+def _stretched(graph: sparse.csr_array, factor: FloatArray) -> sparse.csr_array:
+    """Multiply the length of each arc by the mean factor of its ends."""
+    arcs = graph.tocoo()
+    length = arcs.data * 0.5 * (factor[arcs.row] + factor[arcs.col])
+    return sparse.csr_array(sparse.coo_array((length, (arcs.row, arcs.col)), shape=graph.shape))
+
+
 def _shunning(
     graph: sparse.csr_array, taken: IntArray, ends: IntArray, clearance: float
 ) -> sparse.csr_array:
@@ -226,10 +244,7 @@ def _shunning(
     beside = np.zeros(graph.shape[0])
     near = np.isfinite(to_taken) & (to_taken < to_ends)
     beside[near] = (1.0 - to_taken[near] / clearance) * (1.0 - to_taken[near] / to_ends[near])
-    arcs = graph.tocoo()
-    stretch = 1.0 + STRAND_PENALTY * 0.5 * (beside[arcs.row] + beside[arcs.col])
-    entries = (arcs.data * stretch, (arcs.row, arcs.col))
-    return sparse.csr_array(sparse.coo_array(entries, shape=graph.shape))
+    return _stretched(graph, 1.0 + STRAND_PENALTY * beside)
 
 
 def _rows_in(edges: IntArray, wanted: IntArray, n_vertices: int) -> IntArray:

@@ -55,6 +55,12 @@ class Mesh:
         return triangle_areas(self.vertices, self.faces)
 
     @cached_property
+    def mean_edge_length(self) -> float:
+        """Mean length of the edges, in mesh units."""
+        start, end = unique_edges(self.faces)[0].T
+        return float(np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1).mean())
+
+    @cached_property
     def vertex_faces(self) -> sparse.csr_array:
         """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
         n_faces = len(self.faces)
@@ -91,16 +97,21 @@ def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return 0.5 * np.linalg.norm(normal, axis=1)
 
 
-def unique_edges(faces: IntArray) -> IntArray:
-    """Undirected edges of the faces, shape (E, 2), smaller index first, sorted."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0)
+def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Undirected edges of the faces and how many faces each has.
 
-
-def mean_edge_length(vertices: FloatArray, faces: IntArray) -> float:
-    """Mean length of the undirected edges, the h of the method's narrow band."""
-    edges = unique_edges(faces)
-    return float(np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1).mean())
+    Returns
+    -------
+    (E, 2) int array
+        Smaller index first, sorted.
+    (E,) int array
+        1 on the boundary, 2 inside, more where the surface branches.
+    """
+    size = int(faces.max()) + 1
+    low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
+    # One key an edge: unique rows of a two-column array would take several times as long.
+    keys, count = np.unique(low * size + high, return_counts=True)
+    return np.stack([keys // size, keys % size], axis=1), count
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:

@@ -15,12 +15,14 @@ from .losses import (
     LossWeights,
     SurfaceTensors,
     loss_terms,
-    squared_slope,
+    sdf_density,
+    smoothness_density,
     surface_tensors,
     total_loss,
 )
 from .network import CurveNetwork, NetworkInput
 from .problem import Problem
+from .torch_threads import single_thread
 
 BAND_WIDTH = 3.0
 """Width of the narrow band about the curve, in mean edge lengths (section 4.1)."""
@@ -69,6 +71,7 @@ class Prediction:
     stopped: str
 
 
+@single_thread()
 def predict(
     network: CurveNetwork,
     problem: Problem,
@@ -145,10 +148,8 @@ def narrow_band_energy(
 ) -> float:
     """Mean density of the level-set and smoothness terms in the band about the zero set."""
     inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)
-    eikonal = 0.5 * (squared_slope(surface, phi) - 1.0) ** 2
-    bending = 0.5 * surface.centroid(surface.laplacian(phi)) ** 2
-    # The delta function's value over the band is its mean there, 1 / width.
-    density = weights.sdf * eikonal + weights.smooth * bending / (BAND_WIDTH * edge_length)
+    density = weights.sdf * sdf_density(surface, phi)
+    density = density + weights.smooth * smoothness_density(surface, phi)
     area = surface.face_areas * inside
     return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
 

@@ -17,6 +17,7 @@ from .network import CurveNetwork, NetworkConfig
 from .prediction import network_input
 from .problem import Problem, build_problem
 from .surface_points import locate_control_points
+from .torch_threads import single_thread
 from .weights_file import save_network
 
 GRADIENT_LIMIT = 1.0
@@ -48,6 +49,7 @@ class PretrainingConfig:
     seed: int = 0
 
 
+@single_thread()
 def pretrain(
     meshes: Sequence[Mesh],
     output: str | Path,

@@ -94,7 +94,10 @@ def build_problem(
     UnreachableError
         If no simple loop that bounds a region passes the points in this order.
     """
-    working, loop = build_initial_loop(mesh, points, order)
+    importance = None
+    if obstacles is not None or alignment is not None:
+        importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
+    working, loop = build_initial_loop(mesh, points, order, importance)
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = (working.vertices - working.vertices.mean(axis=0)) / unit
     edge_length = working.mean_edge_length / unit
@@ -106,14 +109,8 @@ def build_problem(
     initial_distance, _ = keep_topology(
         working, distance, smoother.smoothed(distance), loop.control_vertices
     )
-    importance = None
-    if obstacles is not None or alignment is not None:
-        importance = feature_map(
-            vertices,
-            None if obstacles is None else working.interpolation @ obstacles,
-            None if alignment is None else working.interpolation @ alignment,
-            edge_length,
-        )
+    if importance is not None:
+        importance = working.interpolation @ importance
     features = input_features(
         vertices,
         vertex_normals(vertices, working.faces),

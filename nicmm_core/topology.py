@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import FloatArray, IntArray
@@ -100,11 +99,7 @@ def _breaking_vertices(
 
 def _distance_from(working: WorkingMesh, sources: IntArray) -> FloatArray:
     """Length along edges to the nearest source, shape (n,)."""
-    start, end = working.edges.T
-    length = np.linalg.norm(working.vertices[start] - working.vertices[end], axis=1)
-    size = len(working.vertices)
-    graph = sparse.coo_array((length, (start, end)), shape=(size, size)).tocsr()
-    return csgraph.dijkstra(graph, directed=False, indices=sources, min_only=True)
+    return csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources, min_only=True)
 
 
 def _smooth_step(fraction: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, mean_edge_length, triangle_areas, unique_edges
+from .mesh import Mesh, triangle_areas, unique_edges
 from .surface_points import SurfacePoints
 
 Weights = dict[int, float]
@@ -46,9 +46,24 @@ class WorkingMesh:
     input_vertex: IntArray
 
     @cached_property
-    def edges(self) -> IntArray:
-        """Undirected edges, shape (E, 2), smaller index first."""
+    def _unique_edges(self) -> tuple[IntArray, IntArray]:
         return unique_edges(self.faces)
+
+    @property
+    def edges(self) -> IntArray:
+        """Undirected edges, shape (E, 2), smaller index first, sorted."""
+        return self._unique_edges[0]
+
+    @cached_property
+    def edge_lengths(self) -> FloatArray:
+        """Length of each edge, shape (E,)."""
+        start, end = self.edges.T
+        return np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1)
+
+    @property
+    def mean_edge_length(self) -> float:
+        """Mean edge length h, the unit of the narrow band."""
+        return float(self.edge_lengths.mean())
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -56,18 +71,18 @@ class WorkingMesh:
         return triangle_areas(self.vertices, self.faces)
 
     @cached_property
-    def mean_edge_length(self) -> float:
-        """Mean edge length h."""
-        return mean_edge_length(self.vertices, self.faces)
-
-    @cached_property
     def on_boundary(self) -> BoolArray:
         """Which vertices lie on an edge that only one face has, shape (n,)."""
-        sides = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
+        edges, count = self._unique_edges
         result = np.zeros(len(self.vertices), dtype=bool)
         result[edges[count == 1]] = True
         return result
+
+    def edge_graph(self) -> sparse.csr_array:
+        """Lengths of the edges as an upper triangular matrix, shape (n, n)."""
+        n_vertices = len(self.vertices)
+        entries = (self.edge_lengths, (self.edges[:, 0], self.edges[:, 1]))
+        return sparse.csr_array(sparse.coo_array(entries, shape=(n_vertices, n_vertices)))
 
 
 class SplitMesh:

@@ -2,7 +2,7 @@
 """Draw a closed curve through vertices of a mesh, in the order given, without a window.
 
     blender -b head.blend --python-exit-code 1 --python design_curve.py -- \
-        Suzanne 12,80,41 out.blend
+        Suzanne 73,365,74,366 out.blend
 """
 
 import sys
