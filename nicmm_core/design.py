@@ -181,9 +181,9 @@ class Designer:
         controls = problem.loop.control_vertices
         field, breaking = keep_topology(
             problem.working,
+            problem.loop,
             problem.initial_distance,
             problem.smoother.interpolating(field),
-            controls,
         )
         return field, breaking, extract_curves(self.mesh, problem.working, field, controls)
 

@@ -14,6 +14,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import FloatArray, IntArray
+from .band_refinement import refine_along
 from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
 from .surface_points import SurfacePoints
@@ -55,11 +56,17 @@ class InitialLoop:
         The working vertex of each control point, in the order visited.
     order : (k,) int array
         Which of the caller's control points each of them is.
+    edge_length : float
+        Mean length of the edges at the loop: the h that band and delta are measured in.
+    zigzag : float
+        Length of the steps in which the loop follows the mesh, which smoothing has to remove.
     """
 
     vertices: IntArray
     control_vertices: IntArray
     order: IntArray
+    edge_length: float
+    zigzag: float
 
 
 def build_initial_loop(
@@ -115,11 +122,13 @@ def build_initial_loop(
                 'order, for example with order="shortest"'
             )
         path += _split_along(split, nodes)[1:]
-    loop = path[:-1]
-
+    loop, zigzag = refine_along(split, component, path[:-1])
     _separate_strands(split, loop)
     working, renumbered = split.assemble(component)
-    return working, InitialLoop(renumbered[loop], renumbered[controls], visit)
+    vertices = renumbered[loop]
+    beside = np.isin(working.edges, vertices).any(axis=1)
+    edge_length = float(working.edge_lengths[beside].mean())
+    return working, InitialLoop(vertices, renumbered[controls], visit, edge_length, zigzag)
 
 
 def _edge_distances(split: SplitMesh, component: int, controls: IntArray) -> FloatArray:

@@ -22,7 +22,7 @@ from .topology import keep_topology
 from .virtual_splits import WorkingMesh
 
 SMOOTHING_LENGTH = 1.5
-"""ℓ of the smoothing of φ₀ at smoothness 1, in mean edge lengths.
+"""ℓ of the smoothing of φ₀ at smoothness 1, in steps of the initial loop.
 
 Less leaves the zigzag of the edge path in the curve; more makes thin regions vanish, where the
 topology then falls back on the jagged distance.
@@ -64,8 +64,8 @@ class Problem:
 
     @property
     def edge_length(self) -> float:
-        """Mean edge length h, relative to the unit."""
-        return self.working.mean_edge_length / self.unit
+        """Mean length h of the edges at the initial loop, relative to the unit."""
+        return self.loop.edge_length / self.unit
 
 
 def build_problem(
@@ -100,15 +100,13 @@ def build_problem(
     working, loop = build_initial_loop(mesh, points, order, importance)
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = (working.vertices - working.vertices.mean(axis=0)) / unit
-    edge_length = working.mean_edge_length / unit
+    edge_length = loop.edge_length / unit
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
     distance = signed_distance(working, elements, loop, edge_length)
     smoother = build_smoother(
-        elements, loop.control_vertices, smoothness * SMOOTHING_LENGTH * edge_length
+        elements, loop.control_vertices, smoothness * SMOOTHING_LENGTH * loop.zigzag / unit
     )
-    initial_distance, _ = keep_topology(
-        working, distance, smoother.smoothed(distance), loop.control_vertices
-    )
+    initial_distance, _ = keep_topology(working, loop, distance, smoother.smoothed(distance))
     if importance is not None:
         importance = working.interpolation @ importance
     features = input_features(

@@ -18,11 +18,12 @@ from scipy.sparse import csgraph
 
 from .array_types import FloatArray, IntArray
 from .contour import signs_with_controls
+from .initial_loop import InitialLoop
 from .virtual_splits import WorkingMesh
 
 FALLBACK_RADIUS = 4.0
 """Distance from a vertex that breaks the topology within which the start replaces the solution,
-in mean edge lengths; the blend reaches as far as twice that again."""
+in edge lengths at the loop; the blend reaches as far as twice that again."""
 
 FALLBACK_GROWTH = 1.3
 """Growth of that radius from one attempt to the next."""
@@ -32,18 +33,18 @@ FALLBACK_ATTEMPTS = 12
 
 
 def keep_topology(
-    working: WorkingMesh, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
+    working: WorkingMesh, loop: InitialLoop, start: FloatArray, wanted: FloatArray
 ) -> tuple[FloatArray, int]:
     """Follow a field as far as its zero set stays isotopic to that of the start.
 
     Parameters
     ----------
     working : WorkingMesh
+    loop : InitialLoop
     start : (n,) float array
         A field whose zero set is one simple loop through the control vertices.
     wanted : (n,) float array
         The field to follow, in the same unit.
-    control_vertices : (k,) int array
 
     Returns
     -------
@@ -54,13 +55,14 @@ def keep_topology(
         is returned as it came.
     """
     links = _Links(working)
+    control_vertices = loop.control_vertices
     breaking = _breaking_vertices(links, start, wanted, control_vertices)
     n_breaking = len(breaking)
     field, all_breaking = wanted, breaking
     for attempt in range(FALLBACK_ATTEMPTS):
         if not len(breaking):
             return field, n_breaking
-        radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * working.mean_edge_length
+        radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
         share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
         field = start + share * (wanted - start)
         breaking = _breaking_vertices(links, start, field, control_vertices)

@@ -60,11 +60,6 @@ class WorkingMesh:
         start, end = self.edges.T
         return np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1)
 
-    @property
-    def mean_edge_length(self) -> float:
-        """Mean edge length h, the unit of the narrow band."""
-        return float(self.edge_lengths.mean())
-
     @cached_property
     def face_areas(self) -> FloatArray:
         """Area of each face, shape (m,)."""
@@ -121,6 +116,17 @@ class SplitMesh:
             start, end = incidence.indptr[vertex : vertex + 2]
             self._faces_around[vertex] = {int(face) for face in incidence.indices[start:end]}
         return self._faces_around[vertex]
+
+    def position(self, vertex: int) -> FloatArray:
+        """Where a vertex is in space, shape (3,)."""
+        weights = self.weights(vertex)
+        corners = self._mesh.vertices[list(weights)]
+        return np.fromiter(weights.values(), dtype=np.float64) @ corners
+
+    def neighbours(self, vertex: int) -> set[int]:
+        """Vertices joined to a vertex by an edge."""
+        corners = {corner for face in self.faces_around(vertex) for corner in self.corners(face)}
+        return corners - {vertex}
 
     def insert_points(self, points: SurfacePoints) -> IntArray:
         """Make every point a vertex by splitting the face or edge it lies on (Fig. 1).
