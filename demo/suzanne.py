@@ -18,6 +18,8 @@ from mathutils import Vector
 EXTENSION = "bl_ext.user_default.nicmm_curves"
 FOLDER = Path(__file__).resolve().parent
 
+SUBDIVISIONS = 2
+
 # Places on the head, in the order in which the curve visits them: a loop round the crown.
 CONTROL_PLACES = (
     (0.0, -0.45, 0.68),
@@ -26,13 +28,14 @@ CONTROL_PLACES = (
     (-0.42, 0.36, 0.85),
     (-0.65, -0.05, 0.73),
 )
-OBSTACLE_PLACES = ((0.36, -0.27, 0.78),)
-OBSTACLE_RADIUS = 0.24
+OBSTACLE_PLACES = ((0.4, -0.25, 0.78),)
+OBSTACLE_RADIUS = 0.22
 ALIGNMENT_PLACES = (
-    (-0.13, -0.26, 0.86),
-    (-0.23, -0.15, 0.89),
-    (-0.34, -0.07, 0.88),
-    (-0.46, -0.02, 0.86),
+    (-0.2, 0.25, 0.91),
+    (-0.1, 0.21, 0.92),
+    (0.0, 0.2, 0.93),
+    (0.1, 0.21, 0.92),
+    (0.2, 0.25, 0.91),
 )
 ALIGNMENT_RADIUS = 0.13
 
@@ -47,7 +50,7 @@ GREEN = (0.02, 0.45, 0.16)
 def make_suzanne():
     bpy.ops.mesh.primitive_monkey_add()
     suzanne = bpy.context.active_object
-    suzanne.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    suzanne.modifiers.new("Subdivision", "SUBSURF").levels = SUBDIVISIONS
     bpy.ops.object.modifier_apply(modifier="Subdivision")
     bpy.ops.object.shade_smooth()
     return suzanne
@@ -158,7 +161,7 @@ def light_and_camera():
     camera = bpy.data.cameras.new("Camera")
     camera.lens = 58
     scene = bpy.context.scene
-    scene.camera = add_looking_at("Camera", camera, (0.75, -3.5, 4.3), target)
+    scene.camera = add_looking_at("Camera", camera, (0.7, -3.1, 4.5), target)
     scene.world = bpy.data.worlds.new("World")
     scene.world.use_nodes = True
     background = scene.world.node_tree.nodes["Background"]

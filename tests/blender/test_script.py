@@ -1,6 +1,7 @@
 """The documented script, run as the documentation shows it, through the bpy module."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -27,16 +28,18 @@ finally:
 
 
 def test_documented_script(empty_scene, tmp_path):
-    sphere = scenes.sphere()
-    sphere.name = "Head"
-    vertices = scenes.ring(sphere, 3)
+    documentation = (build.ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
+    mesh_name, indices = re.search(r"-- \\\n +(\w+) ([\d,]+) out\.blend", documentation).groups()
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.data.objects[mesh_name]
+    vertices = [int(index) for index in indices.split(",")]
     expected = empty_scene.core.design_curve(
-        empty_scene.core.Mesh(scenes.positions(sphere), scenes.triangles(sphere)), vertices
+        empty_scene.core.Mesh(scenes.positions(monkey), scenes.triangles(monkey)), vertices
     )
     source, output = tmp_path / "head.blend", tmp_path / "out.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source))
 
-    arguments = [source, SCRIPT, "--", "Head", ",".join(map(str, vertices)), output]
+    arguments = [source, SCRIPT, "--", mesh_name, indices, output]
     ran = subprocess.run(
         [sys.executable, "-c", RUNNER, *map(str, arguments)],
         env=os.environ,  # the user folder with the installed extension
@@ -47,8 +50,8 @@ def test_documented_script(empty_scene, tmp_path):
     )
 
     assert ran.returncode == 0, ran.stderr
-    assert "Head Curve: " in ran.stdout
+    assert f"{mesh_name} Curve: " in ran.stdout
     bpy.ops.wm.open_mainfile(filepath=str(output))
     np.testing.assert_allclose(
-        scenes.points(bpy.data.objects["Head Curve"]), expected.curves[0].points, atol=1e-6
+        scenes.points(bpy.data.objects[f"{mesh_name} Curve"]), expected.curves[0].points, atol=1e-6
     )

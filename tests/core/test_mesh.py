@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.mesh import mean_edge_length, unique_edges
 from tests.core.checks import joined
 
 CORNERS = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]]
@@ -84,15 +83,10 @@ def test_arrays_are_read_only_copies():
             array[0] = 1
 
 
-def test_areas_edges_and_diagonal_by_hand():
+def test_areas_and_diagonal_by_hand():
     mesh = nicmm.Mesh(CORNERS, FACES)
     np.testing.assert_allclose(mesh.face_areas, [6.0, 1.5])
     assert mesh.diagonal == pytest.approx(np.sqrt(9 + 16 + 1))
-    np.testing.assert_array_equal(
-        unique_edges(mesh.faces), [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3]]
-    )
-    lengths = [3, 4, 1, 5, np.sqrt(10)]
-    assert mean_edge_length(mesh.vertices, mesh.faces) == pytest.approx(np.mean(lengths))
 
 
 def test_components_are_told_apart(small_ball, ring):
