@@ -2,8 +2,9 @@
 
 φ is linear in every working face, so its zero set crosses each face in one straight segment and
 the polyline lies on the surface by construction. Control points are vertices where φ is exactly
-zero. No other vertex counts as zero: a value of 0 is read as just positive, or the contour would
-shatter at it.
+zero. A vertex that the contour passes closely counts as zero too, where that only draws a few tiny
+segments together into one point. At any other vertex a value of 0 is read as just positive, or the
+contour would shatter there.
 """
 
 from __future__ import annotations
@@ -13,7 +14,11 @@ import numpy as np
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import Mesh
+from .vertex_links import VertexLinks
 from .virtual_splits import WorkingMesh
+
+PASSING_MARGIN = 0.03
+"""The contour goes through a vertex if it crosses every edge there within this share of it."""
 
 CROSSING_MARGIN = 1e-6
 """Closest that a crossing comes to the end of its edge, as a fraction of the edge.
@@ -22,10 +27,10 @@ Keeps neighbouring points of the polyline apart where φ is almost zero at a ver
 """
 
 
-def signs_with_controls(field: FloatArray, control_vertices: IntArray) -> IntArray:
-    """Sign of φ at every vertex: 0 at the control vertices, +1 or -1 elsewhere, shape (n,)."""
+def signs_with_zeros(field: FloatArray, zero_vertices: IntArray) -> IntArray:
+    """Sign of φ at every vertex: 0 at the vertices given, +1 or -1 elsewhere, shape (n,)."""
     sign = np.where(field >= 0.0, 1, -1)
-    sign[control_vertices] = 0
+    sign[zero_vertices] = 0
     return sign
 
 
@@ -50,7 +55,8 @@ def extract_curves(
         Those with most control points first, then the longest. A curve that ends at the mesh's
         boundary is open.
     """
-    nodes, segments, segment_face = _segments(working, field, control_vertices)
+    through = np.concatenate([control_vertices, _passed_vertices(working, field, control_vertices)])
+    nodes, segments, segment_face = _segments(working, field, through)
     chains = _chains(segments, len(nodes))
     curves = []
     for chain, along, closed in chains:
@@ -66,21 +72,53 @@ def extract_curves(
     return curves
 
 
-def _segments(
+def _passed_vertices(
     working: WorkingMesh, field: FloatArray, control_vertices: IntArray
+) -> IntArray:
+    """Vertices that the contour passes so closely that it may go through them.
+
+    They are simple, and no two of them or of them and the control vertices are neighbours.
+    """
+    sign = signs_with_zeros(field, control_vertices)
+    start, end = working.edges[sign[working.edges].prod(axis=1) < 0].T
+    fraction = field[start] / (field[start] - field[end])
+    farthest = np.zeros(len(field))
+    np.maximum.at(farthest, start, fraction)
+    np.maximum.at(farthest, end, 1.0 - fraction)
+    crossed = np.unique(np.concatenate([start, end]))
+    near = crossed[farthest[crossed] < PASSING_MARGIN]
+    links = VertexLinks(working)
+    taken = set(control_vertices.tolist())
+    passed = []
+    for vertex in near[np.argsort(farthest[near], kind="stable")].tolist():
+        if taken.isdisjoint(links.neighbours(vertex)) and links.is_simple(vertex, sign):
+            taken.add(vertex)
+            passed.append(vertex)
+    return np.array(passed, dtype=np.int64)
+
+
+def _segments(
+    working: WorkingMesh, field: FloatArray, through: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Contour nodes, the segments between them and the face of each segment.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    field : (n,) float array
+    through : (q,) int array
+        Vertices that count as zero.
 
     Returns
     -------
     nodes : (p, 2) int array
-        The working edge that φ changes sign on, negative end first, or a control vertex twice.
+        The working edge that φ changes sign on, negative end first, or a zero vertex twice.
     segments : (s, 2) int array
         Node indices.
     segment_face : (s,) int array
         Working face of each segment.
     """
-    sign = signs_with_controls(field, control_vertices)
+    sign = signs_with_zeros(field, through)
     corner_sign = sign[working.faces]
     crossed = (corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1)
     segment_face = np.flatnonzero(crossed)
@@ -93,8 +131,8 @@ def _segments(
         edge = np.where(corner_sign[:, [first]] > 0, edge[:, ::-1], edge)
         ends.append(np.where(changes[:, None], edge, -1))
     for corner in range(3):
-        at_control = corner_sign[:, [corner]] == 0
-        ends.append(np.where(at_control, faces[:, [corner, corner]], -1))
+        at_zero = corner_sign[:, [corner]] == 0
+        ends.append(np.where(at_zero, faces[:, [corner, corner]], -1))
     candidates = np.stack(ends, axis=1)  # (s, 6, 2), exactly two of the six are ends
     valid = candidates[:, :, 0] >= 0
     pairs = candidates[valid].reshape(-1, 2)
@@ -105,7 +143,7 @@ def _segments(
 def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
     """Join segments into paths: (nodes, segments in between, closed), each node used once.
 
-    Where more than two segments meet, a path ends; on a manifold that happens only at control
+    Where more than two segments meet, a path ends; on a manifold that happens only at
     vertices that two strands pass.
     """
     at_node: list[list[int]] = [[] for _ in range(n_nodes)]
@@ -154,8 +192,8 @@ def _from_first_control(
 
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
     """Index among the nodes of each control vertex, -1 when it is none of them, shape (k,)."""
-    at_control = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
-    found = {int(nodes[i, 0]): int(i) for i in at_control}
+    at_vertex = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
+    found = {int(nodes[i, 0]): int(i) for i in at_vertex}
     return np.array([found.get(int(vertex), -1) for vertex in control_vertices], dtype=np.int64)
 
 
@@ -164,7 +202,7 @@ def _barycentric(
 ) -> FloatArray:
     """Coordinates of contour nodes in the input faces given, shape (p, 3)."""
     below, above = nodes.T
-    # At a control vertex both ends are the same and any fraction gives its own weights.
+    # At a vertex both ends are the same and any fraction gives its own weights.
     rise = np.where(below == above, 1.0, field[above] - field[below])
     fraction = np.clip(-field[below] / rise, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]
     corners = mesh.faces[parent]

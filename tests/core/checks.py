@@ -119,6 +119,25 @@ def circle(angles, radius=1.0):
     return radius * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
 
 
+def apart(first, second):
+    """Farthest that either closed polyline (n, 3) strays from the other."""
+    return max(_farthest(first, second), _farthest(second, first))
+
+
+def _farthest(points, polyline):
+    start = polyline[None]
+    step = np.roll(polyline, -1, axis=0)[None] - start
+    offset = points[:, None] - start
+    along = np.clip((offset * step).sum(axis=2) / (step**2).sum(axis=2), 0.0, 1.0)
+    return np.linalg.norm(offset - along[:, :, None] * step, axis=2).min(axis=1).max()
+
+
+def mean_edge_length(mesh):
+    """Mean length of the sides of all faces."""
+    corners = mesh.vertices[mesh.faces]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
 def joined(*meshes):
     """Several meshes as one with several components."""
     offsets = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])

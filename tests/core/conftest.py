@@ -2,11 +2,22 @@
 
 import pytest
 import torch
+from hypothesis import HealthCheck, settings
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
 
 pytest.register_assert_rewrite("tests.core.checks")
+
+# The same examples in every run and nothing written to the folder; times vary with the machine.
+settings.register_profile(
+    "core",
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("core")
 
 # The matrices here are so small that a second thread costs more time than it saves.
 torch.set_num_threads(1)

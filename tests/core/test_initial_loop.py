@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
@@ -75,7 +75,7 @@ PLACES = st.lists(
 )
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25)
 @given(places=PLACES, order=st.sampled_from(["given", "shortest"]))
 @example(places=[(0, (1, 0, 0)), (0, (0.5, 0.5, 0)), (0, (0.2, 0.3, 0.5))], order="given")
 def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
@@ -88,6 +88,15 @@ def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
         return  # Two of them are the same point.
     working, loop = build_initial_loop(BALL, points, order)
     assert_simple_loop(BALL, points, order, working, loop)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loops_of_many_strands_are_simple(small_ball, seed):
+    """Points in random order: the paths wind round one another and split the mesh again and again."""
+    chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
+    points = locate_control_points(small_ball, chosen, closed=True)
+    working, loop = build_initial_loop(small_ball, points, "given")
+    assert_simple_loop(small_ball, points, "given", working, loop)
 
 
 def test_shortest_order_is_that_of_the_distances(ball):

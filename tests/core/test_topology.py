@@ -131,7 +131,7 @@ def problem_on(name, seed):
     return PROBLEMS[name, seed]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     name=st.sampled_from(sorted(MESHES)),
     points=st.integers(0, 2),
