@@ -24,6 +24,12 @@ BAND_SHARE = 0.05
 It holds what the curve may move. Farther out, the longest edge grows with twice the distance.
 """
 
+MOST_SPLITS = 20_000
+"""Edges that are halved at most; needle-shaped faces side by side would ask for many times more.
+
+The longest edges come first, so that stopping leaves the band evenly coarser.
+"""
+
 
 def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[list[int], float]:
     """Halve long edges near a closed path of edges.
@@ -69,7 +75,9 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
     ]
     heapq.heapify(queue)
     following = dict(zip(loop, loop[1:] + loop[:1], strict=True))
-    while queue:
+    for _ in range(MOST_SPLITS):
+        if not queue:
+            break
         _, start, end = heapq.heappop(queue)
         middle = split.split_edge(start, end)
         if following.get(end) == start:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from .array_types import FloatArray
 from .contour import extract_curves
 from .curve import SurfaceCurve
-from .errors import ArgumentError, MissingPackageError, UnreachableError
+from .errors import ArgumentError, MissingPackageError
 from .initial_loop import ORDERS
 from .mesh import Mesh
 from .problem import Problem, build_problem
@@ -123,6 +123,7 @@ class Designer:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
         _check_choices(order, method, closed)
+        _check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         problem = build_problem(
             self.mesh,
@@ -137,14 +138,8 @@ class Designer:
     def _solve(
         self, problem: Problem, smoothness: float, progress: Progress | None, started: float
     ) -> Design:
-        # Imported here so that everything but solving works without PyTorch.
-        try:
-            from . import losses, prediction
-        except ImportError as error:
-            raise MissingPackageError(
-                f"method needs PyTorch, which cannot be imported ({error}); install it into this "
-                "Python with 'pip install torch'"
-            ) from error
+        # These import PyTorch, which nothing before needs.
+        from . import losses, prediction
 
         prediction_result = prediction.predict(
             self._network(problem.features.shape[1]),
@@ -291,9 +286,19 @@ def _check_choices(order: str, method: str, closed: bool) -> None:
     if order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
     if not closed:
-        raise UnreachableError(
+        raise ArgumentError(
             "closed is False, and this version makes closed curves only; pass closed=True"
         )
+
+
+def _check_torch() -> None:
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise MissingPackageError(
+            f"method needs PyTorch, which cannot be imported ({error}); install it into this "
+            "Python with 'pip install torch'"
+        ) from error
 
 
 def _checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:

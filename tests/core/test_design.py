@@ -90,7 +90,9 @@ def on_unit_sphere(mesh, directions):
     corners = mesh.vertices[mesh.faces].transpose(0, 2, 1)
     faces, barycentric = [], []
     for direction in directions:
-        weights = np.linalg.solve(corners, np.tile(direction[:, None], (len(corners), 1, 1)))[..., 0]
+        weights = np.linalg.solve(corners, np.tile(direction[:, None], (len(corners), 1, 1)))[
+            ..., 0
+        ]
         face = weights.min(axis=1).argmax()
         faces.append(face)
         barycentric.append(np.clip(weights[face], 0, None) / np.clip(weights[face], 0, None).sum())
@@ -103,7 +105,9 @@ class TestResult:
         centre = surface.vertices[surface.faces].mean(axis=1)
         near = np.argsort(np.linalg.norm(centre - centre[40], axis=1))
         faces = near[[0, 12, 25, 26]]
-        barycentric = np.array([[0.2, 0.3, 0.5], [0.5, 0.5, 0.0], [0.0, 0.0, 1.0], [0.9, 0.05, 0.05]])
+        barycentric = np.array(
+            [[0.2, 0.3, 0.5], [0.5, 0.5, 0.0], [0.0, 0.0, 1.0], [0.9, 0.05, 0.05]]
+        )
         points = nicmm.SurfacePoints(faces, barycentric)
         design = nicmm.design_curve(surface, points, order="shortest")
         assert_valid_design(surface, design)

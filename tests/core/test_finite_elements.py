@@ -107,7 +107,9 @@ def test_harmonics_of_the_sphere_converge():
         mass = elements.vertex_areas
         residual = elements.laplacian @ z + 2.0 * z
         field_error.append(np.sqrt((mass @ residual**2) / (mass @ z**2)))
-        quotient_error.append(abs((x * y) @ elements.stiffness @ (x * y) / (mass @ (x * y) ** 2) - 6))
+        quotient_error.append(
+            abs((x * y) @ elements.stiffness @ (x * y) / (mass @ (x * y) ** 2) - 6)
+        )
     assert field_error[1] < 0.65 * field_error[0] and field_error[2] < 0.65 * field_error[1]
     # Energies converge at second order: a quarter for each halving of the edges.
     assert quotient_error[1] < 0.35 * quotient_error[0]

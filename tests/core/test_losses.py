@@ -124,9 +124,10 @@ def test_delta_integrates_to_one(width):
 
 
 def test_total_is_the_weighted_sum():
-    terms = {name: torch.tensor(v) for name, v in zip(
-        ("sdf", "int", "smooth", "fea"), (1.0, 10.0, 100.0, 1000.0), strict=True
-    )}
+    terms = {
+        name: torch.tensor(v)
+        for name, v in zip(("sdf", "int", "smooth", "fea"), (1.0, 10.0, 100.0, 1000.0), strict=True)
+    }
     weights = LossWeights(sdf=2.0, interpolation=3.0, smooth=4.0, feature=5.0)
     assert total_loss(terms, weights).item() == 2.0 + 30.0 + 400.0 + 5000.0
 

@@ -68,7 +68,9 @@ def disc_error(rings):
     return np.abs(field - (radius - 0.5)).mean()
 
 
-@pytest.mark.parametrize(("error", "sizes"), [(sphere_error, (12, 24, 48)), (disc_error, (8, 16, 32))])
+@pytest.mark.parametrize(
+    ("error", "sizes"), [(sphere_error, (12, 24, 48)), (disc_error, (8, 16, 32))]
+)
 def test_distance_approaches_the_closed_form(error, sizes):
     errors = [error(size) for size in sizes]
     assert errors[0] < 0.02

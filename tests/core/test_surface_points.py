@@ -127,9 +127,7 @@ def test_points_on_two_components_are_unreachable(small_ball, ring):
 
 def test_point_in_a_face_without_area_is_refused_or_placed():
     # The third face is a sliver of no area along an edge of the first.
-    mesh = nicmm.Mesh(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], [[0, 1, 2], [0, 3, 1]]
-    )
+    mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], [[0, 1, 2], [0, 3, 1]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

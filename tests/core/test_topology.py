@@ -96,9 +96,7 @@ def test_control_points_are_not_lost(ball, working, equator):
 def test_field_without_a_zero_set_falls_back_on_one_loop(ball, working, equator):
     start = working.vertices[:, 2].copy()
     for constant in (1.0, -1.0):
-        field, breaking = keep_topology(
-            working, start, np.full(len(start), constant), equator
-        )
+        field, breaking = keep_topology(working, start, np.full(len(start), constant), equator)
         assert breaking > 0
         assert_one_loop(ball, working, field, equator)
 
@@ -149,9 +147,7 @@ def test_any_smooth_change_leaves_one_loop(name, points, waves, height, length):
     )
     wanted = problem.smoother.interpolating(problem.initial_distance + height * wave)
     controls = problem.loop.control_vertices
-    field, breaking = keep_topology(
-        problem.working, problem.initial_distance, wanted, controls
-    )
+    field, breaking = keep_topology(problem.working, problem.initial_distance, wanted, controls)
     assert_one_loop(mesh, problem.working, field, controls)
     if breaking == 0:
         np.testing.assert_array_equal(field, wanted)

@@ -75,8 +75,9 @@ def test_edge_split_halves_both_faces_and_face_split_makes_three():
 def test_point_seen_from_the_other_face_of_an_edge_is_the_same_vertex(small_ball):
     """A point on an edge may be given in either face; two there must not split it twice alike."""
     a, b, _ = small_ball.faces[7]
-    (other,) = set(np.flatnonzero(((small_ball.faces == a) | (small_ball.faces == b)).sum(1) == 2))\
-        - {7}
+    (other,) = set(
+        np.flatnonzero(((small_ball.faces == a) | (small_ball.faces == b)).sum(1) == 2)
+    ) - {7}
     weight = {a: 0.25, b: 0.75}
     opposite = [weight.get(v, 0.0) for v in small_ball.faces[other]]
     points = nicmm.SurfacePoints(
@@ -109,7 +110,9 @@ def test_input_mesh_is_left_alone(small_ball):
 
 def test_edges_of_the_working_mesh_by_hand():
     """Edges, their mean length and the boundary, on two right triangles that share an edge."""
-    mesh = nicmm.Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 1], [3, 4, 0]], [[0, 1, 2], [2, 1, 4]])
+    mesh = nicmm.Mesh(
+        [[0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 1], [3, 4, 0]], [[0, 1, 2], [2, 1, 4]]
+    )
     working, _ = SplitMesh(mesh).assemble(0)
     np.testing.assert_array_equal(working.input_vertex, [0, 1, 2, 4])
     np.testing.assert_array_equal(working.edges, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]])
@@ -155,6 +158,4 @@ def assert_same_surface(mesh, working):
     )
     assert ((child * normal[working.parent_face]).sum(axis=1) > 0.0).all()
     kept = working.input_vertex >= 0
-    np.testing.assert_array_equal(
-        working.vertices[kept], mesh.vertices[working.input_vertex[kept]]
-    )
+    np.testing.assert_array_equal(working.vertices[kept], mesh.vertices[working.input_vertex[kept]])
