@@ -20,7 +20,7 @@ from .contour import extract_curves
 from .curve import SurfaceCurve
 from .errors import ArgumentError, MissingPackageError
 from .initial_loop import ORDERS
-from .mesh import Mesh
+from .mesh import Mesh, real_array
 from .problem import Problem, build_problem
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 METHODS = ("nicmm", "nicmm-paper")
 """``"nicmm"`` is the same as ``"nicmm-paper"`` until the fast method lands."""
+
+SMOOTHNESS_RANGE = (1e-3, 1e3)
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -123,6 +125,8 @@ class Designer:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
         _check_choices(order, method, closed)
+        if progress is not None and not callable(progress):
+            raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         _check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         problem = build_problem(
@@ -305,7 +309,7 @@ def _checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray
     if weights is None:
         return None
     try:
-        checked = np.array(weights, dtype=np.float64)
+        checked = real_array(weights)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
     if checked.shape != (len(mesh.vertices),):
@@ -324,8 +328,9 @@ def _checked_smoothness(smoothness: float) -> float:
         value = float(smoothness)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
-    if not (np.isfinite(value) and value > 0.0):
-        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number")
+    low, high = SMOOTHNESS_RANGE
+    if not low <= value <= high:
+        raise ArgumentError(f"smoothness is {smoothness!r}; pass a number in {low:g} … {high:g}")
     return value
 
 

@@ -48,6 +48,23 @@ def control_indicator(response: FloatArray) -> FloatArray:
     return response.sum(axis=1)
 
 
+def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> FloatArray:
+    """Positions about the surface's centroid, along its principal axes, shape (n, 3).
+
+    The network sees coordinates; in this frame a turned or moved model gives the same ones, and
+    so the same curve, unless its axes are undetermined as a ball's are.
+    """
+    centroids = vertices[faces].mean(axis=1)
+    share = face_areas / face_areas.sum()
+    centre = share @ centroids
+    offset = centroids - centre
+    _, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
+    # An axis has no sign of its own: it points to where the surface reaches farther.
+    axes = axes * np.where(share @ (offset @ axes) ** 3 < 0.0, -1.0, 1.0)
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return (vertices - centre) @ axes
+
+
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Unit normals weighted by corner angle, shape (n, 3); zero where they cancel."""
     normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)

@@ -9,9 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from .array_types import BoolArray, FloatArray, IntArray
-from .errors import MeshError
 from .mesh import triangle_areas
-from .sparse_solver import DEGENERATE
 
 
 @dataclass(frozen=True)
@@ -53,16 +51,9 @@ def build_finite_elements(
     faces : (m, 3) int array
     on_boundary : (n,) bool array
         Vertices of edges with a single face.
-
-    Raises
-    ------
-    MeshError
-        If a face has no area.
     """
     n_vertices, n_faces = len(vertices), len(faces)
     face_areas = triangle_areas(vertices, faces)
-    if not (face_areas > 0.0).all():
-        raise MeshError(DEGENERATE)
     corners = (np.repeat(np.arange(n_faces), 3), faces.ravel())
     thirds = np.full(3 * n_faces, 1.0 / 3.0)
     centroid = sparse.csr_array((thirds, corners), shape=(n_faces, n_vertices))

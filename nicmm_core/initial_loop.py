@@ -263,8 +263,19 @@ def _rows_in(edges: IntArray, wanted: IntArray, n_vertices: int) -> IntArray:
 
 
 def _split_along(split: SplitMesh, nodes: list[int | tuple[int, int]]) -> list[int]:
-    """Split the edges whose midpoints a path uses; the path as vertices."""
-    return [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
+    """Split the edges whose midpoints a path uses; the path as vertices, each joined to the next.
+
+    Where a path passes all three edges of a face, a line from an earlier midpoint may lie across
+    a later step; there the diagonal of the two faces is exchanged.
+    """
+    path = [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
+    for start, end in zip(path[:-1], path[1:], strict=True):
+        if not split.join(start, end):
+            raise UnreachableError(
+                "control_points: the paths between them come too close to one another for this "
+                "mesh; use a finer mesh or fewer points"
+            )
+    return path
 
 
 def _separate_controls(split: SplitMesh, controls: IntArray) -> None:

@@ -90,6 +90,20 @@ class Mesh:
         return used
 
 
+def real_array(values: ArrayLike) -> FloatArray:
+    """A copy as floats.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If that would lose something: complex numbers, text, ragged lists.
+    """
+    given = np.array(values)
+    if np.iscomplexobj(given):
+        raise TypeError("they are complex")
+    return given.astype(np.float64)
+
+
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
     corner = vertices[faces]
@@ -116,7 +130,7 @@ def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
     try:
-        checked = np.array(vertices, dtype=np.float64)
+        checked = real_array(vertices)
     except (TypeError, ValueError) as error:
         raise MeshError(
             f"vertices cannot be read as numbers ({error}); pass an array of shape (V, 3)"
@@ -136,11 +150,11 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
     try:
         given = np.array(faces)
         if given.size and not np.issubdtype(given.dtype, np.integer):
-            checked = given.astype(np.float64).astype(np.int64)
-            if not np.array_equal(checked, given):
+            given = real_array(given)
+            # Beyond 2^53 floats skip whole numbers, and no mesh has as many vertices.
+            if not (np.abs(given) < 2.0**53).all() or (given != np.round(given)).any():
                 raise ValueError("some are not whole numbers")
-        else:
-            checked = given.astype(np.int64)
+        checked = given.astype(np.int64)
     except (TypeError, ValueError, OverflowError) as error:
         raise MeshError(
             f"faces cannot be read as vertex indices ({error}); pass an integer array of shape "

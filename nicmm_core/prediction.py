@@ -106,7 +106,8 @@ def predict(
     network = copy.deepcopy(network).to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
 
-    best_loss, best_field, best_terms = np.inf, problem.initial_distance, _as_floats({})
+    best_loss, best_field = np.inf, problem.initial_distance
+    best_terms = dict.fromkeys(("sdf", "int", "smooth", "fea"), np.inf)
     energies: list[float] = []
     stopped = "cap"
     iteration = 0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,12 +90,15 @@ def pretrain(
     report = progress or (lambda stage, done, total, loss: None)
     if not meshes:
         raise ArgumentError("meshes is empty; name at least one mesh to train on")
+    if not Path(output).resolve().parent.is_dir():
+        raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     torch.manual_seed(config.seed)
     network = CurveNetwork(network_config or NetworkConfig()).to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
     checkpoint = Path(output).with_suffix(".checkpoint.pt")
-    losses = _resume(checkpoint, repr((network.config, config, weights)), network, optimiser)
+    configuration = repr((network.config, config, weights, _fingerprint(meshes)))
+    losses = _resume(checkpoint, configuration, network, optimiser)
 
     # The tensors of a set on 4,000 vertices take about 2 MB, so all of them stay on the device.
     prepared = [
@@ -117,7 +122,7 @@ def pretrain(
             report("training", done, config.epochs * len(order), total / (step + 1))
         losses.append(total / len(order))
         state = {
-            "configuration": repr((network.config, config, weights)),
+            "configuration": configuration,
             "network": network.state_dict(),
             "optimiser": optimiser.state_dict(),
             "losses": losses,
@@ -139,14 +144,29 @@ def _resume(
     """Load an interrupted run, if there is one; the losses of its epochs."""
     if not checkpoint.exists():
         return []
-    state = torch.load(checkpoint, weights_only=True)
-    if state["configuration"] != configuration:
+    try:
+        state = torch.load(checkpoint, weights_only=True)
+        theirs = state["configuration"]
+    except (OSError, RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError) as error:
         raise ArgumentError(
-            f"{checkpoint} belongs to a run with other settings; remove it or repeat those settings"
+            f"{checkpoint} cannot be read as a checkpoint ({error}); remove it to start anew"
+        ) from error
+    if theirs != configuration:
+        raise ArgumentError(
+            f"{checkpoint} belongs to a run with other meshes or settings; remove it or repeat "
+            "that run"
         )
     network.load_state_dict(state["network"])
     optimiser.load_state_dict(state["optimiser"])
     return list(state["losses"])
+
+
+def _fingerprint(meshes: Sequence[Mesh]) -> str:
+    digest = hashlib.sha256()
+    for mesh in meshes:
+        digest.update(mesh.vertices.tobytes())
+        digest.update(mesh.faces.tobytes())
+    return digest.hexdigest()
 
 
 def _random_problems(
@@ -161,6 +181,11 @@ def _random_problems(
         generator = np.random.default_rng([config.seed, number])
         component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
         vertices = np.unique(mesh.faces[mesh.face_component == component])
+        if len(vertices) < config.most_points:
+            raise ArgumentError(
+                f"meshes[{number}] has {len(vertices)} connected vertices, fewer than a set's "
+                f"{config.most_points} points; leave it out or use a finer mesh"
+            )
         found = 0
         for _ in range(TRIES_PER_SET * wanted):
             if found == wanted:

@@ -11,12 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from .array_types import FloatArray
-from .features import control_indicator, feature_map, input_features, vertex_normals
+from .errors import MeshError
+from .features import (
+    control_indicator,
+    feature_map,
+    in_principal_frame,
+    input_features,
+    vertex_normals,
+)
 from .finite_elements import FiniteElements, build_finite_elements
 from .initial_loop import InitialLoop, build_initial_loop
 from .mesh import Mesh
 from .signed_distance import signed_distance
 from .smoothing import Smoother, build_smoother
+from .sparse_solver import DEGENERATE
 from .surface_points import SurfacePoints
 from .topology import keep_topology
 from .virtual_splits import WorkingMesh
@@ -91,15 +99,20 @@ def build_problem(
 
     Raises
     ------
+    MeshError
+        If faces have no area.
     UnreachableError
         If no simple loop that bounds a region passes the points in this order.
     """
+    component = mesh.face_component == mesh.face_component[points.faces[0]]
+    if not (mesh.face_areas[component] > 0.0).all():
+        raise MeshError(DEGENERATE)
     importance = None
     if obstacles is not None or alignment is not None:
         importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
     working, loop = build_initial_loop(mesh, points, order, importance)
     unit = float(np.sqrt(working.face_areas.sum()))
-    vertices = (working.vertices - working.vertices.mean(axis=0)) / unit
+    vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
     edge_length = loop.edge_length / unit
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
     distance = signed_distance(working, elements, loop, edge_length)

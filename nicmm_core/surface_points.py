@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import igl
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import tolerances
 from .array_types import FloatArray, IntArray
 from .errors import ControlPointError, UnreachableError
-from .mesh import Mesh
+from .mesh import Mesh, real_array
 
 FEWEST_POINTS_CLOSED = 3
 FEWEST_POINTS_OPEN = 2
@@ -76,7 +77,7 @@ def locate_control_points(
             points = SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
         elif given.ndim == 1 and np.issubdtype(given.dtype, np.integer):
             points = _points_at_vertices(mesh, given.astype(np.int64))
-        elif given.ndim == 2 and given.shape[1] == 3 and np.issubdtype(given.dtype, np.number):
+        elif given.ndim == 2 and given.shape[1] == 3 and _is_real(given):
             points = _points_in_space(mesh, given.astype(np.float64))
         else:
             raise ControlPointError(
@@ -92,10 +93,14 @@ def locate_control_points(
 _FORMS = "pass vertex indices (k,), points on the surface (k, 3) or SurfacePoints"
 
 
+def _is_real(values: NDArray[Any]) -> bool:
+    return np.issubdtype(values.dtype, np.integer) or np.issubdtype(values.dtype, np.floating)
+
+
 def _checked_surface_points(mesh: Mesh, given: SurfacePoints) -> SurfacePoints:
     try:
         faces = np.asarray(given.faces)
-        barycentric = np.asarray(given.barycentric, dtype=np.float64)
+        barycentric = real_array(given.barycentric)
     except (TypeError, ValueError) as error:
         raise ControlPointError(f"control_points cannot be read ({error}); {_FORMS}") from error
     if faces.ndim != 1 or not (faces.size == 0 or np.issubdtype(faces.dtype, np.integer)):

@@ -148,6 +148,28 @@ class SplitMesh:
         """Insert the midpoint of an edge and halve the faces beside it."""
         return self._split_edge_at(start, end, _mixed(self.weights(start), self.weights(end), 0.5))
 
+    def join(self, first: int, second: int) -> bool:
+        """Make an edge between the two vertices opposite a common edge inside an input face.
+
+        Returns
+        -------
+        bool
+            Whether they are joined now; they may have been before.
+        """
+        if second in self.neighbours(first):
+            return True
+        for face in sorted(self.faces_around(first)):
+            start, end = (corner for corner in self.corners(face) if corner != first)
+            across = self.faces_around(start) & self.faces_around(end) & self.faces_around(second)
+            if across and self._parent(face) == self._parent(other := min(across)):
+                a, b, c = self.corners(face)
+                if (start, end) not in ((a, b), (b, c), (c, a)):
+                    start, end = end, start
+                self._replace_face(face, [(first, start, second)])
+                self._replace_face(other, [(first, second, end)])
+                return True
+        return False
+
     def split_face(self, face: int) -> int:
         """Insert the centroid of a face, which becomes three faces."""
         third = 1.0 / 3.0
@@ -266,9 +288,14 @@ class SplitMesh:
         self._faces_around[vertex] = set()
         return vertex
 
+    def _parent(self, face: int) -> int:
+        """The input face that a face lies in."""
+        n_input = len(self._mesh.faces)
+        return face if face < n_input else self._new_parents[face - n_input]
+
     def _replace_face(self, face: int, children: list[tuple[int, ...]]) -> None:
         n_input = len(self._mesh.faces)
-        parent = face if face < n_input else self._new_parents[face - n_input]
+        parent = self._parent(face)
         siblings = self._children.setdefault(parent, set())
         siblings.discard(face)
         self._dead.add(face)

@@ -40,14 +40,26 @@ def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> C
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        config = NetworkConfig(**json.loads(str(arrays.pop("config"))))
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        network = CurveNetwork(NetworkConfig(**json.loads(str(arrays.pop("config")))), channels)
+        extra = channels - arrays["stem.weight"].shape[1]
+        arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
+        network.load_state_dict({name: torch.as_tensor(value) for name, value in arrays.items()})
+    except _UNREADABLE as error:
         raise ArgumentError(
             f"{path} cannot be read as network weights ({error}); make the file with "
             "'python -m nicmm_core pretrain'"
         ) from error
-    extra = channels - arrays["stem.weight"].shape[1]
-    arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
-    network = CurveNetwork(config, channels)
-    network.load_state_dict({name: torch.as_tensor(value) for name, value in arrays.items()})
     return network
+
+
+# What a missing file, another kind of file and weights of another network raise.
+_UNREADABLE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)

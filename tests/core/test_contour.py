@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nicmm_core.contour import extract_curves
+from nicmm_core.contour import PASSING_MARGIN, extract_curves
 from nicmm_core.virtual_splits import SplitMesh
 from tests.core.checks import (
     assert_does_not_touch_itself,
@@ -13,6 +13,7 @@ from tests.core.checks import (
     assert_valid_curve,
     circle,
     euler_characteristic,
+    mean_edge_length,
     nearest_vertices,
 )
 
@@ -30,12 +31,18 @@ def curves_of(mesh, field, controls=NONE):
     return curves
 
 
+def assert_nearly_all_exact(mesh, deviation):
+    """The contour is exact but for the vertices that it passes closely and is drawn to."""
+    assert np.abs(deviation).max() < PASSING_MARGIN * 1.5 * mean_edge_length(mesh)
+    assert np.quantile(np.abs(deviation), 0.8) < 1e-9
+
+
 @pytest.mark.parametrize("offset", [0.013, -0.37, 0.66])
 def test_linear_field_gives_a_straight_line_from_boundary_to_boundary(flat_disc, offset):
     across = np.array([0.6, 0.8, 0.0])
     (curve,) = curves_of(flat_disc, flat_disc.vertices @ across - offset)
     assert not curve.closed
-    np.testing.assert_allclose(curve.points @ across, offset, rtol=0, atol=1e-6)
+    assert_nearly_all_exact(flat_disc, curve.points @ across - offset)
     along = curve.points @ [-0.8, 0.6, 0.0]
     assert (np.diff(along) > 0).all() or (np.diff(along) < 0).all()
     # The rim is a polygon of 72 sides, so the chord ends a little inside the unit circle.
@@ -49,7 +56,7 @@ def test_height_on_the_sphere_gives_a_parallel(ball, height):
     (curve,) = curves_of(ball, ball.vertices[:, 2] - height)
     assert curve.closed
     assert_valid_curve(ball, curve)
-    np.testing.assert_allclose(curve.points[:, 2], height, rtol=0, atol=1e-6)
+    assert_nearly_all_exact(ball, curve.points[:, 2] - height)
     assert curve.length == pytest.approx(2 * np.pi * np.sqrt(1 - height**2), rel=0.01)
     assert len(curve.control_index) == 0
 
@@ -156,8 +163,8 @@ def test_contour_on_split_faces_refers_to_the_input_mesh(small_ball):
     (curve,) = extract_curves(small_ball, working, working.vertices @ tilt - 0.05, NONE)
     (plain,) = curves_of(small_ball, small_ball.vertices @ tilt - 0.05)
     assert_valid_curve(small_ball, curve)
-    np.testing.assert_allclose(curve.points @ tilt, 0.05, rtol=0, atol=1e-6)
-    assert curve.length == pytest.approx(plain.length, rel=1e-6)
+    assert_nearly_all_exact(small_ball, curve.points @ tilt - 0.05)
+    assert curve.length == pytest.approx(plain.length, rel=1e-3)
 
 
 def test_curve_is_frozen(ball):

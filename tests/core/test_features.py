@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.features import FEATURE_BASELINE, feature_map, vertex_normals
 from nicmm_core.problem import build_problem
@@ -17,6 +19,11 @@ def painted(mesh, vertex, weight):
     weights = np.zeros(len(mesh.vertices))
     weights[vertex] = weight
     return weights
+
+
+def pairwise_distances(points):
+    """Between the first points, enough to fix a shape."""
+    return np.linalg.norm(points[:60, None] - points[None, :60], axis=2)
 
 
 def map_of(mesh, obstacles=None, alignment=None):
@@ -41,14 +48,19 @@ def test_channels_are_position_normal_indicator_and_distance(body):
     working = problem.working
     assert problem.features.shape == (len(working.vertices), 8)
     assert np.isfinite(problem.features).all()
-    position = problem.features[:, :3]
-    # Positions keep their shape: centred, and in units of the square root of the area.
-    np.testing.assert_allclose(position.mean(axis=0), 0.0, atol=1e-12)
-    area = working.face_areas.sum()
+    position, normal = problem.features[:, :3], problem.features[:, 3:6]
+    # Positions keep their shape, in units of the square root of the area about the centroid.
+    unit = np.sqrt(working.face_areas.sum())
     np.testing.assert_allclose(
-        position - position[0], (working.vertices - working.vertices[0]) / np.sqrt(area), atol=1e-12
+        pairwise_distances(unit * position), pairwise_distances(working.vertices), atol=1e-9
     )
-    np.testing.assert_allclose(np.linalg.norm(problem.features[:, 3:6], axis=1), 1.0)
+    centroid = working.face_areas @ position[working.faces].mean(axis=1)
+    np.testing.assert_allclose(centroid, 0.0, atol=1e-9)
+    # Normals are those of the positions, on the outside.
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
+    corner = position[working.faces]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    assert ((across * normal[working.faces[:, 0]]).sum(axis=1) > 0).mean() > 0.95
     np.testing.assert_array_equal(problem.features[:, 7], problem.initial_distance)
 
 
@@ -131,3 +143,17 @@ def test_effect_does_not_depend_on_how_many_vertices_are_painted(ball):
     one = map_of(ball, obstacles=painted(ball, 100, 1.0))
     near = np.linalg.norm(ball.vertices - ball.vertices[100], axis=1) < 2 * EDGE
     assert map_of(ball, obstacles=near.astype(float)).max() == pytest.approx(one.max())
+
+
+def test_turned_and_moved_surface_has_the_same_positions_and_normals(body):
+    """At the input's vertices; but for a ball and its like, whose axes are undetermined."""
+    points = locate_control_points(body, [3, 50, 200, 333], closed=True)
+    turn = Rotation.from_rotvec([0.4, -1.1, 0.7])
+    moved = nicmm.Mesh(turn.apply(body.vertices.copy()) + [3.0, 1.0, -2.0], body.faces)
+    channels = []
+    for mesh in (body, moved):
+        problem = build_problem(mesh, points, "shortest")
+        inputs = problem.working.input_vertex
+        channels.append(problem.features[np.argsort(inputs)[(inputs < 0).sum() :], :6])
+    assert len(channels[0]) == len(body.vertices)
+    np.testing.assert_allclose(channels[1], channels[0], rtol=0, atol=1e-8)

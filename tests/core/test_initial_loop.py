@@ -92,7 +92,7 @@ def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_loops_of_many_strands_are_simple(small_ball, seed):
-    """Points in random order: the paths wind round one another and split the mesh again and again."""
+    """Points in random order: the paths wind round one another and split the mesh often."""
     chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
     points = locate_control_points(small_ball, chosen, closed=True)
     working, loop = build_initial_loop(small_ball, points, "given")

@@ -13,7 +13,8 @@ from nicmm_core.weights_file import load_network
 
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
-NEVER_STILL = -1.0
+NEVER = {"fluctuation": -1.0, "threshold": -1.0}
+"""Settings with which nothing but the cap stops it."""
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +40,14 @@ def run(network, problem, watch=None, weights=WEIGHTS, **settings):
 @pytest.mark.parametrize("iterations", [1, 2, 5, 20])
 def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     start = run(network, problem, iterations=1)
-    result = run(network, problem, iterations=iterations, fluctuation=NEVER_STILL)
+    result = run(network, problem, iterations=iterations, **NEVER)
     assert loss_of(problem, result.field) <= loss_of(problem, start.field) * (1 + 1e-6)
 
 
 def test_iterations_lower_the_loss_of_an_untrained_network(problem):
     torch.manual_seed(0)
     untrained = CurveNetwork(NetworkConfig(width=16, depth=1))
-    result = run(untrained, problem, iterations=40, fluctuation=NEVER_STILL)
+    result = run(untrained, problem, iterations=40, **NEVER)
     assert loss_of(problem, result.field) < 0.98 * loss_of(problem, problem.initial_distance)
 
 
@@ -61,20 +62,33 @@ def test_terms_are_those_of_the_field_returned(network, problem):
 
 def test_stops_when_the_energy_has_been_still_for_the_patience(network, problem):
     """With a fluctuation that any energy stays within, that is as soon as it may."""
-    for patience in (3, 7):
-        result = run(network, problem, patience=patience, fluctuation=1e9)
-        assert (result.stopped, result.iterations) == ("converged", patience)
+    for patience, least, expected in ((3, 1, 3), (7, 1, 7), (3, 12, 12)):
+        result = run(
+            network,
+            problem,
+            patience=patience,
+            least_iterations=least,
+            fluctuation=1e9,
+            threshold=-1.0,
+        )
+        assert (result.stopped, result.iterations) == ("converged", expected)
+
+
+def test_stops_at_once_when_the_energy_is_low_enough(network, problem):
+    result = run(network, problem, fluctuation=-1.0, threshold=1e9)
+    assert (result.stopped, result.iterations) == ("converged", 1)
 
 
 def test_looser_fluctuation_stops_no_later(network, problem):
     counts = [
-        run(network, problem, fluctuation=fluctuation).iterations for fluctuation in (0.3, 0.03)
+        run(network, problem, fluctuation=fluctuation, threshold=-1.0).iterations
+        for fluctuation in (0.3, 0.03)
     ]
     assert counts[0] <= counts[1]
 
 
 def test_stops_at_the_cap(network, problem):
-    result = run(network, problem, iterations=4, fluctuation=NEVER_STILL)
+    result = run(network, problem, iterations=4, **NEVER)
     assert (result.stopped, result.iterations) == ("cap", 4)
 
 
@@ -85,7 +99,7 @@ def test_watch_cancels_and_sees_the_best_field(network, problem):
         seen.append((fraction, loss_of(problem, field)))
         return len(seen) < 6
 
-    result = run(network, problem, watch, iterations=50, fluctuation=NEVER_STILL)
+    result = run(network, problem, watch, iterations=50, **NEVER)
     assert (result.stopped, result.iterations) == ("cancelled", 6)
     fractions, losses = zip(*seen, strict=True)
     assert all(a < b for a, b in zip(fractions, fractions[1:], strict=False))
@@ -103,7 +117,7 @@ def test_an_energy_without_value_diverges_to_the_initial_field(network, problem)
 
 def test_network_given_is_not_changed(network, problem):
     before = {name: value.clone() for name, value in network.state_dict().items()}
-    run(network, problem, iterations=5, fluctuation=NEVER_STILL)
+    run(network, problem, iterations=5, **NEVER)
     for name, value in network.state_dict().items():
         assert torch.equal(value, before[name])
 
@@ -143,7 +157,7 @@ def test_band_energy_of_a_distance_sees_the_band_only(problem):
     """Whatever happens far from the zero set leaves it alone."""
     surface = surface_tensors(problem, CPU)
     phi = torch.as_tensor(problem.initial_distance, dtype=torch.float32)
-    far = phi.abs() > 4 * problem.edge_length
+    far = phi.abs() > 0.5 * phi.max()
     assert far.any()
     changed = torch.where(far, 3.0 * phi, phi)
     energies = [

@@ -7,19 +7,26 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.finite_elements import build_finite_elements
 from nicmm_core.initial_loop import InitialLoop
+from nicmm_core.problem import build_problem
 from nicmm_core.signed_distance import signed_distance
 from nicmm_core.surface_points import locate_control_points
 from nicmm_core.virtual_splits import SplitMesh
-from nicmm_core.problem import build_problem
 from tests.core.checks import joined
 
 
 def distance_to(mesh, on_loop):
     """Signed distance to the vertices given, which are in the order of a loop."""
     working, renumbered = SplitMesh(mesh).assemble(mesh.face_component[0])
-    loop = InitialLoop(renumbered[on_loop], renumbered[on_loop[:1]], np.arange(1))
+    edge_length = working.edge_lengths.mean()
+    loop = InitialLoop(
+        vertices=renumbered[on_loop],
+        control_vertices=renumbered[on_loop[:1]],
+        order=np.arange(1),
+        edge_length=edge_length,
+        zigzag=edge_length,
+    )
     elements = build_finite_elements(working.vertices, working.faces, working.on_boundary)
-    return signed_distance(working, elements, loop, working.mean_edge_length)
+    return signed_distance(working, elements, loop, edge_length)
 
 
 def globe(rings):

@@ -116,7 +116,7 @@ def test_edges_of_the_working_mesh_by_hand():
     working, _ = SplitMesh(mesh).assemble(0)
     np.testing.assert_array_equal(working.input_vertex, [0, 1, 2, 4])
     np.testing.assert_array_equal(working.edges, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]])
-    assert working.mean_edge_length == pytest.approx((3 + 4 + 5 + 4 + 3) / 5)
+    np.testing.assert_allclose(working.edge_lengths, [3, 4, 5, 4, 3])
     assert working.on_boundary.all()
 
 

@@ -47,13 +47,20 @@ def test_few_points_get_the_optimal_open_tour(count, seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_many_points_get_no_longer_tour_than_the_nearest_neighbour_way(seed):
+def test_many_points_get_a_tour_that_no_reversal_shortens(seed):
+    """And never a longer one than going to the nearest point each time."""
     count = EXACT_UP_TO + 11
     distance = distances(np.random.default_rng(seed).normal(size=(count, 3)))
     tour = shortest_order(distance, closed=True)
     assert tour[0] == 0
     assert sorted(tour.tolist()) == list(range(count))
-    assert length(distance, tour) <= length(distance, nearest_neighbour_tour(distance))
+    found = length(distance, tour)
+    assert found <= length(distance, nearest_neighbour_tour(distance))
+    for start in range(count):
+        for end in range(start + 2, count + 1):
+            reversed_part = tour.copy()
+            reversed_part[start:end] = tour[start:end][::-1]
+            assert length(distance, reversed_part) > found - 1e-9
 
 
 @pytest.mark.parametrize("count", [EXACT_UP_TO, EXACT_UP_TO + 1, 24])

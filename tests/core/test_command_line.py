@@ -1,0 +1,157 @@
+"""The command line: what it reads, writes, prints and returns."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core.__main__ import main
+from nicmm_core.curve import SurfaceCurve
+from nicmm_core.files import read_mesh, write_mesh
+from nicmm_core.weights_file import load_network
+from tests.core.checks import assert_valid_curve
+
+ROOT = Path(__file__).parents[2]
+CHOSEN = "3,60,100"
+
+
+@pytest.fixture(scope="module")
+def mesh_file(small_ball, tmp_path_factory):
+    path = tmp_path_factory.mktemp("meshes") / "ball.off"
+    write_mesh(path, small_ball)
+    return path
+
+
+def as_program(*arguments, folder):
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, "-m", "nicmm_core", *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_program_writes_the_curve_that_the_function_gives(mesh_file, tmp_path):
+    result = as_program(
+        "design", mesh_file, "--points", CHOSEN, "-o", "curve.json", folder=tmp_path
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    data = json.loads((tmp_path / "curve.json").read_text())
+    arrays = {name: np.array(data[name]) for name in data if name != "closed"}
+    mesh = read_mesh(mesh_file)
+    chosen = [int(vertex) for vertex in CHOSEN.split(",")]
+    assert_valid_curve(mesh, SurfaceCurve(data["closed"], **arrays), mesh.vertices[chosen])
+    (expected,) = nicmm.design_curve(mesh, chosen).curves
+    np.testing.assert_array_equal(arrays["faces"], expected.faces)
+    np.testing.assert_allclose(arrays["points"], expected.points, rtol=0, atol=1e-9)
+
+
+def test_program_ends_with_2_and_the_message(mesh_file, tmp_path):
+    result = as_program(
+        "design", mesh_file, "--points", "3,60,999", "-o", "curve.obj", folder=tmp_path
+    )
+    assert result.returncode == 2
+    assert "control_points[2] = 999 is out of range" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert not (tmp_path / "curve.obj").exists()
+
+
+@pytest.mark.parametrize(("mesh_ending", "ending"), [(".obj", ".obj"), (".ply", ".csv")])
+def test_formats_go_by_their_endings(small_ball, tmp_path, mesh_ending, ending):
+    write_mesh(tmp_path / f"ball{mesh_ending}", small_ball)
+    output = tmp_path / f"curve{ending}"
+    assert (
+        main(
+            ["design", str(tmp_path / f"ball{mesh_ending}"), "--points", CHOSEN, "-o", str(output)]
+        )
+        == 0
+    )
+    first = output.read_text().splitlines()[0]
+    assert first.startswith("v ") if ending == ".obj" else first.startswith("face,")
+
+
+def test_options_reach_the_design(mesh_file, tmp_path):
+    outputs = []
+    for number, options in enumerate(
+        (["--order", "shortest", "--smoothness", "0.2"], ["--method", "nicmm-paper"])
+    ):
+        output = tmp_path / f"{number}.csv"
+        arguments = ["design", str(mesh_file), "--points", "3,60,100,20", "-o", str(output)]
+        assert main([*arguments, *options]) == 0
+        outputs.append(output.read_text())
+    assert outputs[0] != outputs[1]
+
+
+BAD_COMMANDS = {
+    "missing mesh": (["nowhere.obj", "--points", CHOSEN], "nowhere.obj"),
+    "unknown mesh format": (["mesh.blend", "--points", CHOSEN], "mesh.blend"),
+    "points no numbers": (["MESH", "--points", "a,b,c"], "--points is 'a,b,c'"),
+    "too few points": (["MESH", "--points", "3,60"], "too few"),
+    "repeated points": (["MESH", "--points", "3,60,3"], "same point"),
+    "smoothness negative": (["MESH", "--points", CHOSEN, "--smoothness", "-1"], "smoothness"),
+    "unknown method": (["MESH", "--points", CHOSEN, "--method", "magic"], "magic"),
+    "open": (["MESH", "--points", CHOSEN, "--open"], "closed"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD_COMMANDS.values(), ids=BAD_COMMANDS)
+def test_bad_commands_end_with_2_and_say_why(mesh_file, tmp_path, capsys, arguments, message):
+    output = tmp_path / "curve.obj"
+    arguments = [str(mesh_file) if a == "MESH" else a for a in arguments]
+    try:
+        status = main(["design", *arguments, "-o", str(output)])
+    except SystemExit as ended:  # The parser ends the program by itself, with the same status.
+        status = ended.code
+    assert status == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert message in printed.err
+    assert not output.exists()
+
+
+def test_bad_output_is_refused_before_the_work(tmp_path, capsys):
+    """The mesh is missing as well, but nothing gets as far as that."""
+    arguments = ["design", "nowhere.obj", "--points", CHOSEN, "-o", str(tmp_path / "curve.xyz")]
+    assert main(arguments) == 2
+    assert "curve.xyz" in capsys.readouterr().err
+
+
+def test_shapes_writes_meshes_that_differ(tmp_path):
+    assert main(["shapes", str(tmp_path / "meshes"), "--count", "2"]) == 0
+    first, second = sorted((tmp_path / "meshes").iterdir())
+    meshes = read_mesh(first), read_mesh(second)
+    assert all(len(np.unique(mesh.face_component)) == 1 for mesh in meshes)
+    assert not np.array_equal(meshes[0].vertices[:100], meshes[1].vertices[:100])
+
+
+def test_pretrain_writes_weights_with_the_switches_asked_for(mesh_file, tmp_path, capsys):
+    output = tmp_path / "weights.npz"
+    options = ["--sets", "2", "--epochs", "1", "--no-attention"]
+    assert main(["pretrain", str(mesh_file), "-o", str(output), *options]) == 0
+    config = load_network(output).config
+    assert (config.attention, config.gating) == (False, True)
+    # The bar goes to standard error.
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    "options", [["--sets", "0"], ["--sets", "2", "--epochs", "0"], ["--sets", "-3"]]
+)
+def test_pretrain_refuses_to_train_nothing(mesh_file, tmp_path, capsys, options):
+    output = tmp_path / "weights.npz"
+    try:
+        status = main(["pretrain", str(mesh_file), "-o", str(output), *options])
+    except SystemExit as ended:
+        status = ended.code
+    assert status == 2
+    assert capsys.readouterr().err
+    assert not output.exists()
