@@ -59,7 +59,8 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Lengths of edges, and which are too long for their distance from the loop."""
-        size = np.linalg.norm(start - end, axis=1)
+        # Rounded, so that equal edges stay equal however the model is turned.
+        size = np.round(np.linalg.norm(start - end, axis=1) / longest, 6) * longest
         distance, _ = tree.query(0.5 * (start + end))
         return size, (size > longest) & (distance < half_width + 0.5 * size)
 

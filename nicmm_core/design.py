@@ -148,7 +148,9 @@ class Designer:
         prediction_result = prediction.predict(
             self._network(problem.features.shape[1]),
             problem,
-            losses.LossWeights(smooth=smoothness * losses.LossWeights.smooth),
+            losses.balanced(
+                losses.LossWeights(smooth=smoothness * losses.LossWeights.smooth), problem
+            ),
             prediction.PredictionConfig(),
             None if progress is None else self._watcher(problem, progress),
         )

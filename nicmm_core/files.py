@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import igl
@@ -35,12 +39,27 @@ def read_mesh(path: str | Path) -> Mesh:
     if not path.is_file():
         raise MeshError(f"{path} does not exist; check the path of the mesh")
     try:
-        vertices, faces = igl.read_triangle_mesh(str(path))[:2]
+        with _silent_output():
+            vertices, faces = igl.read_triangle_mesh(str(path))[:2]
     except (RuntimeError, ValueError) as error:
         raise MeshError(f"{path} cannot be read as a triangle mesh ({error})") from error
     if path.suffix.lower() == ".stl" and len(vertices):
         vertices, faces = _joined(np.asarray(vertices), np.asarray(faces))
     return Mesh(vertices, faces)
+
+
+@contextmanager
+def _silent_output() -> Iterator[None]:
+    """Keep libigl's readers, which print what they do not like, from writing to the terminal."""
+    sys.stdout.flush()
+    saved = os.dup(1)
+    try:
+        with open(os.devnull, "wb") as nothing:
+            os.dup2(nothing.fileno(), 1)
+        yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:

@@ -9,7 +9,7 @@ integrand is taken at the centroid.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -24,6 +24,10 @@ DELTA_WIDTH = 1.0
 The least that the centroids of a mesh still sample: the delta then covers the band of three edge
 lengths in which the paper judges convergence.
 """
+
+
+MOST_BENDING = 0.25
+"""Most that the smoothness term may weigh in the energy at φ₀."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,20 @@ def loss_terms(surface: SurfaceTensors, phi: Tensor) -> dict[str, Tensor]:
         "smooth": smoothness_loss(surface, phi),
         "fea": feature_loss(surface, phi),
     }
+
+
+def balanced(weights: LossWeights, problem: Problem) -> LossWeights:
+    """Lower λ_smooth where the bending of φ₀ would outweigh its slope.
+
+    A flat φ costs ½ in Eq. 3 and nothing in Eq. 6. Where bending costs about as much, as with many
+    points or a large smoothness, the least energy would be no curve at all.
+    """
+    surface = surface_tensors(problem, torch.device("cpu"))
+    phi = torch.as_tensor(problem.initial_distance, dtype=torch.float32)
+    bending = smoothness_loss(surface, phi).item()
+    if weights.smooth * bending <= MOST_BENDING:
+        return weights
+    return replace(weights, smooth=MOST_BENDING / bending)
 
 
 def total_loss(terms: dict[str, Tensor], weights: LossWeights) -> Tensor:

@@ -90,6 +90,9 @@ def pretrain(
     report = progress or (lambda stage, done, total, loss: None)
     if not meshes:
         raise ArgumentError("meshes is empty; name at least one mesh to train on")
+    for name in ("sets", "epochs"):
+        if getattr(config, name) < 1:
+            raise ArgumentError(f"{name} is {getattr(config, name)}; at least 1 is needed")
     if not Path(output).resolve().parent.is_dir():
         raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")

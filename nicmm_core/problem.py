@@ -95,7 +95,7 @@ def build_problem(
     obstacles, alignment : (V,) float array or None
         Weights in [0, 1] at the input mesh's vertices.
     smoothness : float
-        Multiplies the smoothing length of φ₀.
+        Multiplies the weight of bending in the smoothing of φ₀, the fourth power of its length.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def build_problem(
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
     distance = signed_distance(working, elements, loop, edge_length)
     smoother = build_smoother(
-        elements, loop.control_vertices, smoothness * SMOOTHING_LENGTH * loop.zigzag / unit
+        elements, loop.control_vertices, smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
     )
     initial_distance, _ = keep_topology(working, loop, distance, smoother.smoothed(distance))
     if importance is not None:
