@@ -52,6 +52,7 @@ def test_documented_script(empty_scene, tmp_path):
     assert ran.returncode == 0, ran.stderr
     assert f"{mesh_name} Curve: " in ran.stdout
     bpy.ops.wm.open_mainfile(filepath=str(output))
+    # Another process may round single-precision sums otherwise; 300 optimiser steps enlarge that.
     np.testing.assert_allclose(
-        scenes.points(bpy.data.objects[f"{mesh_name} Curve"]), expected.curves[0].points, atol=1e-6
+        scenes.points(bpy.data.objects[f"{mesh_name} Curve"]), expected.curves[0].points, atol=1e-4
     )
