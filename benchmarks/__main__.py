@@ -1,25 +1,33 @@
-"""Run a measurement: ``python -m benchmarks one_loop [--quick]``.
+"""Run a measurement: ``python -m benchmarks NAME [--quick]``, or ``all`` of them.
 
-Every measurement prints its seed, its meshes and the machine, and a table that goes into
-RESULTS.md.
+Each prints its result with seed, meshes and machine, and full runs put it into RESULTS.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
+import time
 
-from . import one_loop
+from .scale import Scale
 
-MEASUREMENTS = {"one_loop": one_loop.run}
+MEASUREMENTS = ("one_loop",)
+"""Modules of this package with a ``run(scale)``, in the order of the paper."""
 
 
 def main() -> None:
-    """Parse the command line and run one measurement."""
+    """Parse the command line and run."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("name", choices=MEASUREMENTS)
-    parser.add_argument("--quick", action="store_true", help="a few meshes only")
+    parser.add_argument("name", choices=(*MEASUREMENTS, "all"))
+    how_much = parser.add_mutually_exclusive_group()
+    how_much.add_argument("--quick", action="store_true", help="fewer meshes and points: minutes")
+    how_much.add_argument("--smoke", action="store_true", help="generated meshes: seconds")
     options = parser.parse_args()
-    MEASUREMENTS[options.name](quick=options.quick)
+    scale = Scale.QUICK if options.quick else Scale.SMOKE if options.smoke else Scale.FULL
+    for name in MEASUREMENTS if options.name == "all" else (options.name,):
+        started = time.perf_counter()
+        importlib.import_module(f".{name}", __package__).run(scale)
+        print(f"-- {name}: {time.perf_counter() - started:.0f} s\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Meshes to measure on: collections beside the project, where there are any."""
+"""Meshes to measure on: collections beside the project, or generated ones."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from pathlib import Path
 
 import igl
 
+from nicmm_core import shapes
 from nicmm_core.files import MESH_FORMATS, read_mesh
 from nicmm_core.mesh import Mesh
 
+from .scale import Scale
+
 COLLECTIONS = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 """Third-party meshes are no part of the project; each has its own licence."""
+
+PAPER_SUBDIVISIONS = 2
+"""Loop subdivisions that bring a mesh of SHREC16 to the paper's "about 4,000" vertices."""
 
 
 def mesh_files(folder: str) -> list[Path]:
@@ -23,16 +29,34 @@ def mesh_files(folder: str) -> list[Path]:
     return files
 
 
-def shrec16(count: int, subdivisions: int = 2) -> Iterator[tuple[str, Mesh]]:
+def surfaces(scale: Scale, count: int) -> Iterator[tuple[str, Mesh]]:
+    """The paper's data set, or generated creatures when only a smoke test is asked for."""
+    return creatures(count) if scale is Scale.SMOKE else shrec16(count)
+
+
+def label(scale: Scale) -> str:
+    """What `surfaces` are, in words."""
+    return "generated creatures" if scale is Scale.SMOKE else "SHREC16, two Loop subdivisions"
+
+
+def shrec16(count: int, subdivisions: int = PAPER_SUBDIVISIONS) -> Iterator[tuple[str, Mesh]]:
     """Meshes of SHREC16, spread over its classes, after Loop subdivisions."""
-    files = mesh_files("shrec16")
-    for path in files[:: max(1, len(files) // count)][:count]:
+    for path in _spread(mesh_files("shrec16"), count):
         mesh = read_mesh(path)
         yield path.stem, Mesh(*igl.loop(mesh.vertices, mesh.faces, subdivisions))
 
 
 def clean(count: int) -> Iterator[tuple[str, Mesh]]:
     """Closed manifold meshes, as they are."""
-    files = mesh_files("clean")
-    for path in files[:: max(1, len(files) // count)][:count]:
+    for path in _spread(mesh_files("clean"), count):
         yield path.stem, read_mesh(path)
+
+
+def creatures(count: int) -> Iterator[tuple[str, Mesh]]:
+    """Generated shapes with limbs, small."""
+    for seed in range(count):
+        yield f"creature {seed}", shapes.creature(seed, resolution=32, faces=200)
+
+
+def _spread(files: list[Path], count: int) -> list[Path]:
+    return files[:: max(1, len(files) // count)][:count]
