@@ -69,14 +69,20 @@ class Prediction:
         φ of the iteration with the least loss, in units of the problem.
     terms : dict of str to float
         The unweighted terms of the loss there.
-    iterations : int
+    losses : list of float
+        Total loss of every iteration.
     stopped : {"converged", "cap", "cancelled", "diverged"}
     """
 
     field: FloatArray
     terms: dict[str, float]
-    iterations: int
+    losses: list[float]
     stopped: str
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations done."""
+        return len(self.losses)
 
 
 @single_thread()
@@ -109,14 +115,15 @@ def predict(
     best_loss, best_field = np.inf, problem.initial_distance
     best_terms = dict.fromkeys(("sdf", "int", "smooth", "fea"), np.inf)
     energies: list[float] = []
+    losses: list[float] = []
     stopped = "cap"
-    iteration = 0
     for iteration in range(1, config.iterations + 1):
         optimiser.zero_grad()
         phi = network(given)  # (n,)
         terms = loss_terms(surface, phi)
         loss = total_loss(terms, weights)
         value = loss.item()
+        losses.append(value)
         if not np.isfinite(value):
             stopped = "diverged"
             break
@@ -132,7 +139,7 @@ def predict(
             break
         loss.backward()
         optimiser.step()
-    return Prediction(best_field, best_terms, iteration, stopped)
+    return Prediction(best_field, best_terms, losses, stopped)
 
 
 def network_input(problem: Problem, device: torch.device) -> NetworkInput:
