@@ -15,6 +15,9 @@ from torch import Tensor, nn
 
 from .features import BASE_CHANNELS
 
+NORMAL_CHANNELS, INDICATOR_CHANNEL, DISTANCE_CHANNEL = slice(3, 6), 6, 7
+"""Places of N, φ_p and φ₀ among the input channels."""
+
 
 @dataclass(frozen=True)
 class NetworkConfig:
@@ -39,6 +42,13 @@ class NetworkConfig:
     position_gain : float
         Factor on the first layer's initial weights for positions. Coordinates lie within about
         ±0.5 and a plain layer would see them as almost linear; 5 resolves a tenth of the surface.
+    normals : bool
+        Normals N among the input; off for the ablation of Table 4, where zeros replace them.
+    control_indicator : bool
+        φ_p among the input; off for Table 4 likewise.
+    distance : bool
+        φ₀ among the input and under the correction that the network gives; off for Table 4. The
+        last layer then begins at random, because φ = 0 is a place where the energy has no slope.
     """
 
     width: int = 64
@@ -48,6 +58,9 @@ class NetworkConfig:
     gating: bool = True
     gate_rank: int = 8
     position_gain: float = 5.0
+    normals: bool = True
+    control_indicator: bool = True
+    distance: bool = True
 
 
 class EfficientChannelAttention(nn.Module):
@@ -135,22 +148,37 @@ class CurveNetwork(nn.Module):
     zeros they brought it there.
     """
 
+    seen: Tensor
+
     def __init__(self, config: NetworkConfig, channels: int = BASE_CHANNELS) -> None:
         super().__init__()
         self.config = config
         self.stem = nn.Linear(channels, config.width)
         self.blocks = nn.ModuleList(Block(config) for _ in range(config.depth))
         self.head = nn.Linear(config.width, 1)
+        # No part of the stored weights: it follows from the configuration.
+        self.register_buffer("seen", _channels_seen(config, channels), persistent=False)
         with torch.no_grad():
             self.stem.weight[:, :3] *= config.position_gain
-            self.head.weight.zero_()
-            self.head.bias.zero_()
+            if config.distance:
+                self.head.weight.zero_()
+                self.head.bias.zero_()
 
     def forward(self, given: NetworkInput) -> Tensor:
         """Level-set values φ, shape (n,)."""
-        hidden = torch.tanh(self.stem(given.features))  # (n, C)
+        hidden = torch.tanh(self.stem(given.features * self.seen))  # (n, C)
         for block in self.blocks:
             hidden = block(hidden, given.area_share)  # (n, C)
         correction = self.head(hidden)[:, 0]  # (n,)
         at_controls = correction[given.control_vertices]  # (k,)
-        return given.initial_distance + correction - given.response @ at_controls  # (n,)
+        phi = correction - given.response @ at_controls  # (n,)
+        return given.initial_distance + phi if self.config.distance else phi
+
+
+def _channels_seen(config: NetworkConfig, channels: int) -> Tensor:
+    """1 for each input channel that the network sees and 0 for those switched off."""
+    seen = torch.ones(channels)
+    seen[NORMAL_CHANNELS] *= config.normals
+    seen[INDICATOR_CHANNEL] *= config.control_indicator
+    seen[DISTANCE_CHANNEL] *= config.distance
+    return seen

@@ -30,7 +30,8 @@ def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> C
     """Read a network for a number of input channels.
 
     The weights are stored for the eight base channels. A ninth one, φ_fea, starts with zero
-    weight, so the same weights serve with and without maps.
+    weight, so the same weights serve with and without maps. Settings that a file does not name
+    have their defaults.
 
     Raises
     ------

@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -83,6 +84,30 @@ def test_switches_remove_parameters(given):
         assert torch.isfinite(randomised(network)(given)).all()
 
 
+SWITCHED_CHANNELS = {"normals": [3, 4, 5], "control_indicator": [6], "distance": [7]}
+
+
+@pytest.mark.parametrize("switch", SWITCHED_CHANNELS)
+def test_a_channel_switched_off_is_not_seen(given, switch):
+    changed = given.features.clone()
+    changed[:, SWITCHED_CHANNELS[switch]] += 0.3
+    changed = given._replace(features=changed)
+    on = randomised(CurveNetwork(SMALL))
+    off = randomised(CurveNetwork(replace(SMALL, **{switch: False})))
+    assert not torch.equal(on(changed), on(given))
+    assert torch.equal(off(changed), off(given))
+
+
+def test_without_distance_the_output_knows_nothing_of_it(given):
+    torch.manual_seed(0)
+    network = CurveNetwork(replace(SMALL, distance=False))
+    phi = network(given)
+    assert torch.equal(phi, network(given._replace(initial_distance=-given.initial_distance)))
+    assert phi[given.control_vertices].abs().max() < 1e-5
+    # At φ = 0 the energy has no slope, so training could not begin there.
+    assert phi.abs().max() > 1e-3
+
+
 def test_without_attention_a_vertex_does_not_feel_the_others(given):
     """Attention is the only way from one vertex to another, but for the control points."""
     moved = given.features.clone()
@@ -155,6 +180,23 @@ def test_weights_survive_the_file(given, tmp_path):
     loaded = load_network(tmp_path / "weights.npz")
     assert loaded.config == config
     assert torch.equal(loaded(given), network(given))
+
+
+@pytest.mark.parametrize("switch", SWITCHED_CHANNELS)
+def test_input_switches_survive_the_file(given, tmp_path, switch):
+    network = randomised(CurveNetwork(replace(SMALL, **{switch: False})))
+    save_network(tmp_path / "weights.npz", network)
+    loaded = load_network(tmp_path / "weights.npz")
+    assert not getattr(loaded.config, switch)
+    assert torch.equal(loaded(given), network(given))
+
+
+def test_files_without_input_switches_see_every_channel(given, tmp_path):
+    network = randomised(CurveNetwork(SMALL))
+    arrays = {name: value.numpy() for name, value in network.state_dict().items()}
+    config = {k: v for k, v in asdict(SMALL).items() if k not in SWITCHED_CHANNELS}
+    np.savez(tmp_path / "weights.npz", config=np.array(json.dumps(config)), **arrays)
+    assert torch.equal(load_network(tmp_path / "weights.npz")(given), network(given))
 
 
 def test_ninth_channel_starts_without_effect(given, tmp_path):
