@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib
@@ -13,6 +14,8 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.ticker import FuncFormatter  # noqa: E402
+
+from nicmm_core.array_types import FloatArray  # noqa: E402
 
 METHOD_COLOURS = {
     "nicmm-paper": "tab:orange",
@@ -36,6 +39,19 @@ def labelled(
     return figure, axes
 
 
+def labelled_pair(
+    titles: tuple[str, str], x: str, y: tuple[str, str]
+) -> tuple[Figure, tuple[Axes, Axes]]:
+    """A new figure with two axes side by side that share the meaning of x."""
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 4.2))
+    for axes, title, label in zip((left, right), titles, y, strict=True):
+        axes.set_title(title)
+        axes.set_xlabel(x)
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    return figure, (left, right)
+
+
 def plain_ticks(axis: Axis) -> None:
     """Write the ticks of a logarithmic axis as plain numbers."""
     for set_formatter in (axis.set_major_formatter, axis.set_minor_formatter):
@@ -48,3 +64,28 @@ def save(figure: Figure, path: Path) -> Path:
     figure.savefig(path, dpi=130)
     pyplot.close(figure)
     return path
+
+
+def least_losses(runs: Mapping[str, FloatArray], title: str, path: Path) -> Path:
+    """Mean over the sets of the least loss so far, against the iteration, on a log axis.
+
+    Parameters
+    ----------
+    runs : mapping of str to (sets, iterations + 1) float array
+    title : str
+    path : Path
+    """
+    figure, axes = labelled(title, "iteration", "least loss so far, mean of the sets")
+    for label, losses in runs.items():
+        axes.plot(losses.mean(axis=0), label=label, linewidth=1.6)
+    axes.set_yscale("log")
+    plain_numbers(axes)
+    axes.legend(fontsize=8)
+    return save(figure, path)
+
+
+def plain_numbers(axes: Axes) -> None:
+    """Write the numbers of a logarithmic y axis without powers of ten, also between decades."""
+    for each in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        each(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.tick_params(axis="y", which="both", labelsize=8)

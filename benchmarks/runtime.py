@@ -27,7 +27,8 @@ def run(scale: Scale) -> None:
     seconds: dict[str, list[FloatArray]] = {method: [] for method in METHODS}
     iterations: dict[str, list[int]] = {method: [] for method in METHODS}
     several = dict.fromkeys(METHODS, 0)
-    names, sizes = [], []
+    names: list[str] = []
+    sizes: list[int] = []
     meshes = collections.surfaces(scale, scale.choose(40, 5))
     for name, mesh, points in random_sets(meshes, 1, SEED):
         try:
