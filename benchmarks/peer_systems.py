@@ -1,0 +1,188 @@
+"""Closed curves by other systems; runs in a process of its own, since some of them can crash it.
+
+Each function takes the surface, the control points in the order of the visit and a path of edges
+through them, and gives polylines and the seconds that the system took, its preparation included.
+None of the packages belongs to the project; where one is missing its systems are left out.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import cast
+
+import numpy as np
+
+from nicmm_core.array_types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a system is asked for.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+    faces : (m, 3) int array
+    path : (l,) int array
+        Vertices of a closed path of edges through the control points.
+    controls : (k,) int array
+        Vertices of the control points, in the order of the visit.
+    spacing : float
+        Mean edge length of the mesh, for systems that ask for a step.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    path: IntArray
+    controls: IntArray
+    spacing: float
+
+
+Answer = tuple[list[FloatArray], float]
+"""Polylines, closed ones without their first point repeated, and seconds."""
+
+
+def meshlib_spline(task: Task) -> Answer:
+    """MeshLib: a spline in space through the points, then projected to the mesh."""
+    mrmeshpy = importlib.import_module("meshlib.mrmeshpy")
+    mrmeshnumpy = importlib.import_module("meshlib.mrmeshnumpy")
+    started = time.perf_counter()
+    mesh = mrmeshnumpy.meshFromFacesVerts(task.faces.astype(np.int32), task.vertices)
+    points = mrmeshpy.std_vector_Vector3_float()
+    for place in task.vertices[np.append(task.controls, task.controls[0])]:
+        points.append(mrmeshpy.Vector3f(*map(float, place)))
+    settings = mrmeshpy.SplineSettings()
+    settings.samplingStep = task.spacing
+    spline = mrmeshpy.makeSpline(points, settings)
+    projected = mrmeshpy.projectSpline(mesh, spline)
+    seconds = time.perf_counter() - started
+    return [_without_repetition(np.array([[p.x, p.y, p.z] for p in projected]))], seconds
+
+
+def flip_loop(task: Task) -> Answer:
+    """potpourri3d: the shortest loop that edge flips reach from the path."""
+    potpourri3d = importlib.import_module("potpourri3d")
+    started = time.perf_counter()
+    solver = potpourri3d.EdgeFlipGeodesicSolver(task.vertices, task.faces)
+    loop = solver.find_geodesic_loop([int(vertex) for vertex in task.path])
+    return [_without_repetition(np.asarray(loop))], time.perf_counter() - started
+
+
+def signed_heat(task: Task) -> Answer:
+    """potpourri3d: zero set of the signed distance to the path, free to leave it."""
+    return _signed_heat(task, "None")
+
+
+def signed_heat_fixed(task: Task) -> Answer:
+    """potpourri3d: the same with the distance forced to zero on the path, its default."""
+    return _signed_heat(task, "ZeroSet")
+
+
+SYSTEMS: dict[str, tuple[str, Callable[[Task], Answer]]] = {
+    "MeshLib, projected spline": ("meshlib", meshlib_spline),
+    "potpourri3d, edge-flip loop": ("potpourri3d", flip_loop),
+    "potpourri3d, signed heat": ("potpourri3d", signed_heat),
+    "potpourri3d, signed heat, zero on the path": ("potpourri3d", signed_heat_fixed),
+}
+"""Package and function of each system."""
+
+
+def missing_packages() -> list[str]:
+    """Packages of the systems that are not installed."""
+    packages = dict.fromkeys(package for package, _ in SYSTEMS.values())
+    return [package for package in packages if importlib.util.find_spec(package) is None]
+
+
+class SystemsProcess:
+    """A process that asks the systems, started again after a crash or a hang."""
+
+    def __init__(self) -> None:
+        # Forking a process that has started threads, as PyTorch has, can hang.
+        self._context = multiprocessing.get_context("spawn")
+        self._start()
+
+    def ask(self, name: str, task: Task, patience: float) -> Answer | str:
+        """A system's answer, or in words why there is none.
+
+        Parameters
+        ----------
+        name : str
+            Key of `SYSTEMS`.
+        task : Task
+        patience : float
+            Seconds that it may take.
+        """
+        try:
+            self._connection.send((name, task))
+            if self._connection.poll(patience):
+                return cast("Answer | str", self._connection.recv())
+            reason = f"no answer within {patience:g} s"
+        except (EOFError, ConnectionError):
+            self._process.join()
+            reason = f"crashed with exit status {self._process.exitcode}"
+        self.end()
+        self._start()
+        return reason
+
+    def end(self) -> None:
+        """Stop the process, busy or not."""
+        self._process.terminate()
+        self._process.join()
+        self._connection.close()
+
+    def _start(self) -> None:
+        self._connection, theirs = self._context.Pipe()
+        self._process = self._context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+
+
+def _serve(connection: Connection) -> None:
+    while True:
+        name, task = connection.recv()
+        try:
+            connection.send(SYSTEMS[name][1](task))
+        except Exception as error:  # whatever a foreign package raises is its answer
+            connection.send(f"{type(error).__name__}: {error}")
+
+
+def _signed_heat(task: Task, constraint: str) -> Answer:
+    potpourri3d = importlib.import_module("potpourri3d")
+    started = time.perf_counter()
+    solver = potpourri3d.MeshSignedHeatSolver(task.vertices, task.faces)
+    path: list[tuple[int, list[float]]] = [
+        (int(vertex), []) for vertex in np.append(task.path, task.path[0])
+    ]
+    distance = solver.compute_distance([path], level_set_constraint=constraint)
+    contour = potpourri3d.MeshMarchingTrianglesSolver(task.vertices, task.faces)
+    pieces = contour.marching_triangles(distance, 0.0)
+    seconds = time.perf_counter() - started
+    edges = potpourri3d.edges(task.vertices, task.faces)
+    return [_positions(task.vertices, edges, piece) for piece in pieces], seconds
+
+
+def _positions(
+    vertices: FloatArray, edges: IntArray, piece: list[tuple[int, list[float]]]
+) -> FloatArray:
+    """Places that a contour names as vertices, or as edges with the share of the way."""
+    places = []
+    for index, share in piece:
+        if share:
+            start, end = vertices[edges[index]]
+            places.append((1.0 - share[0]) * start + share[0] * end)
+        else:
+            places.append(vertices[index])
+    return _without_repetition(np.array(places))
+
+
+def _without_repetition(points: FloatArray) -> FloatArray:
+    """Points without those that repeat the one before, or at the end the first."""
+    size = np.abs(points).max()
+    steps = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
+    return points[steps > 1e-7 * size] if len(points) > 1 else points
