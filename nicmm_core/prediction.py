@@ -12,16 +12,17 @@ from torch import Tensor
 
 from .array_types import FloatArray
 from .losses import (
+    EnergySurface,
     LossWeights,
-    SurfaceTensors,
     loss_terms,
     sdf_density,
     smoothness_density,
-    surface_tensors,
     total_loss,
 )
-from .network import CurveNetwork, NetworkInput
+from .network import CurveNetwork
 from .problem import Problem
+from .solution import Solution
+from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 
 BAND_WIDTH = 3.0
@@ -59,32 +60,6 @@ class PredictionConfig:
     iterations: int = 300
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """What stage 2 found.
-
-    Attributes
-    ----------
-    field : (n,) float array
-        φ of the iteration with the least loss, in units of the problem.
-    terms : dict of str to float
-        The unweighted terms of the loss there.
-    losses : list of float
-        Total loss of every iteration.
-    stopped : {"converged", "cap", "cancelled", "diverged"}
-    """
-
-    field: FloatArray
-    terms: dict[str, float]
-    losses: list[float]
-    stopped: str
-
-    @property
-    def iterations(self) -> int:
-        """Number of iterations done."""
-        return len(self.losses)
-
-
 @single_thread()
 def predict(
     network: CurveNetwork,
@@ -92,7 +67,7 @@ def predict(
     weights: LossWeights,
     config: PredictionConfig,
     watch: Callable[[float, FloatArray], bool] | None = None,
-) -> Prediction:
+) -> Solution:
     """Optimise a copy of the network for one problem.
 
     Parameters
@@ -139,28 +114,12 @@ def predict(
             break
         loss.backward()
         optimiser.step()
-    return Prediction(best_field, best_terms, losses, stopped)
-
-
-def network_input(problem: Problem, device: torch.device) -> NetworkInput:
-    """Move what the network sees of a problem to a device in single precision."""
-
-    def tensor(array: FloatArray) -> Tensor:
-        return torch.as_tensor(array, dtype=torch.float32, device=device)
-
-    areas = problem.elements.vertex_areas
-    return NetworkInput(
-        features=tensor(problem.features),
-        initial_distance=tensor(problem.initial_distance),
-        area_share=tensor(areas / areas.sum()),
-        response=tensor(problem.smoother.response),
-        control_vertices=torch.as_tensor(problem.loop.control_vertices, device=device),
-    )
+    return Solution(best_field, best_terms, losses, stopped)
 
 
 @torch.no_grad()
 def narrow_band_energy(
-    surface: SurfaceTensors, phi: Tensor, weights: LossWeights, edge_length: float
+    surface: EnergySurface, phi: Tensor, weights: LossWeights, edge_length: float
 ) -> float:
     """Mean density of the level-set and smoothness terms in the band about the zero set."""
     inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)

@@ -13,12 +13,12 @@ import numpy as np
 import torch
 
 from .errors import ArgumentError, UnreachableError
-from .losses import LossWeights, loss_terms, surface_tensors, total_loss
+from .losses import LossWeights, loss_terms, total_loss
 from .mesh import Mesh
 from .network import CurveNetwork, NetworkConfig
-from .prediction import network_input
 from .problem import Problem, build_problem
 from .surface_points import locate_control_points
+from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .weights_file import save_network
 

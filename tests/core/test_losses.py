@@ -10,20 +10,20 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.finite_elements import build_finite_elements
 from nicmm_core.losses import (
+    EnergySurface,
     LossWeights,
-    SurfaceTensors,
     feature_loss,
     gaussian_delta,
     interpolation_loss,
     loss_terms,
     sdf_loss,
     smoothness_loss,
-    surface_tensors,
     total_loss,
 )
 from nicmm_core.problem import build_problem
 from nicmm_core.sparse_operator import SparseOperator
 from nicmm_core.surface_points import locate_control_points
+from nicmm_core.tensors import surface_tensors
 from nicmm_core.virtual_splits import SplitMesh
 
 CPU = torch.device("cpu")
@@ -38,7 +38,7 @@ def dense_tensors(mesh, delta_width, controls=(), importance=None):
         dense = torch.as_tensor(matrix.toarray())
         return lambda vector: dense @ vector
 
-    return SurfaceTensors(
+    return EnergySurface(
         face_areas=torch.as_tensor(elements.face_areas),
         gradient=operator(elements.gradient),
         laplacian=operator(elements.laplacian),
@@ -202,7 +202,7 @@ def test_gradients_of_all_terms_are_those_of_differences(small_ball):
 def test_single_precision_operators_give_the_same_terms_and_gradients(problem):
     """The tensors that solve against dense matrices in double precision."""
     elements = problem.elements
-    double = SurfaceTensors(
+    double = EnergySurface(
         face_areas=torch.as_tensor(elements.face_areas),
         gradient=lambda v: torch.as_tensor(elements.gradient.toarray()) @ v,
         laplacian=lambda v: torch.as_tensor(elements.laplacian.toarray()) @ v,

@@ -17,8 +17,8 @@ from nicmm_core.network import (
     NetworkConfig,
     NetworkInput,
 )
-from nicmm_core.prediction import network_input
 from nicmm_core.problem import build_problem
+from nicmm_core.tensors import network_input
 from nicmm_core.weights_file import load_network, save_network
 from tests.core.checks import random_surface_points
 

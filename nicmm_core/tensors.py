@@ -1,0 +1,44 @@
+"""Problems as tensors in single precision: what training and prediction work on."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from .array_types import FloatArray
+from .losses import EnergySurface, energy_surface
+from .network import NetworkInput
+from .problem import Problem
+from .sparse_operator import SparseOperator
+
+
+def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
+    """Move what the energy needs of a problem to a device."""
+    arrays = energy_surface(problem)
+    elements = problem.elements
+    importance = arrays.feature_map
+    return EnergySurface(
+        face_areas=_tensor(arrays.face_areas, device),
+        gradient=SparseOperator(elements.gradient, device),
+        laplacian=SparseOperator(elements.laplacian, device),
+        centroid=SparseOperator(elements.centroid, device),
+        control_vertices=torch.as_tensor(arrays.control_vertices, device=device),
+        delta_width=arrays.delta_width,
+        feature_map=None if importance is None else _tensor(importance, device),
+    )
+
+
+def network_input(problem: Problem, device: torch.device) -> NetworkInput:
+    """Move what the network sees of a problem to a device."""
+    areas = problem.elements.vertex_areas
+    return NetworkInput(
+        features=_tensor(problem.features, device),
+        initial_distance=_tensor(problem.initial_distance, device),
+        area_share=_tensor(areas / areas.sum(), device),
+        response=_tensor(problem.smoother.response, device),
+        control_vertices=torch.as_tensor(problem.loop.control_vertices, device=device),
+    )
+
+
+def _tensor(array: FloatArray, device: torch.device) -> Tensor:
+    return torch.as_tensor(array, dtype=torch.float32, device=device)
