@@ -97,6 +97,32 @@ def _passed_vertices(
     return np.array(passed, dtype=np.int64)
 
 
+def segment_ends(
+    vertices: FloatArray, faces: IntArray, field: FloatArray, sign: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Faces that the zero set crosses, and where its segment in each of them starts and ends.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+    faces : (m, 3) int array
+    field : (n,) float array
+    sign : (n,) int array
+        As from `signs_with_zeros`.
+
+    Returns
+    -------
+    crossed : (s,) int array
+    start, end : (s, 3) float array
+    """
+    crossed, ends = _crossings(faces, sign)
+    below, above = ends.transpose(2, 0, 1)
+    rise = np.where(below == above, 1.0, field[above] - field[below])
+    fraction = np.where(below == above, 0.0, -field[below] / rise)[..., None]
+    points = (1.0 - fraction) * vertices[below] + fraction * vertices[above]
+    return crossed, points[:, 0], points[:, 1]
+
+
 def _segments(
     working: WorkingMesh, field: FloatArray, through: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
@@ -118,12 +144,19 @@ def _segments(
     segment_face : (s,) int array
         Working face of each segment.
     """
-    sign = signs_with_zeros(field, through)
-    corner_sign = sign[working.faces]
-    crossed = (corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1)
-    segment_face = np.flatnonzero(crossed)
-    faces, corner_sign = working.faces[crossed], corner_sign[crossed]
+    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through))
+    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    return nodes, index.reshape(-1, 2), segment_face
 
+
+def _crossings(faces: IntArray, sign: IntArray) -> tuple[IntArray, IntArray]:
+    """Faces that the zero set crosses, (s,), and the two ends of each segment, (s, 2, 2).
+
+    An end is the edge on which the sign changes, negative vertex first, or a zero vertex twice.
+    """
+    corner_sign = sign[faces]
+    crossed = np.flatnonzero((corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1))
+    faces, corner_sign = faces[crossed], corner_sign[crossed]
     ends = []
     for first, second in ((0, 1), (1, 2), (2, 0)):
         changes = corner_sign[:, first] * corner_sign[:, second] < 0
@@ -134,10 +167,7 @@ def _segments(
         at_zero = corner_sign[:, [corner]] == 0
         ends.append(np.where(at_zero, faces[:, [corner, corner]], -1))
     candidates = np.stack(ends, axis=1)  # (s, 6, 2), exactly two of the six are ends
-    valid = candidates[:, :, 0] >= 0
-    pairs = candidates[valid].reshape(-1, 2)
-    nodes, index = np.unique(pairs, axis=0, return_inverse=True)
-    return nodes, index.reshape(-1, 2), segment_face
+    return crossed, candidates[candidates[:, :, 0] >= 0].reshape(-1, 2, 2)
 
 
 def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:

@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import variational
 from .array_types import FloatArray
 from .contour import extract_curves
 from .curve import SurfaceCurve
 from .errors import ArgumentError, MissingPackageError
 from .initial_loop import ORDERS
+from .losses import LossWeights, balanced
 from .mesh import Mesh, real_array
 from .problem import Problem, build_problem
 from .surface_points import SurfacePoints, locate_control_points
@@ -28,7 +30,7 @@ from .topology import keep_topology
 if TYPE_CHECKING:
     from .network import CurveNetwork
 
-METHODS = ("nicmm", "nicmm-paper")
+METHODS = ("nicmm", "nicmm-paper", "variational")
 """``"nicmm"`` is the same as ``"nicmm-paper"`` until the fast method lands."""
 
 SMOOTHNESS_RANGE = (1e-3, 1e3)
@@ -127,7 +129,8 @@ class Designer:
         _check_choices(order, method, closed)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
-        _check_torch()
+        if method != "variational":
+            _check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         problem = build_problem(
             self.mesh,
@@ -137,34 +140,38 @@ class Designer:
             _checked_map("alignment", alignment, self.mesh),
             _checked_smoothness(smoothness),
         )
-        return self._solve(problem, float(smoothness), progress, started)
+        return self._solve(problem, method, float(smoothness), progress, started)
 
     def _solve(
-        self, problem: Problem, smoothness: float, progress: Progress | None, started: float
+        self,
+        problem: Problem,
+        method: str,
+        smoothness: float,
+        progress: Progress | None,
+        started: float,
     ) -> Design:
-        # These import PyTorch, which nothing before needs.
-        from . import losses, prediction
+        weights = balanced(LossWeights(smooth=smoothness * LossWeights.smooth), problem)
+        watch = None if progress is None else self._watcher(problem, progress)
+        if method == "variational":
+            solution = variational.solve(problem, weights, variational.VariationalConfig(), watch)
+        else:
+            # This imports PyTorch, which nothing before needs.
+            from . import prediction
 
-        prediction_result = prediction.predict(
-            self._network(problem.features.shape[1]),
-            problem,
-            losses.balanced(
-                losses.LossWeights(smooth=smoothness * losses.LossWeights.smooth), problem
-            ),
-            prediction.PredictionConfig(),
-            None if progress is None else self._watcher(problem, progress),
-        )
-        field, breaking, curves = self._curves(problem, prediction_result.field)
-        status = _STATUS[prediction_result.stopped]
+            network = self._network(problem.features.shape[1])
+            config = prediction.PredictionConfig()
+            solution = prediction.predict(network, problem, weights, config, watch)
+        field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
+        status = _STATUS[solution.stopped]
         if not is_one_curve(curves):
             status = Status.NOT_ONE_CURVE
         return Design(
             status=status,
             curves=curves,
             field=_at_input_vertices(self.mesh, problem, field),
-            iterations=prediction_result.iterations,
+            iterations=solution.iterations,
             seconds=time.perf_counter() - started,
-            energy=prediction_result.terms,
+            energy=solution.terms,
             breaking_vertices=breaking,
         )
 
@@ -176,16 +183,18 @@ class Designer:
         return self._networks[channels]
 
     def _curves(
-        self, problem: Problem, field: FloatArray
+        self, problem: Problem, field: FloatArray, keeps_topology: bool = False
     ) -> tuple[FloatArray, int, list[SurfaceCurve]]:
         """Make φ exactly zero at the control points and one loop, and take its contour."""
+        breaking = 0
+        if not keeps_topology:
+            field, breaking = keep_topology(
+                problem.working,
+                problem.loop,
+                problem.initial_distance,
+                problem.smoother.interpolating(field),
+            )
         controls = problem.loop.control_vertices
-        field, breaking = keep_topology(
-            problem.working,
-            problem.loop,
-            problem.initial_distance,
-            problem.smoother.interpolating(field),
-        )
         return field, breaking, extract_curves(self.mesh, problem.working, field, controls)
 
     def _watcher(self, problem: Problem, progress: Progress) -> Callable[[float, FloatArray], bool]:
@@ -227,8 +236,9 @@ def design_curve(
         A closed curve. Open curves are not available yet.
     order : {"given", "shortest"}
         Visit the points in this order, or in the shortest cyclic order.
-    method : {"nicmm", "nicmm-paper"}
-        The network of the paper; both are the same for now.
+    method : {"nicmm", "nicmm-paper", "variational"}
+        The network of the paper (both names are the same for now), or the same energy minimised
+        without a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
         What the curve shall avoid and what it shall follow.
     smoothness : float, default 1
@@ -250,7 +260,7 @@ def design_curve(
     ArgumentError
         If another argument cannot be used.
     MissingPackageError
-        If PyTorch cannot be imported.
+        If the method needs PyTorch and it cannot be imported.
 
     Examples
     --------

@@ -47,6 +47,8 @@ class Problem:
         In the input mesh's units.
     unit : float
         Square root of the area of the working mesh, the unit of all that follows.
+    vertices : (n, 3) float array
+        Positions about the surface's centroid, along its principal axes.
     elements : FiniteElements
     loop : InitialLoop
     distance : (n,) float array
@@ -62,6 +64,7 @@ class Problem:
 
     working: WorkingMesh
     unit: float
+    vertices: FloatArray
     elements: FiniteElements
     loop: InitialLoop
     distance: FloatArray
@@ -132,6 +135,7 @@ def build_problem(
     return Problem(
         working=working,
         unit=unit,
+        vertices=vertices,
         elements=elements,
         loop=loop,
         distance=distance,

@@ -57,7 +57,7 @@ def keep_topology(
     """
     links = VertexLinks(working)
     control_vertices = loop.control_vertices
-    breaking = _breaking_vertices(links, start, wanted, control_vertices)
+    breaking = breaking_vertices(links, start, wanted, control_vertices)
     n_breaking = len(breaking)
     field, all_breaking = wanted, breaking
     for attempt in range(FALLBACK_ATTEMPTS):
@@ -66,15 +66,29 @@ def keep_topology(
         radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
         share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
         field = start + share * (wanted - start)
-        breaking = _breaking_vertices(links, start, field, control_vertices)
+        breaking = breaking_vertices(links, start, field, control_vertices)
         all_breaking = np.union1d(all_breaking, breaking)
     return start, n_breaking
 
 
-def _breaking_vertices(
+def breaking_vertices(
     links: VertexLinks, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
 ) -> IntArray:
-    """Vertices that no sequence of simple flips brings to the side where they are wanted."""
+    """Vertices that no sequence of simple flips brings to the side where they are wanted.
+
+    Parameters
+    ----------
+    links : VertexLinks
+    start : (n,) float array
+        A field whose zero set is one simple loop through the control vertices.
+    wanted : (n,) float array
+    control_vertices : (k,) int array
+
+    Returns
+    -------
+    (q,) int array
+        None when the zero set of ``wanted`` is isotopic to that of ``start``.
+    """
     sign = signs_with_zeros(start, control_vertices)
     goal = signs_with_zeros(wanted, control_vertices)
     changes_at_control = {v: links.sign_changes(v, sign) for v in control_vertices.tolist()}
