@@ -11,7 +11,7 @@ import time
 
 from .scale import Scale
 
-MEASUREMENTS = ("one_loop", "curvature", "runtime", "peers", "degraded", "resolution")
+MEASUREMENTS = ("one_loop", "curvature", "runtime", "peers", "degraded", "resolution", "gallery")
 """Modules of this package with a ``run(scale)``, in the order of the paper."""
 
 

@@ -46,6 +46,13 @@ def shrec16(count: int, subdivisions: int = PAPER_SUBDIVISIONS) -> Iterator[tupl
         yield path.stem, Mesh(*igl.loop(mesh.vertices, mesh.faces, subdivisions))
 
 
+def shrec16_class(name: str) -> Iterator[tuple[str, Mesh]]:
+    """Meshes of one class of SHREC16 after the paper's subdivisions."""
+    for path in mesh_files(f"shrec16/{name}"):
+        mesh = read_mesh(path)
+        yield path.stem, Mesh(*igl.loop(mesh.vertices, mesh.faces, PAPER_SUBDIVISIONS))
+
+
 def clean(count: int) -> Iterator[tuple[str, Mesh]]:
     """Closed manifold meshes, as they are."""
     for path in _spread(mesh_files("clean"), count):

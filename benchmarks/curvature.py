@@ -52,7 +52,7 @@ def run(scale: Scale) -> None:
     pictures: list[renders.Picture] = []
     names = []
     left_out = 0
-    meshes = collections.surfaces(scale, scale.choose(48, 4))
+    meshes = collections.surfaces(scale, scale.choose(48, 3))
     for name, mesh, points in random_sets(meshes, 1, SEED):
         curves = _curves(name, mesh, points)
         if curves is None:
@@ -71,7 +71,7 @@ def run(scale: Scale) -> None:
         print(
             f"  {name}: " + ", ".join(f"{k} {v[0]:.0f}" for k, v in bends[-1].items()), flush=True
         )
-        if len(pictures) < min(PICTURED, scale.choose(4, 2)):
+        if len(pictures) < min(PICTURED, scale.choose(PICTURED, 1)):
             pictures.append(_picture(name, mesh, curves))
     if not bends:
         raise SystemExit("No set gave one curve with every method; there is nothing to compare")

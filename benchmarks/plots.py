@@ -79,13 +79,6 @@ def least_losses(runs: Mapping[str, FloatArray], title: str, path: Path) -> Path
     for label, losses in runs.items():
         axes.plot(losses.mean(axis=0), label=label, linewidth=1.6)
     axes.set_yscale("log")
-    plain_numbers(axes)
+    plain_ticks(axes.yaxis)
     axes.legend(fontsize=8)
     return save(figure, path)
-
-
-def plain_numbers(axes: Axes) -> None:
-    """Write the numbers of a logarithmic y axis without powers of ten, also between decades."""
-    for each in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-        each(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.tick_params(axis="y", which="both", labelsize=8)

@@ -115,13 +115,15 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
 
 
 def best_view(picture: Picture) -> FloatArray:
-    """Axes of a camera (right, up, towards it) that sees most of the curves.
+    """Axes of a camera (right, up, towards it) that sees most of curves and painted places.
 
     A place counts as seen if it faces the camera and nothing of the mesh is in between.
     """
     mesh = picture.mesh
     tree = BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.faces.tolist())
-    points = np.concatenate([resample(curve.points, 48)[0] for curve, _ in picture.curves])
+    points = np.concatenate(
+        [*(resample(curve.points, 48)[0] for curve, _ in picture.curves), _painted(picture)]
+    )
     surface = NearestPoints(mesh)
     _, faces, barycentric = surface.project(points)
     normals = surface.normals(faces, barycentric)
@@ -188,6 +190,16 @@ def _directions() -> FloatArray:
     angle = np.pi * (1.0 + 5.0**0.5) * number
     radius = np.sqrt(1.0 - z**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+
+
+def _painted(picture: Picture) -> FloatArray:
+    """Some vertices of painted regions, as many as a curve has samples at most."""
+    places = [np.zeros((0, 3))]
+    for weights in (picture.obstacles, picture.alignment):
+        if weights is not None:
+            strong = picture.mesh.vertices[weights > 0.5]
+            places.append(strong[:: 1 + len(strong) // 48])
+    return np.concatenate(places)
 
 
 def _control_positions(picture: Picture) -> FloatArray:

@@ -36,8 +36,8 @@ class NarrowBand:
     unknowns : (u,) int array
         Working vertices.
     face_areas : (b,) float array
-    gradient : three sparse arrays (b, u)
-        One for each coordinate.
+    gradient : (3 b, u) sparse array
+        All x components, then y, then z.
     inner_areas : (c,) float array
     laplacian : (c, u) sparse array
         Δφ at centroids.
@@ -53,7 +53,7 @@ class NarrowBand:
 
     unknowns: IntArray
     face_areas: FloatArray
-    gradient: tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]
+    gradient: sparse.csr_array
     inner_areas: FloatArray
     laplacian: sparse.csr_array
     centroid: sparse.csr_array
@@ -68,8 +68,8 @@ class Residuals:
 
     Attributes
     ----------
-    gradient : three (b,) float arrays
-        ∇φ.
+    gradient : (3 b,) float array
+        ∇φ, all x components, then y, then z.
     slope : (b,) float array
         Residual of Eq. 3 in every face.
     centroid : (c,) float array
@@ -82,7 +82,7 @@ class Residuals:
         λ-weighted sum of ½ ∫ residual².
     """
 
-    gradient: tuple[FloatArray, FloatArray, FloatArray]
+    gradient: FloatArray
     slope: FloatArray
     centroid: FloatArray
     bending: FloatArray
@@ -112,17 +112,17 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
     vertices[problem.loop.control_vertices] = False
     unknowns = np.flatnonzero(vertices)
 
-    x, y, z = (elements.gradient[band + axis * n_faces][:, unknowns] for axis in range(3))
+    components = np.concatenate([band + axis * n_faces for axis in range(3)])
+    gradient = elements.gradient[components][:, unknowns]
     areas = elements.face_areas[band]
-    weighted = sparse.diags_array(areas)
     mass = elements.vertex_areas[unknowns] / problem.edge_length**2
-    stiffness = x.T @ weighted @ x + y.T @ weighted @ y + z.T @ weighted @ z
+    stiffness = gradient.T @ _rows(np.tile(areas, 3), gradient)
     centroid = elements.centroid[inner]
     importance = problem.feature_map
     return NarrowBand(
         unknowns=unknowns,
         face_areas=areas,
-        gradient=(x, y, z),
+        gradient=gradient,
         inner_areas=elements.face_areas[inner],
         laplacian=(centroid @ elements.laplacian)[:, unknowns],
         centroid=centroid[:, unknowns],
@@ -134,8 +134,8 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
 
 def evaluate(band: NarrowBand, weights: LossWeights, values: FloatArray) -> Residuals:
     """Residuals and energy of φ at the unknowns, (u,)."""
-    x, y, z = (axis @ values for axis in band.gradient)
-    slope = slope_residual(x**2 + y**2 + z**2)
+    gradient = band.gradient @ values
+    slope = slope_residual((gradient.reshape(3, -1) ** 2).sum(axis=0))
     centroid = band.centroid @ values
     bending = bending_residual(band.laplacian @ values, centroid, band.delta_width)
     energy = weights.sdf * (band.face_areas @ slope**2)
@@ -144,7 +144,7 @@ def evaluate(band: NarrowBand, weights: LossWeights, values: FloatArray) -> Resi
     if band.feature_map is not None:
         feature = feature_residual(band.feature_map, centroid, band.delta_width)
         energy += weights.feature * (band.inner_areas @ feature**2)
-    return Residuals((x, y, z), slope, centroid, bending, feature, 0.5 * float(energy))
+    return Residuals(gradient, slope, centroid, bending, feature, 0.5 * float(energy))
 
 
 def gauss_newton_system(
@@ -155,9 +155,11 @@ def gauss_newton_system(
     To JᵀJ of all residuals comes what the curvature of |∇φ|² adds where it is positive, in faces
     with a slope above 1; elsewhere it would make the Hessian indefinite.
     """
-    x, y, z = residuals.gradient
-    by_x, by_y, by_z = band.gradient
-    slope = _rows(2.0 * x, by_x) + _rows(2.0 * y, by_y) + _rows(2.0 * z, by_z)
+    n_faces = len(band.face_areas)
+    # Row f holds 2 ∇φ of face f, so that its product with the gradient is that of |∇φ|².
+    components = (np.tile(np.arange(n_faces), 3), np.arange(3 * n_faces))
+    along = sparse.csr_array((2.0 * residuals.gradient, components))
+    slope = along @ band.gradient
     # √G has the derivative -φ / (2 σ²) √G.
     decay = -residuals.centroid / (2.0 * band.delta_width**2)
     root_delta = feature_residual(1.0, residuals.centroid, band.delta_width)
@@ -170,7 +172,7 @@ def gauss_newton_system(
         feature = _rows(residuals.feature * decay, band.centroid)
         terms.append((weights.feature * band.inner_areas, feature, residuals.feature))
     excess = 2.0 * weights.sdf * band.face_areas * np.maximum(residuals.slope, 0.0)
-    hessian = sum(axis.T @ _rows(excess, axis) for axis in band.gradient)
+    hessian = band.gradient.T @ _rows(np.tile(excess, 3), band.gradient)
     gradient = np.zeros(len(band.unknowns))
     for weight, jacobian, residual in terms:
         weighted = sparse.csr_array(_rows(weight, jacobian).T)

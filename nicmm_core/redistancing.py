@@ -109,13 +109,15 @@ def _spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> Non
     least_gain = SETTLED * surface.edge_length
     while len(changed):
         faces = surface.faces[np.unique(surface.faces_around[changed].indices)]
-        before = distance.copy()
-        for corner in range(3):
-            reached, first, second = (faces[:, (corner + k) % 3] for k in range(3))
-            arrival = _wave_arrival(surface.vertices, before, reached, first, second)
-            np.minimum.at(distance, reached, np.where(settled[reached], np.inf, arrival))
-        touched = np.unique(faces)
-        gain = before[touched] - distance[touched]
+        # Each corner in turn is reached from the other two.
+        reached, first, second = (np.roll(faces, k, axis=1).ravel() for k in range(3))
+        moving = ~settled[reached]
+        reached, first, second = reached[moving], first[moving], second[moving]
+        arrival = _wave_arrival(surface.vertices, distance, reached, first, second)
+        touched = np.unique(reached)
+        before = distance[touched]
+        np.minimum.at(distance, reached, arrival)
+        gain = before - distance[touched]
         changed = touched[(gain > least_gain) & (distance[touched] < limit)]
 
 

@@ -97,7 +97,7 @@ def solve(
     controls = problem.loop.control_vertices
     surface = build_distance_surface(problem.vertices, problem.working.faces, h)
     links = VertexLinks(problem.working)
-    reach = (config.half_width + 2.0) * h
+    reach = (config.half_width + 1.0) * h
     field = redistanced(surface, problem.initial_distance, controls, reach)
     best_field, losses, least = field, [], []
     damping = config.damping

@@ -1,0 +1,347 @@
+"""Pictures: alignment (Fig. 13), obstacles (Fig. 14) and many meshes (Fig. 15)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.curve import SurfaceCurve, resample
+from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.features import vertex_normals
+from nicmm_core.files import read_mesh
+from nicmm_core.mesh import Mesh, unique_edges
+
+from . import collections, renders, report
+from .polylines import NearestPoints
+from .scale import Scale
+
+SEED = 15
+METHOD = METHODS[0]
+
+POINTS = 5
+RINGS = 5
+"""Places that are tried on a mesh; about a thin limb there is no ring."""
+
+RING_RADIUS = 0.22
+"""Distance of the control points from the middle of their ring, in √area."""
+
+OBSTACLE_RADIUS = 0.08
+ALIGNMENT_RADIUS = 0.05
+ALIGNMENT_OFFSET = 0.06
+"""How far beside the free curve the alignment region lies, in √area as the radii are."""
+
+FEWEST_VERTICES, MOST_VERTICES = 1500, 12000
+
+FOLLOWED = 0.8
+"""Share of an alignment region's middle line that has to have the curve near it."""
+
+OBSTACLE, ALIGNMENT = "obstacle", "alignment"
+GUIDANCE = (OBSTACLE, ALIGNMENT, None)
+"""What the meshes of Fig. 15 get in turn."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A painted part of a mesh.
+
+    Attributes
+    ----------
+    kind : {"obstacle", "alignment"}
+    places : (p, 3) float array
+        Its middle: a point, or a line beside the free curve.
+    radius : float
+        Distance from the middle at which the paint has faded.
+    weights : (V,) float array
+        The map: 1 within half the radius.
+    """
+
+    kind: str
+    places: FloatArray
+    radius: float
+    weights: FloatArray
+
+    def share(self, mesh: Mesh, curve: SurfaceCurve) -> float:
+        """Share of the curve inside an obstacle, or of an alignment line that has the curve near.
+
+        Inside is where the paint is stronger than ½, and near is the same distance.
+        """
+        even, segment = resample(curve.points, 1024)
+        if self.kind == ALIGNMENT:
+            return float((cKDTree(even).query(self.places)[0] < 0.75 * self.radius).mean())
+        corners = self.weights[mesh.faces[curve.faces[segment]]]
+        return float(((curve.barycentric[segment] * corners).sum(axis=1) > 0.5).mean())
+
+
+@dataclass(frozen=True)
+class Example:
+    """A mesh with a curve without guidance and, if there is a region, one with it.
+
+    Attributes
+    ----------
+    name : str
+    mesh : Mesh
+    region : Region or None
+    free, guided : Design
+        ``guided`` is None without a region.
+    """
+
+    name: str
+    mesh: Mesh
+    region: Region | None
+    free: nicmm.Design
+    guided: nicmm.Design | None
+
+    @property
+    def shares(self) -> tuple[float, float] | None:
+        """`Region.share` of the free and of the guided curve."""
+        if self.region is None or self.guided is None:
+            return None
+        return (
+            self.region.share(self.mesh, self.free.curves[0]),
+            self.region.share(self.mesh, self.guided.curves[0]),
+        )
+
+    def picture(self, title: str, free: bool = True, guided: bool = True) -> renders.Picture:
+        """The painted mesh with its free curve in white and the guided one in blue."""
+        curves = [(self.free.curves[0], renders.WHITE)] if free else []
+        if guided and self.guided is not None:
+            curves.append((self.guided.curves[0], renders.BLUE))
+        painted = {} if self.region is None else {self.region.kind: self.region.weights}
+        return renders.Picture(
+            title,
+            self.mesh,
+            curves,
+            obstacles=painted.get(OBSTACLE),
+            alignment=painted.get(ALIGNMENT),
+        )
+
+
+def run(scale: Scale) -> None:
+    """Render all three figures."""
+    generator = np.random.default_rng(SEED)
+    folder = report.output_folder(scale)
+    first = _example(*_named_mesh("horse", scale), ALIGNMENT, generator)
+    second = _example(*_named_mesh("woman", scale), OBSTACLE, generator)
+    if first is None or second is None:
+        raise SystemExit("There is no ring of points with a curve for Fig. 13 or 14")
+    view = renders.best_view(first.picture(""))
+    alignment = folder / "gallery_alignment.png"
+    renders.render_sheet(
+        [
+            first.picture("without guidance", guided=False),
+            first.picture("with alignment", free=False),
+        ],
+        alignment,
+        scale,
+        views=[view, view],
+    )
+    obstacles = folder / "gallery_obstacles.png"
+    renders.render_sheet([second.picture("with an obstacle")], obstacles, scale)
+    examples = _gallery(scale, generator)
+    if not examples:
+        raise SystemExit("No mesh has a ring of points with a curve for Fig. 15")
+    many = folder / "gallery.png"
+    renders.render_sheet([example.picture(example.name) for example in examples], many, scale)
+    body = (
+        f"Seed {SEED}, `{METHOD}`, {POINTS} control points on a ring about a random vertex of each "
+        f"mesh, obstacles on the free curve and alignment regions beside it.\n\n"
+        + report.figure(alignment, "Alignment (Fig. 13): without and with the blue region")
+        + "\n\n"
+        + report.figure(obstacles, "An obstacle (Fig. 14): white without it, blue with it")
+        + "\n\n"
+        + report.figure(
+            many, "Many meshes (Fig. 15): white without guidance, blue with obstacle or alignment"
+        )
+        + f"\n\n{_table([first, second, *examples])}\n\n{_findings([first, second, *examples])}"
+    )
+    report.write_section("gallery", "Pictures (Fig. 13, 14, 15)", body, scale)
+
+
+def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
+    """The first mesh of a class of SHREC16, or a ball."""
+    if scale is Scale.SMOKE:
+        return "ball", shapes.sphere(3)
+    for name, mesh in collections.shrec16_class(kind):
+        return name, mesh
+    raise SystemExit(f"SHREC16 has no class {kind}")
+
+
+def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
+    """Meshes of several collections in turn, of a size that a picture needs."""
+    if scale is Scale.SMOKE:
+        yield "ball", shapes.sphere(3)
+        return
+    folders = [collections.mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
+    longest = max(len(files) for files in folders)
+    for number in range(longest):
+        for files in folders:
+            if number >= len(files):
+                continue
+            try:
+                mesh = read_mesh(files[number])
+            except nicmm.NicmmError as error:
+                print(f"  {files[number].stem}: {error}", flush=True)
+                continue
+            if FEWEST_VERTICES <= len(mesh.vertices) <= MOST_VERTICES:
+                yield files[number].stem, mesh
+
+
+def _gallery(scale: Scale, generator: np.random.Generator) -> list[Example]:
+    examples: list[Example] = []
+    wanted = scale.choose(16, 3)
+    for name, mesh in _meshes(scale):
+        kind = GUIDANCE[len(examples) % len(GUIDANCE)]
+        example = _example(name, mesh, kind, generator)
+        if example is not None:
+            examples.append(example)
+        if len(examples) == wanted:
+            break
+    return examples
+
+
+def _example(
+    name: str, mesh: Mesh, kind: str | None, generator: np.random.Generator
+) -> Example | None:
+    """A free and a guided curve through the first ring that has them; None if none has."""
+    for _ in range(RINGS):
+        points = _ring(mesh, generator)
+        if points is None:
+            continue
+        try:
+            free = nicmm.design_curve(mesh, points, order="shortest", method=METHOD)
+            region = None if kind is None else _region(mesh, free.curves[0], kind)
+            guided = None if region is None else _guided(mesh, points, region)
+        except nicmm.NicmmError as error:
+            print(f"  {name}: {error}", flush=True)
+            continue
+        if all(is_one_curve(design.curves) for design in (free, guided) if design is not None):
+            print(f"  {name}: {kind or 'free'}, {free.seconds:.1f} s", flush=True)
+            return Example(name, mesh, region, free, guided)
+        print(f"  {name}: not one curve", flush=True)
+    print(f"  {name}: left out, none of {RINGS} rings of points has a curve", flush=True)
+    return None
+
+
+def _guided(mesh: Mesh, points: IntArray, region: Region) -> nicmm.Design:
+    return nicmm.design_curve(
+        mesh,
+        points,
+        order="shortest",
+        method=METHOD,
+        obstacles=region.weights if region.kind == OBSTACLE else None,
+        alignment=region.weights if region.kind == ALIGNMENT else None,
+    )
+
+
+def _ring(mesh: Mesh, generator: np.random.Generator) -> IntArray | None:
+    """Vertices all round a random one, at about the same distance along edges."""
+    component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
+    own = mesh.face_component == component
+    radius = RING_RADIUS * float(np.sqrt(mesh.face_areas[own].sum()))
+    middle = int(generator.choice(np.unique(mesh.faces[own])))
+    edges = unique_edges(mesh.faces)[0]
+    lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    size = len(mesh.vertices)
+    graph = sparse.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=(size, size))
+    distance = csgraph.dijkstra(graph, directed=False, indices=middle)
+    near = np.flatnonzero(np.abs(distance - radius) < 0.1 * radius)
+    normal = vertex_normals(mesh.vertices, mesh.faces)[middle]
+    first = np.cross(normal, np.roll(np.eye(3)[np.abs(normal).argmax()], 1))
+    first /= np.linalg.norm(first)
+    offset = mesh.vertices[near] - mesh.vertices[middle]
+    angle = np.arctan2(offset @ np.cross(normal, first), offset @ first)
+    chosen = []
+    for wanted in np.arange(POINTS) * 2 * np.pi / POINTS:
+        apart = np.abs(np.angle(np.exp(1j * (angle - wanted))))
+        if not len(near) or apart.min() > np.pi / POINTS:
+            return None
+        chosen.append(int(near[apart.argmin()]))
+    return np.array(chosen)
+
+
+def _region(mesh: Mesh, curve: SurfaceCurve, kind: str) -> Region:
+    """An obstacle on the curve, or a strip beside it to follow.
+
+    Both lie in the middle of the longest stretch between two control points.
+    """
+    unit = float(np.sqrt(mesh.face_areas.sum()))
+    stretch = _longest_stretch(curve)
+    if kind == OBSTACLE:
+        places, radius = stretch[len(stretch) // 2][None], OBSTACLE_RADIUS * unit
+    else:
+        middle = stretch[len(stretch) // 4 : -len(stretch) // 4]
+        surface = NearestPoints(mesh)
+        _, faces, barycentric = surface.project(middle)
+        along = np.gradient(middle, axis=0)
+        across = np.cross(surface.normals(faces, barycentric), along)
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        beside = middle + ALIGNMENT_OFFSET * unit * across
+        places = surface.curve(beside, np.zeros(0, dtype=np.int64)).points
+        radius = ALIGNMENT_RADIUS * unit
+    distance = cKDTree(places).query(mesh.vertices)[0]
+    return Region(kind, places, radius, np.clip(2.0 - 2.0 * distance / radius, 0.0, 1.0))
+
+
+def _longest_stretch(curve: SurfaceCurve) -> FloatArray:
+    """Evenly spaced points of the longest part between two control points."""
+    count = 256
+    even, segment = resample(curve.points, count)
+    bounds = [int((segment < index).sum()) for index in np.sort(curve.control_index)]
+    starts = np.array(bounds)
+    lengths = np.diff([*bounds, bounds[0] + count])
+    longest = int(lengths.argmax())
+    return even[(starts[longest] + np.arange(lengths[longest])) % count]
+
+
+def _table(examples: list[Example]) -> str:
+    rows = []
+    for example in examples:
+        shares = example.shares
+        designs = [design for design in (example.free, example.guided) if design is not None]
+        rows.append(
+            (
+                example.name,
+                len(example.mesh.vertices),
+                "–" if example.region is None else example.region.kind,
+                "–" if shares is None else f"{100 * shares[0]:.0f} % → {100 * shares[1]:.0f} %",
+                designs[-1].status.name,
+                " and ".join(f"{design.seconds:.1f}" for design in designs),
+            )
+        )
+    header = ("mesh", "vertices", "guidance", "share, without → with", "status", "seconds")
+    return (
+        report.table(header, rows)
+        + "\n\nShare of the curve inside the obstacle, or of the alignment region's middle line "
+        "that has the curve near."
+    )
+
+
+def _findings(examples: list[Example]) -> str:
+    """Whether guidance moved the curves the way it should."""
+    text = ""
+    for kind, claim in ((OBSTACLE, "avoids"), (ALIGNMENT, "follows")):
+        pairs = [
+            example.shares
+            for example in examples
+            if example.region is not None and example.region.kind == kind and example.shares
+        ]
+        if not pairs:
+            continue
+        works = sum(
+            guided == 0.0 if kind == OBSTACLE else guided >= FOLLOWED for _, guided in pairs
+        )
+        without, guided = 100 * np.mean(pairs, axis=0)
+        text += (
+            f"The curve {claim} the {kind} region in {works} of {len(pairs)} pictures (shares "
+            f"{without:.0f} % → {guided:.0f} % on average)"
+        )
+        text += ". " if works == len(pairs) else "; the others contradict the paper. "
+    return text + f"A line is followed if the curve is near {100 * FOLLOWED:g} % of it."
