@@ -22,7 +22,7 @@ from .scale import Scale
 
 SEED = 11
 
-SEVERITIES = {Scale.FULL: (32, 8, 2, 1), Scale.QUICK: (8, 1), Scale.SMOKE: (1,)}
+SEVERITIES = {Scale.FULL: (32, 8, 2, 1), Scale.QUICK: (8, 1), Scale.SMOKE: (8,)}
 """n of the paper's "one triangle for every n", from mild to severe."""
 
 THIN = 5.0

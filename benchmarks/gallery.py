@@ -23,7 +23,7 @@ from . import collections, renders, report
 from .polylines import NearestPoints
 from .scale import Scale
 
-SEED = 15
+SEED = 16
 METHOD = METHODS[0]
 
 POINTS = 5
@@ -166,9 +166,9 @@ def run(scale: Scale) -> None:
 
 
 def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
-    """The first mesh of a class of SHREC16, or a ball."""
+    """The first mesh of a class of SHREC16, or a disc."""
     if scale is Scale.SMOKE:
-        return "ball", shapes.sphere(3)
+        return "disc", shapes.disc(16)
     for name, mesh in collections.shrec16_class(kind):
         return name, mesh
     raise SystemExit(f"SHREC16 has no class {kind}")
@@ -177,7 +177,7 @@ def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
 def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
     """Meshes of several collections in turn, of a size that a picture needs."""
     if scale is Scale.SMOKE:
-        yield "ball", shapes.sphere(3)
+        yield "disc", shapes.disc(16)
         return
     folders = [collections.mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
     longest = max(len(files) for files in folders)

@@ -22,7 +22,7 @@ from .polylines import NearestPoints
 from .samples import random_sets
 from .scale import Scale
 
-SEED = 12
+SEED = 4
 
 REMARKABLE = 0.02
 """Distance, relative to the diagonal, beyond which curves are plainly different to the eye."""
