@@ -34,6 +34,7 @@ class DesignProperties:
         items=(
             ("NICMM", "NICMM", "The default method"),
             ("NICMM_PAPER", "NICMM (Paper)", "The method exactly as the paper describes it"),
+            ("VARIATIONAL", "Variational", "The same energy without a network or PyTorch"),
         ),
         default="NICMM",
     )

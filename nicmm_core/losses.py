@@ -152,7 +152,7 @@ def smoothness_loss(surface: EnergySurface, phi: Array) -> Array:
 def feature_loss(surface: EnergySurface, phi: Array) -> Array:
     """Feature constraint, Eq. 7 and 8: ∫ ½ φ_fea² G_σ(φ)."""
     if surface.feature_map is None:
-        return 0.0 * phi.sum()
+        return 0.0 * (phi**2).sum()
     residual = feature_residual(surface.feature_map, surface.centroid(phi), surface.delta_width)
     return (0.5 * residual**2 * surface.face_areas).sum()
 

@@ -69,10 +69,13 @@ def redistanced(
     Returns
     -------
     (n,) float array
+        The field itself where it has no zero set.
     """
     sign = signs_with_zeros(field, zero_vertices)
     distance = _distance_at_the_curve(surface, field, sign)
     distance[zero_vertices] = 0.0
+    if not np.isfinite(distance).any():
+        return field.copy()
     _spread(surface, distance, limit)
     distance = np.maximum(distance, LEAST_DISTANCE * surface.edge_length)
     reached = np.isfinite(distance)

@@ -54,6 +54,7 @@ def test_equals_the_core(empty_scene, mode):
         ({"order": "GIVEN"}, {"order": "given"}),
         ({"smoothness": 3.0}, {"smoothness": 3.0}),
         ({"method": "NICMM_PAPER"}, {"method": "nicmm-paper"}),
+        ({"method": "VARIATIONAL"}, {"method": "variational"}),
     ],
 )
 def test_settings_reach_the_core(empty_scene, settings, arguments):

@@ -172,8 +172,8 @@ class TestResult:
         # ½ (|∇φ|² - 1)² over an area of 1: a field with no slope at all has 0.5.
         assert design.energy["sdf"] < 0.35
 
-    def test_both_methods_are_available(self, small_ball):
-        for method in ("nicmm", "nicmm-paper"):
+    def test_all_methods_are_available(self, small_ball):
+        for method in ("nicmm", "nicmm-paper", "variational"):
             design = nicmm.design_curve(small_ball, [3, 60, 100], method=method)
             assert_valid_design(small_ball, design, small_ball.vertices[[3, 60, 100]])
 
