@@ -313,7 +313,7 @@ def _check_torch() -> None:
     except ImportError as error:
         raise MissingPackageError(
             f"method needs PyTorch, which cannot be imported ({error}); install it into this "
-            "Python with 'pip install torch'"
+            "Python with 'pip install torch', or choose the method \"variational\""
         ) from error
 
 

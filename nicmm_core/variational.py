@@ -117,7 +117,7 @@ def solve(
         if _rests(least, config):
             stopped = "converged"
             break
-        moved, damping = _step(problem, band, links, field, weights, damping, config)
+        moved, damping = gauss_newton_step(problem, band, links, field, weights, damping, config)
         if moved is None:
             stopped = "converged"
             break
@@ -135,7 +135,7 @@ def _rests(least: list[float], config: VariationalConfig) -> bool:
     return least[-1 - config.patience] - least[-1] < config.tolerance
 
 
-def _step(
+def gauss_newton_step(
     problem: Problem,
     band: NarrowBand,
     links: VertexLinks,
