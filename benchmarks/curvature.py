@@ -180,7 +180,7 @@ def _histogram(curvatures: Mapping[str, Sequence[FloatArray]], scale: Scale) -> 
             label=f"{label} ({100 * beyond:.1f} % outside)",
         )
     axes.set_yscale("log")
-    axes.legend()
+    axes.legend(fontsize=8)
     path = plots.save(figure, report.output_folder(scale) / "curvature.png")
     return report.figure(path, "Geodesic curvature of all curves, weighted by length (Fig. 8)")
 

@@ -69,7 +69,7 @@ def run(scale: Scale) -> None:
     pictures: list[renders.Picture] = []
     names = []
     process = SystemsProcess()
-    surfaces = collections.surfaces(scale, scale.choose(40, 4))
+    surfaces = collections.surfaces(scale, scale.choose(40, 3))
     for name, mesh, points in random_sets(surfaces, 1, SEED):
         try:
             task = _task(mesh, points)

@@ -55,7 +55,13 @@ def labelled_pair(
 def plain_ticks(axis: Axis) -> None:
     """Write the ticks of a logarithmic axis as plain numbers."""
     for set_formatter in (axis.set_major_formatter, axis.set_minor_formatter):
-        set_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        set_formatter(FuncFormatter(lambda value, _: _plain(value)))
+
+
+def _plain(value: float) -> str:
+    """1, 2 and 5 of each decade; labels of the ticks between them would overlap."""
+    text = f"{value:g}"
+    return text if text.strip("0.") in {"1", "2", "5"} else ""
 
 
 def save(figure: Figure, path: Path) -> Path:

@@ -29,7 +29,7 @@ def run(scale: Scale) -> None:
     several = dict.fromkeys(METHODS, 0)
     names: list[str] = []
     sizes: list[int] = []
-    meshes = collections.surfaces(scale, scale.choose(40, 5))
+    meshes = collections.surfaces(scale, scale.choose(40, 4))
     for name, mesh, points in random_sets(meshes, 1, SEED):
         try:
             if not names:
