@@ -1,5 +1,6 @@
 """Every measurement runs at the smallest scale and writes its section with its figures."""
 
+import dataclasses
 import importlib
 import re
 
@@ -9,6 +10,19 @@ import pytest
 from benchmarks import report
 from benchmarks.__main__ import MEASUREMENTS
 from benchmarks.scale import Scale
+from nicmm_core.prediction import PredictionConfig
+
+FEW_ITERATIONS = 40
+
+
+@pytest.fixture(autouse=True)
+def short_predictions(monkeypatch):
+    """Stop predictions early wherever the default configuration is used: time is spent there."""
+    defaults = tuple(
+        FEW_ITERATIONS if field.name == "iterations" else field.default
+        for field in dataclasses.fields(PredictionConfig)
+    )
+    monkeypatch.setattr(PredictionConfig.__init__, "__defaults__", defaults)
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)
