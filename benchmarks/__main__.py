@@ -11,7 +11,21 @@ import time
 
 from .scale import Scale
 
-MEASUREMENTS = ("one_loop", "curvature", "runtime", "peers", "degraded", "resolution", "gallery")
+MEASUREMENTS = (
+    "one_loop",
+    "pretraining",
+    "transfer",
+    "convergence",
+    "ablation",
+    "parameters",
+    "initial",
+    "curvature",
+    "runtime",
+    "peers",
+    "degraded",
+    "resolution",
+    "gallery",
+)
 """Modules of this package with a ``run(scale)``, in the order of the paper."""
 
 

@@ -52,6 +52,17 @@ def labelled_pair(
     return figure, (left, right)
 
 
+def labelled_row(x: str, labels: Mapping[str, str]) -> tuple[Figure, list[Axes]]:
+    """A new figure with a row of axes that share the meaning of x; y labels by title."""
+    figure, row = pyplot.subplots(1, len(labels), figsize=(4.0 * len(labels), 3.8))
+    for axes, (title, y) in zip(row, labels.items(), strict=True):
+        axes.set_title(title)
+        axes.set_xlabel(x)
+        axes.set_ylabel(y)
+        axes.grid(alpha=0.3)
+    return figure, list(row)
+
+
 def plain_ticks(axis: Axis) -> None:
     """Write the ticks of a logarithmic axis as plain numbers."""
     for set_formatter in (axis.set_major_formatter, axis.set_minor_formatter):

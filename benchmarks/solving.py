@@ -1,0 +1,221 @@
+"""Parts of the method one by one: problems of random points, pretraining, losses, curves."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import torch
+
+import nicmm_core as nicmm
+from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.contour import extract_curves
+from nicmm_core.curve import SurfaceCurve
+from nicmm_core.losses import LossWeights, balanced
+from nicmm_core.mesh import Mesh
+from nicmm_core.network import CurveNetwork, NetworkConfig
+from nicmm_core.prediction import PredictionConfig, predict
+from nicmm_core.pretraining import PretrainingConfig, pretrain
+from nicmm_core.problem import Problem, build_problem
+from nicmm_core.surface_points import locate_control_points
+from nicmm_core.topology import keep_topology
+from nicmm_core.weights_file import load_network
+
+from .measures import diagonal, distances
+from .samples import random_sets
+
+TYPICAL_SETS = 9
+"""Sets whose middle λ_smooth is taken for pretraining."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A problem with random control points.
+
+    Attributes
+    ----------
+    name : str
+        Of the mesh.
+    mesh : Mesh
+    points : (k,) int array
+        Vertices that are the control points.
+    problem : Problem
+    weights : LossWeights
+        Those that a design takes for this problem.
+    """
+
+    name: str
+    mesh: Mesh
+    points: IntArray
+    problem: Problem
+    weights: LossWeights
+
+
+def random_samples(
+    meshes: Iterable[tuple[str, Mesh]], per_mesh: int, seed: int
+) -> Iterator[Sample]:
+    """Problems of `random_sets`; a set without a loop that bounds a region is named and skipped."""
+    for name, mesh, points in random_sets(meshes, per_mesh, seed):
+        try:
+            problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
+        except nicmm.UnreachableError as error:
+            print(f"  {name}: {error}", flush=True)
+            continue
+        yield Sample(name, mesh, points, problem, balanced(LossWeights(), problem))
+
+
+def untrained(config: NetworkConfig | None = None, seed: int = 0) -> CurveNetwork:
+    """The network as pretraining starts with it."""
+    torch.manual_seed(seed)
+    return CurveNetwork(config or NetworkConfig())
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A network after pretraining.
+
+    Attributes
+    ----------
+    network : CurveNetwork
+    losses : list of float
+        Mean loss of every epoch.
+    preparing_seconds, training_seconds : float
+        For initial loops, distances and features of all sets, and for the steps themselves.
+    """
+
+    network: CurveNetwork
+    losses: list[float]
+    preparing_seconds: float
+    training_seconds: float
+
+
+def train(
+    mesh: Mesh,
+    weights: LossWeights,
+    sets: int,
+    epochs: int,
+    seed: int,
+    network_config: NetworkConfig | None = None,
+) -> Trained:
+    """Pretrain a network on random sets of one mesh."""
+    started = prepared = time.perf_counter()
+
+    def watch(stage: str, done: int, total: int, loss: float) -> None:
+        nonlocal prepared
+        if stage == "preparing":
+            prepared = time.perf_counter()
+
+    with TemporaryDirectory() as folder:
+        output = Path(folder) / "weights.npz"
+        config = PretrainingConfig(sets=sets, epochs=epochs, seed=seed)
+        losses = pretrain([mesh], output, network_config, config, weights, watch)
+        finished = time.perf_counter()
+        network = load_network(output)
+    print(
+        f"  pretrained {sets} sets, {epochs} epochs: {finished - started:.0f} s, "
+        f"loss {losses[0]:.3g} to {losses[-1]:.3g}",
+        flush=True,
+    )
+    return Trained(network, losses, prepared - started, finished - prepared)
+
+
+def typical_weights(mesh: Mesh, seed: int) -> LossWeights:
+    """The weights with the middle one of the λ_smooth that designs on this mesh take.
+
+    Prediction lowers λ_smooth set by set; pretraining has one value for all of its sets.
+    """
+    samples = random_samples([("typical λ_smooth", mesh)], TYPICAL_SETS, seed)
+    return replace(LossWeights(), smooth=float(np.median([s.weights.smooth for s in samples])))
+
+
+def without_early_stop(iterations: int) -> PredictionConfig:
+    """Settings that stop after a number of steps of the optimiser and never before."""
+    # The loss is taken before each step, so the last one needs a further evaluation.
+    return PredictionConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Predictions with one network.
+
+    Attributes
+    ----------
+    least_losses : (samples, iterations + 1) float array
+        Least loss so far, from before the first step to after the last one.
+    seconds : (samples,) float array
+        Of the whole prediction stage.
+    smooth : (samples,) float array
+        λ_smooth of the energy, as a design takes it.
+    """
+
+    least_losses: FloatArray
+    seconds: FloatArray
+    smooth: FloatArray
+
+
+def run_networks(
+    networks: Mapping[str, CurveNetwork], samples: Iterable[Sample], iterations: int
+) -> dict[str, Runs]:
+    """Predict every sample with every network, in turn, so that a busy machine slows all alike."""
+    losses: dict[str, list[FloatArray]] = {label: [] for label in networks}
+    seconds: dict[str, list[float]] = {label: [] for label in networks}
+    smooth = []
+    for sample in samples:
+        smooth.append(sample.weights.smooth)
+        for label, network in networks.items():
+            started = time.perf_counter()
+            prediction = predict(
+                network, sample.problem, sample.weights, without_early_stop(iterations)
+            )
+            seconds[label].append(time.perf_counter() - started)
+            losses[label].append(_least_so_far(prediction.losses, iterations + 1))
+        last = ", ".join(f"{label} {losses[label][-1][-1]:.3f}" for label in networks)
+        print(f"  {sample.name}: {last}", flush=True)
+    if not smooth:
+        raise SystemExit("No set had a loop that bounds a region; there is nothing to measure")
+    return {
+        label: Runs(np.array(losses[label]), np.array(seconds[label]), np.array(smooth))
+        for label in networks
+    }
+
+
+def _least_so_far(losses: list[float], length: int) -> FloatArray:
+    """Running minimum; after a divergence it stays, as the field that is returned does."""
+    least = np.fmin.accumulate(np.array(losses))
+    return np.pad(least, (0, length - len(least)), mode="edge")
+
+
+def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
+    """The zero level set of φ as it is, zero at the control points."""
+    problem = sample.problem
+    return extract_curves(
+        sample.mesh,
+        problem.working,
+        problem.smoother.interpolating(field),
+        problem.loop.control_vertices,
+    )
+
+
+def designed_curve(sample: Sample, field: FloatArray) -> tuple[SurfaceCurve, bool]:
+    """The curve that a design makes of φ, and whether it was one loop by itself."""
+    problem = sample.problem
+    kept, breaking = keep_topology(
+        problem.working,
+        problem.loop,
+        problem.initial_distance,
+        problem.smoother.interpolating(field),
+    )
+    curves = extract_curves(sample.mesh, problem.working, kept, problem.loop.control_vertices)
+    return curves[0], not breaking
+
+
+def relative_distances(
+    sample: Sample, first: SurfaceCurve, second: SurfaceCurve
+) -> tuple[float, float]:
+    """Mean and greatest distance of two curves in percent of the bounding box's diagonal."""
+    mean, greatest = distances(first, second)
+    return 100 * mean / diagonal(sample.mesh), 100 * greatest / diagonal(sample.mesh)
