@@ -25,6 +25,7 @@ MEASUREMENTS = (
     "degraded",
     "resolution",
     "gallery",
+    "variational_order",
 )
 """Modules of this package with a ``run(scale)``, in the order of the paper."""
 

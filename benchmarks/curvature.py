@@ -12,7 +12,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray, IntArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.design import is_one_curve
 from nicmm_core.mesh import Mesh
 from nicmm_core.problem import build_problem
 from nicmm_core.surface_points import locate_control_points
@@ -20,6 +20,7 @@ from nicmm_core.surface_points import locate_control_points
 from . import collections, plots, renders, report
 from .elastic_curve import NODES, elastic_curve
 from .measures import SAMPLES, bending, curvature_along
+from .methods import METHODS
 from .polylines import initial_path
 from .samples import random_sets
 from .scale import Scale
@@ -196,6 +197,6 @@ def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
     renders.render_sheet(pictures, path, scale)
     return report.figure(
         path,
-        "The curves of nicmm-paper (orange), nicmm (blue), variational (green) and the elastic "
+        "The curves of nicmm-paper (orange), variational (green) and the elastic "
         "curve (white) through the same points (Fig. 7)",
     )

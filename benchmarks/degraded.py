@@ -10,11 +10,12 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.array_types import IntArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.design import is_one_curve
 from nicmm_core.mesh import Mesh
 
 from . import collections, plots, renders, report
 from .measures import bending, distances
+from .methods import METHODS
 from .perturbation import GREATEST_FRACTION, LEAST_ANGLE, LEAST_FRACTION, angles, perturbed
 from .resolution import REMARKABLE
 from .samples import random_sets

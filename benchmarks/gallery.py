@@ -14,12 +14,13 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.array_types import FloatArray, IntArray
 from nicmm_core.curve import SurfaceCurve, resample
-from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.design import is_one_curve
 from nicmm_core.features import vertex_normals
 from nicmm_core.files import read_mesh
 from nicmm_core.mesh import Mesh, unique_edges
 
 from . import collections, renders, report
+from .methods import METHODS
 from .polylines import NearestPoints
 from .scale import Scale
 

@@ -10,13 +10,13 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray, IntArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.design import METHODS
 from nicmm_core.mesh import Mesh
 from nicmm_core.problem import build_problem
 from nicmm_core.surface_points import locate_control_points
 
 from . import collections, renders, report
 from .measures import bending
+from .methods import METHODS
 from .peer_systems import SYSTEMS, SystemsProcess, Task, missing_packages
 from .polylines import NearestPoints, misses
 from .samples import random_sets

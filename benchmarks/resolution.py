@@ -13,11 +13,12 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.array_types import IntArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.design import is_one_curve
 from nicmm_core.mesh import Mesh
 
 from . import collections, plots, renders, report
 from .measures import bending, distances
+from .methods import METHODS
 from .polylines import NearestPoints
 from .samples import random_sets
 from .scale import Scale

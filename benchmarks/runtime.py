@@ -8,10 +8,11 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.design import METHODS, is_one_curve
+from nicmm_core.design import is_one_curve
 from nicmm_core.mesh import Mesh
 
 from . import collections, plots, report
+from .methods import METHODS
 from .samples import random_sets
 from .scale import Scale
 
