@@ -40,7 +40,7 @@ topology then falls back on the jagged distance.
 
 
 END_RADIUS = 3.0
-"""Distance from an end of an open curve, in edge lengths, within which φ is not bent.
+"""Distance from an end of an open curve, in edge lengths, within which bending does not count.
 
 φ is a cone about the end, whose Laplacian grows without bound and says nothing of the curve.
 """
@@ -138,7 +138,7 @@ def build_problem(
     if side is None:
         bundle = build_sign_bundle(working, loop)
         side = bundle.side
-        no_laplacian = working.on_boundary | _near_ends(working, bundle, loop.edge_length)
+        no_laplacian = working.on_boundary | _near_ends(working, loop)
         elements = build_finite_elements(vertices, working.faces, no_laplacian, bundle)
     distance = signed_distance(plain, loop, edge_length, side)
     length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
@@ -172,15 +172,15 @@ def build_problem(
     )
 
 
-def _near_ends(working: WorkingMesh, bundle: SignBundle, edge_length: float) -> BoolArray:
-    """Vertices near an end of an open curve, shape (n,)."""
-    if not len(bundle.ends):
+def _near_ends(working: WorkingMesh, loop: InitialLoop) -> BoolArray:
+    """Vertices near an end of an open path, shape (n,)."""
+    if loop.closed:
         return np.zeros(len(working.vertices), dtype=bool)
     distance = csgraph.dijkstra(
         working.edge_graph(),
         directed=False,
-        indices=bundle.ends,
+        indices=loop.vertices[[0, -1]],
         min_only=True,
-        limit=END_RADIUS * edge_length,
+        limit=END_RADIUS * loop.edge_length,
     )
     return np.isfinite(distance)
