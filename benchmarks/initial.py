@@ -106,7 +106,7 @@ class Comparison:
 def run(scale: Scale) -> None:
     """Compare curves through the same points from several initial loops, and from none."""
     network = load_network()
-    meshes = collections.surfaces(scale, scale.choose(12, 2))
+    meshes = collections.surfaces(scale, scale.choose(12, 1))
     compared = []
     for sample in random_samples(meshes, 1, SEED):
         with_loop = _with_loops(network, sample)

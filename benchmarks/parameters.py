@@ -74,8 +74,8 @@ Outcomes = dict[tuple[str, float], list[Outcome]]
 def run(scale: Scale) -> None:
     """Vary one weight at a time over decades."""
     network = load_network()
-    iterations = scale.choose(200, 60, 20)
-    meshes = collections.surfaces(scale, scale.choose(6, 2))
+    iterations = scale.choose(200, 40, 20)
+    meshes = collections.surfaces(scale, scale.choose(6, 1))
     outcomes: Outcomes = {(weight, factor): [] for weight in NAMES for factor in FACTORS}
     samples = []
     for sample in random_samples(meshes, 1, SEED):

@@ -13,7 +13,7 @@ from matplotlib import pyplot  # noqa: E402 - the backend is chosen first
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
-from matplotlib.ticker import FuncFormatter  # noqa: E402
+from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: E402
 
 from nicmm_core.array_types import FloatArray  # noqa: E402
 
@@ -96,6 +96,9 @@ def least_losses(runs: Mapping[str, FloatArray], title: str, path: Path) -> Path
     for label, losses in runs.items():
         axes.plot(losses.mean(axis=0), label=label, linewidth=1.6)
     axes.set_yscale("log")
-    plain_ticks(axes.yaxis)
+    # The losses often stay within one decade, where a logarithmic locator finds hardly any tick.
+    axes.yaxis.set_major_locator(MaxNLocator(7))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
     axes.legend(fontsize=8)
     return save(figure, path)

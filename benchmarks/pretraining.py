@@ -31,7 +31,7 @@ PAPER_TRAINING = 1000 * 10
 def run(scale: Scale) -> None:
     """Pretrain for several durations and predict sets of the same mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
-    sets = scale.choose(250, 15, 4)
+    sets = scale.choose(250, 10, 4)
     weights = typical_weights(mesh, SEED)
     trained = {
         _label(sets, epochs): train(mesh, weights, sets, epochs, SEED) for epochs in _epochs(scale)
@@ -44,7 +44,7 @@ def run(scale: Scale) -> None:
         **{label: one.network for label, one in trained.items()},
         SHIPPED: load_network(),
     }
-    samples = random_samples([(name, mesh)], scale.choose(50, 4, 2), TEST_SEED)
+    samples = random_samples([(name, mesh)], scale.choose(50, 2, 2), TEST_SEED)
     runs = run_networks(networks, samples, ITERATIONS)
     body = (
         f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices; pretraining "
@@ -58,7 +58,7 @@ def run(scale: Scale) -> None:
 
 
 def _epochs(scale: Scale) -> tuple[int, ...]:
-    return {Scale.FULL: (1, 4, 16), Scale.QUICK: (2, 6), Scale.SMOKE: (1, 2)}[scale]
+    return {Scale.FULL: (1, 4, 16), Scale.QUICK: (1, 3), Scale.SMOKE: (1, 2)}[scale]
 
 
 def _label(sets: int, epochs: int) -> str:

@@ -25,8 +25,8 @@ PAPER = {UNTRAINED: 15.298, ONE_MESH: 10.996}
 
 def run(scale: Scale) -> None:
     """Pretrain on one mesh and predict sets of others."""
-    sets, epochs = scale.choose(100, 15, 4), scale.choose(16, 6, 2)
-    others = scale.choose(20, 3, 2)
+    sets, epochs = scale.choose(100, 10, 4), scale.choose(16, 3, 2)
+    others = scale.choose(20, 2, 1)
     (name, mesh), *rest = collections.surfaces(scale, others + 1)
     weights = typical_weights(mesh, SEED)
     trained = train(mesh, weights, sets, epochs, SEED)
