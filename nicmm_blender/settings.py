@@ -10,7 +10,7 @@ class DesignProperties:
 
     closed: BoolProperty(
         name="Closed",
-        description="Lead the curve from the last control point back to the first",
+        description="Lead the curve from the last control point back to the first, or end it there",
         default=True,
     )
     order: EnumProperty(

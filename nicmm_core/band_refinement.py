@@ -31,8 +31,10 @@ The longest edges come first, so that stopping leaves the band evenly coarser.
 """
 
 
-def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[list[int], float]:
-    """Halve long edges near a closed path of edges.
+def refine_along(
+    split: SplitMesh, component: int, loop: list[int], closed: bool = True
+) -> tuple[list[int], float]:
+    """Halve long edges near a path of edges.
 
     Parameters
     ----------
@@ -42,6 +44,8 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
         The connected component that the path is on.
     loop : list of int
         Vertices of the path, the first not repeated.
+    closed : bool
+        Whether the last vertex is joined to the first.
 
     Returns
     -------
@@ -52,7 +56,9 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
         longest edge after.
     """
     points = np.array([split.position(vertex) for vertex in loop])
-    lengths = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(lengths.sum())
     longest, half_width = length / PIECES, BAND_SHARE * length
     tree = cKDTree(_samples(points, longest))
@@ -75,7 +81,7 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
         )
     ]
     heapq.heapify(queue)
-    following = dict(zip(loop, loop[1:] + loop[:1], strict=True))
+    following = dict(zip(loop, loop[1:] + loop[:1] if closed else loop[1:], strict=False))
     for _ in range(MOST_SPLITS):
         if not queue:
             break
@@ -92,14 +98,14 @@ def refine_along(split: SplitMesh, component: int, loop: list[int]) -> tuple[lis
             if wanted:
                 heapq.heappush(queue, (-float(size), min(vertex, middle), max(vertex, middle)))
     refined = [loop[0]]
-    while following[refined[-1]] != loop[0]:
+    while following.get(refined[-1], loop[0]) != loop[0]:
         refined.append(following[refined[-1]])
     return refined, min(float(lengths.mean()), longest)
 
 
 def _samples(points: FloatArray, spacing: float) -> FloatArray:
-    """Points along a closed polyline, no farther apart than the spacing."""
-    following = np.roll(points, -1, axis=0)
+    """Points along a polyline, no farther apart than the spacing."""
+    points, following = points[:-1], points[1:]
     count = np.ceil(np.linalg.norm(following - points, axis=1) / spacing).astype(int).clip(min=1)
     return np.concatenate(
         [

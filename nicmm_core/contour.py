@@ -14,6 +14,7 @@ import numpy as np
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import Mesh
+from .sign_bundle import SignBundle, local_signs
 from .vertex_links import VertexLinks
 from .virtual_splits import WorkingMesh
 
@@ -35,7 +36,11 @@ def signs_with_zeros(field: FloatArray, zero_vertices: IntArray) -> IntArray:
 
 
 def extract_curves(
-    mesh: Mesh, working: WorkingMesh, field: FloatArray, control_vertices: IntArray
+    mesh: Mesh,
+    working: WorkingMesh,
+    field: FloatArray,
+    control_vertices: IntArray,
+    bundle: SignBundle | None = None,
 ) -> list[SurfaceCurve]:
     """Zero level set of a field that is linear in each face.
 
@@ -48,20 +53,25 @@ def extract_curves(
         φ at the working vertices; its values at the control vertices count as zero.
     control_vertices : (k,) int array
         Working vertices of the control points, in the order visited, no two of them neighbours.
+    bundle : SignBundle, optional
+        How the faces read the values of their corners.
 
     Returns
     -------
     list of SurfaceCurve
         Those with most control points first, then the longest. A curve that ends at the mesh's
-        boundary is open.
+        boundary, or at an end of the bundle, is open.
     """
-    through = np.concatenate([control_vertices, _passed_vertices(working, field, control_vertices)])
-    nodes, segments, segment_face = _segments(working, field, through)
+    passed = _passed_vertices(working, field, control_vertices, bundle)
+    through = np.concatenate([control_vertices, passed])
+    nodes, segments, segment_face = _segments(working, field, through, bundle)
     chains = _chains(segments, len(nodes))
     curves = []
     for chain, along, closed in chains:
         if closed:
             chain, along = _from_first_control(chain, along, nodes, control_vertices)
+        elif _runs_backwards(nodes[chain], control_vertices):
+            chain, along = chain[::-1], along[::-1]
         parent = working.parent_face[segment_face[along]]
         # The last point of an open chain has no segment after it and lies on the one before.
         parent = parent if closed else np.append(parent, parent[-1])
@@ -73,21 +83,25 @@ def extract_curves(
 
 
 def _passed_vertices(
-    working: WorkingMesh, field: FloatArray, control_vertices: IntArray
+    working: WorkingMesh,
+    field: FloatArray,
+    control_vertices: IntArray,
+    bundle: SignBundle | None,
 ) -> IntArray:
     """Vertices that the contour passes so closely that it may go through them.
 
     They are simple, and no two of them or of them and the control vertices are neighbours.
     """
     sign = signs_with_zeros(field, control_vertices)
-    start, end = working.edges[sign[working.edges].prod(axis=1) < 0].T
-    fraction = field[start] / (field[start] - field[end])
+    _, ends = _crossings(working.faces, sign, bundle)
+    start, end = np.unique(ends[ends[:, :, 0] != ends[:, :, 1]], axis=0).T
+    fraction = _crossing_fraction(field, start, end)
     farthest = np.zeros(len(field))
     np.maximum.at(farthest, start, fraction)
     np.maximum.at(farthest, end, 1.0 - fraction)
     crossed = np.unique(np.concatenate([start, end]))
     near = crossed[farthest[crossed] < PASSING_MARGIN]
-    links = VertexLinks(working)
+    links = VertexLinks(working, bundle)
     taken = set(control_vertices.tolist())
     passed = []
     for vertex in near[np.argsort(farthest[near], kind="stable")].tolist():
@@ -98,7 +112,11 @@ def _passed_vertices(
 
 
 def segment_ends(
-    vertices: FloatArray, faces: IntArray, field: FloatArray, sign: IntArray
+    vertices: FloatArray,
+    faces: IntArray,
+    field: FloatArray,
+    sign: IntArray,
+    bundle: SignBundle | None = None,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Faces that the zero set crosses, and where its segment in each of them starts and ends.
 
@@ -109,22 +127,22 @@ def segment_ends(
     field : (n,) float array
     sign : (n,) int array
         As from `signs_with_zeros`.
+    bundle : SignBundle, optional
 
     Returns
     -------
     crossed : (s,) int array
     start, end : (s, 3) float array
     """
-    crossed, ends = _crossings(faces, sign)
-    below, above = ends.transpose(2, 0, 1)
-    rise = np.where(below == above, 1.0, field[above] - field[below])
-    fraction = np.where(below == above, 0.0, -field[below] / rise)[..., None]
-    points = (1.0 - fraction) * vertices[below] + fraction * vertices[above]
+    crossed, ends = _crossings(faces, sign, bundle)
+    first, second = ends.transpose(2, 0, 1)
+    fraction = _crossing_fraction(field, first, second)[..., None]
+    points = (1.0 - fraction) * vertices[first] + fraction * vertices[second]
     return crossed, points[:, 0], points[:, 1]
 
 
 def _segments(
-    working: WorkingMesh, field: FloatArray, through: IntArray
+    working: WorkingMesh, field: FloatArray, through: IntArray, bundle: SignBundle | None
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Contour nodes, the segments between them and the face of each segment.
 
@@ -134,40 +152,49 @@ def _segments(
     field : (n,) float array
     through : (q,) int array
         Vertices that count as zero.
+    bundle : SignBundle or None
 
     Returns
     -------
     nodes : (p, 2) int array
-        The working edge that φ changes sign on, negative end first, or a zero vertex twice.
+        The working edge that φ changes sign on, smaller index first, or a zero vertex twice.
     segments : (s, 2) int array
         Node indices.
     segment_face : (s,) int array
         Working face of each segment.
     """
-    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through))
+    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
     nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     return nodes, index.reshape(-1, 2), segment_face
 
 
-def _crossings(faces: IntArray, sign: IntArray) -> tuple[IntArray, IntArray]:
+def _crossings(
+    faces: IntArray, sign: IntArray, bundle: SignBundle | None
+) -> tuple[IntArray, IntArray]:
     """Faces that the zero set crosses, (s,), and the two ends of each segment, (s, 2, 2).
 
-    An end is the edge on which the sign changes, negative vertex first, or a zero vertex twice.
+    An end is the edge on which the sign changes, smaller index first, or a zero vertex twice.
     """
-    corner_sign = sign[faces]
+    corner_sign = local_signs(sign, faces, bundle)
     crossed = np.flatnonzero((corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1))
     faces, corner_sign = faces[crossed], corner_sign[crossed]
     ends = []
     for first, second in ((0, 1), (1, 2), (2, 0)):
         changes = corner_sign[:, first] * corner_sign[:, second] < 0
-        edge = faces[:, [first, second]]
-        edge = np.where(corner_sign[:, [first]] > 0, edge[:, ::-1], edge)
+        edge = np.sort(faces[:, [first, second]], axis=1)
         ends.append(np.where(changes[:, None], edge, -1))
     for corner in range(3):
         at_zero = corner_sign[:, [corner]] == 0
         ends.append(np.where(at_zero, faces[:, [corner, corner]], -1))
     candidates = np.stack(ends, axis=1)  # (s, 6, 2), exactly two of the six are ends
     return crossed, candidates[candidates[:, :, 0] >= 0].reshape(-1, 2, 2)
+
+
+def _crossing_fraction(field: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
+    """How far from the first end of an edge φ is zero, as a share of the edge; 0 at a vertex."""
+    here, there = np.abs(field[first]), np.abs(field[second])
+    fraction = here / np.maximum(here + there, np.finfo(np.float64).tiny)
+    return np.where(first == second, 0.0, fraction)
 
 
 def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
@@ -220,6 +247,13 @@ def _from_first_control(
     return chain, along
 
 
+def _runs_backwards(nodes: IntArray, control_vertices: IntArray) -> bool:
+    """Whether an open chain meets its last control point first."""
+    where = _positions_in(nodes, control_vertices)
+    where = where[where >= 0]
+    return len(where) > 1 and bool(where[0] > where[-1])
+
+
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
     """Index among the nodes of each control vertex, -1 when it is none of them, shape (k,)."""
     at_vertex = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
@@ -231,12 +265,11 @@ def _barycentric(
     mesh: Mesh, working: WorkingMesh, field: FloatArray, nodes: IntArray, parent: IntArray
 ) -> FloatArray:
     """Coordinates of contour nodes in the input faces given, shape (p, 3)."""
-    below, above = nodes.T
-    # At a vertex both ends are the same and any fraction gives its own weights.
-    rise = np.where(below == above, 1.0, field[above] - field[below])
-    fraction = np.clip(-field[below] / rise, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]
+    first, second = nodes.T
+    fraction = _crossing_fraction(field, first, second)
+    fraction = np.clip(fraction, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]
     corners = mesh.faces[parent]
     weights = working.interpolation
-    start = np.asarray(weights[below[:, None], corners].todense()).reshape(-1, 3)
-    end = np.asarray(weights[above[:, None], corners].todense()).reshape(-1, 3)
-    return np.where((below == above)[:, None], start, (1.0 - fraction) * start + fraction * end)
+    start = np.asarray(weights[first[:, None], corners].todense()).reshape(-1, 3)
+    end = np.asarray(weights[second[:, None], corners].todense()).reshape(-1, 3)
+    return np.where((first == second)[:, None], start, (1.0 - fraction) * start + fraction * end)

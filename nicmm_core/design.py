@@ -74,8 +74,9 @@ class Design:
     curves : list of SurfaceCurve
         One entry when all is well.
     field : (V,) float array
-        Level-set values in mesh units at the input mesh's vertices, negative inside. Vertices
-        that are not connected to the control points get the largest value: they are outside.
+        Level-set values in mesh units at the input mesh's vertices, negative inside, or the
+        distance without sign where the curve is open or bounds no region. Vertices that are not
+        connected to the control points get the largest value: they are outside.
     iterations : int
         Of the prediction stage.
     seconds : float
@@ -126,7 +127,7 @@ class Designer:
     ) -> Design:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
-        _check_choices(order, method, closed)
+        _check_choices(order, method)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method != "variational":
@@ -139,6 +140,7 @@ class Designer:
             _checked_map("obstacles", obstacles, self.mesh),
             _checked_map("alignment", alignment, self.mesh),
             _checked_smoothness(smoothness),
+            closed,
         )
         return self._solve(problem, method, float(smoothness), progress, started)
 
@@ -163,7 +165,7 @@ class Designer:
             solution = prediction.predict(network, problem, weights, config, watch)
         field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
         status = _STATUS[solution.stopped]
-        if not is_one_curve(curves):
+        if not is_one_curve(curves, problem.loop.closed):
             status = Status.NOT_ONE_CURVE
         return Design(
             status=status,
@@ -193,9 +195,11 @@ class Designer:
                 problem.loop,
                 problem.initial_distance,
                 problem.smoother.interpolating(field),
+                problem.bundle,
             )
         controls = problem.loop.control_vertices
-        return field, breaking, extract_curves(self.mesh, problem.working, field, controls)
+        curves = extract_curves(self.mesh, problem.working, field, controls, problem.bundle)
+        return field, breaking, curves
 
     def _watcher(self, problem: Problem, progress: Progress) -> Callable[[float, FloatArray], bool]:
         last_call = -np.inf
@@ -231,11 +235,11 @@ def design_curve(
     mesh : Mesh
     control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
         Vertex indices, points on the surface, or faces with barycentric coordinates; at least
-        three.
+        three, or two of an open curve.
     closed : bool, default True
-        A closed curve. Open curves are not available yet.
+        A closed curve, or an open one from the first point visited to the last.
     order : {"given", "shortest"}
-        Visit the points in this order, or in the shortest cyclic order.
+        Visit the points in this order, or in the shortest one: cyclic where the curve is closed.
     method : {"nicmm", "nicmm-paper", "variational"}
         The network of the paper (both names are the same for now), or the same energy minimised
         without a network.
@@ -291,20 +295,18 @@ _STATUS = {
 }
 
 
-def is_one_curve(curves: list[SurfaceCurve]) -> bool:
-    """Whether curves are a single closed one through all control points."""
-    return len(curves) == 1 and curves[0].closed and bool((curves[0].control_index >= 0).all())
+def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
+    """Whether curves are a single one, closed or open, through all control points."""
+    if len(curves) != 1 or curves[0].closed != closed:
+        return False
+    return bool((curves[0].control_index >= 0).all())
 
 
-def _check_choices(order: str, method: str, closed: bool) -> None:
+def _check_choices(order: str, method: str) -> None:
     if method not in METHODS:
         raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
     if order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
-    if not closed:
-        raise ArgumentError(
-            "closed is False, and this version makes closed curves only; pass closed=True"
-        )
 
 
 def _check_torch() -> None:
@@ -348,6 +350,8 @@ def _checked_smoothness(smoothness: float) -> float:
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
     """φ in mesh units at the input vertices."""
+    if problem.bundle is not None:
+        field = np.abs(field)
     inputs = problem.working.input_vertex
     values = np.full(len(mesh.vertices), field.max() * problem.unit)
     values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit

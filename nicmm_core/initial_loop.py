@@ -45,13 +45,13 @@ LEAST_WEIGHT = 0.1
 
 @dataclass(frozen=True)
 class InitialLoop:
-    """A simple closed path of edges of a working mesh.
+    """A simple path of edges of a working mesh, closed or open.
 
     Attributes
     ----------
     vertices : (l,) int array
-        Working vertices in order, the first not repeated at the end. No two of them are joined
-        by an edge that is not part of the loop.
+        Working vertices in order, the first of a closed path not repeated at the end. No two of
+        them are joined by an edge that is not part of the path.
     control_vertices : (k,) int array
         The working vertex of each control point, in the order visited.
     order : (k,) int array
@@ -60,6 +60,7 @@ class InitialLoop:
         Mean length of the edges at the loop: the h that band and delta are measured in.
     zigzag : float
         Length of the steps in which the loop follows the mesh, which smoothing has to remove.
+    closed : bool
     """
 
     vertices: IntArray
@@ -67,10 +68,22 @@ class InitialLoop:
     order: IntArray
     edge_length: float
     zigzag: float
+    closed: bool = True
+
+    def neighbours(self, place: int) -> list[int]:
+        """Vertices before and after the one at a place of the path."""
+        places = [place - 1, place + 1]
+        if self.closed:
+            return [int(self.vertices[i % len(self.vertices)]) for i in places]
+        return [int(self.vertices[i]) for i in places if 0 <= i < len(self.vertices)]
 
 
 def build_initial_loop(
-    mesh: Mesh, points: SurfacePoints, order: str, importance: FloatArray | None = None
+    mesh: Mesh,
+    points: SurfacePoints,
+    order: str,
+    importance: FloatArray | None = None,
+    closed: bool = True,
 ) -> tuple[WorkingMesh, InitialLoop]:
     """Insert the control points and join them by edge paths that do not touch one another.
 
@@ -78,12 +91,14 @@ def build_initial_loop(
     ----------
     mesh : Mesh
     points : SurfacePoints
-        At least three, on one component.
+        At least three, or two of an open path, on one component.
     order : {"given", "shortest"}
-        Visit the points as given, or in the shortest cyclic order.
+        Visit the points as given, or in the shortest order.
     importance : (V,) float array, optional
         φ_fea at the input vertices. Lengths count times its square, as the curve's does in Eq. 7,
         so the loop goes round obstacles and along alignment from the start.
+    closed : bool
+        Whether the path returns from the last point to the first.
 
     Returns
     -------
@@ -105,12 +120,12 @@ def build_initial_loop(
     controls = split.insert_points(points)
     visit = np.arange(len(points))
     if order == "shortest":
-        visit = shortest_order(_edge_distances(split, component, controls), closed=True)
+        visit = shortest_order(_edge_distances(split, component, controls), closed)
     controls = controls[visit]
     _separate_controls(split, controls)
 
     path: list[int] = [int(controls[0])]
-    for leg in range(len(controls)):
+    for leg in range(len(controls) - (not closed)):
         target = int(controls[(leg + 1) % len(controls)])
         blocked = (set(path) | {int(control) for control in controls}) - {path[-1], target}
         nodes = _shortest_free_path(split, component, target, path, blocked, importance)
@@ -122,13 +137,13 @@ def build_initial_loop(
                 'order, for example with order="shortest"'
             )
         path += _split_along(split, nodes)[1:]
-    loop, zigzag = refine_along(split, component, path[:-1])
-    _separate_strands(split, loop)
+    loop, zigzag = refine_along(split, component, path[:-1] if closed else path, closed)
+    _separate_strands(split, loop, closed)
     working, renumbered = split.assemble(component)
     vertices = renumbered[loop]
     beside = np.isin(working.edges, vertices).any(axis=1)
     edge_length = float(working.edge_lengths[beside].mean())
-    return working, InitialLoop(vertices, renumbered[controls], visit, edge_length, zigzag)
+    return working, InitialLoop(vertices, renumbered[controls], visit, edge_length, zigzag, closed)
 
 
 def _edge_distances(split: SplitMesh, component: int, controls: IntArray) -> FloatArray:
@@ -288,7 +303,7 @@ def _separate_controls(split: SplitMesh, controls: IntArray) -> None:
                     split.split_edge(control, other)
 
 
-def _separate_strands(split: SplitMesh, loop: list[int]) -> None:
+def _separate_strands(split: SplitMesh, loop: list[int], closed: bool) -> None:
     """Give both sides of the loop vertices of their own wherever two strands are neighbours.
 
     An edge that joins two loop vertices without being part of the loop is split, and so is a face
@@ -296,7 +311,8 @@ def _separate_strands(split: SplitMesh, loop: list[int]) -> None:
     remaining vertices, so flood fill can tell them apart.
     """
     on_loop = set(loop)
-    loop_edges = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
+    onward = loop[1:] + loop[:1] if closed else loop[1:]
+    loop_edges = {frozenset(edge) for edge in zip(loop, onward, strict=False)}
     for vertex in loop:
         for face in sorted(split.faces_around(vertex)):
             if face not in split.faces_around(vertex):

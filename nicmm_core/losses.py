@@ -89,7 +89,7 @@ def energy_surface(problem: Problem) -> EnergySurface:
         centroid=lambda phi: elements.centroid @ phi,
         control_vertices=problem.loop.control_vertices,
         delta_width=DELTA_WIDTH * problem.edge_length,
-        feature_map=None if importance is None else elements.centroid @ importance,
+        feature_map=None if importance is None else elements.plain_centroid @ importance,
     )
 
 

@@ -126,7 +126,7 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
         inner_areas=elements.face_areas[inner],
         laplacian=(centroid @ elements.laplacian)[:, unknowns],
         centroid=centroid[:, unknowns],
-        feature_map=None if importance is None else centroid @ importance,
+        feature_map=None if importance is None else elements.plain_centroid[inner] @ importance,
         damping=stiffness + sparse.diags_array(MASS_SHARE * mass),
         delta_width=DELTA_WIDTH * problem.edge_length,
     )

@@ -177,7 +177,7 @@ def _random_problems(
     config: PretrainingConfig,
     report: Callable[[str, int, int, float], None],
 ) -> Iterator[Problem]:
-    """Random sets of vertices, as many on each mesh; sets whose loop bounds nothing are redrawn."""
+    """Random sets of vertices, as many on each mesh; sets without a loop are redrawn."""
     done = 0
     per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
     for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
@@ -207,7 +207,7 @@ def _random_problems(
         if found < wanted:
             raise ArgumentError(
                 f"meshes[{number}]: only {found} of {wanted} random sets of points have a loop "
-                "that bounds a region; leave out meshes with many handles"
+                "through them; leave the mesh out or use a finer one"
             )
 
 

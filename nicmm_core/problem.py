@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csgraph
 
-from .array_types import FloatArray
+from .array_types import BoolArray, FloatArray
 from .errors import MeshError
 from .features import (
     control_indicator,
@@ -22,7 +23,8 @@ from .features import (
 from .finite_elements import FiniteElements, build_finite_elements
 from .initial_loop import InitialLoop, build_initial_loop
 from .mesh import Mesh
-from .signed_distance import signed_distance
+from .sign_bundle import SignBundle, build_sign_bundle
+from .signed_distance import bounding_side, signed_distance
 from .smoothing import Smoother, build_smoother
 from .sparse_solver import DEGENERATE
 from .surface_points import SurfacePoints
@@ -34,6 +36,13 @@ SMOOTHING_LENGTH = 1.5
 
 Less leaves the zigzag of the edge path in the curve; more makes thin regions vanish, where the
 topology then falls back on the jagged distance.
+"""
+
+
+END_RADIUS = 3.0
+"""Distance from an end of an open curve, in edge lengths, within which bending does not count.
+
+φ is a cone about the end, whose Laplacian grows without bound and says nothing of the curve.
 """
 
 
@@ -49,6 +58,8 @@ class Problem:
         Square root of the area of the working mesh, the unit of all that follows.
     vertices : (n, 3) float array
         Positions about the surface's centroid, along its principal axes.
+    bundle : SignBundle or None
+        How the faces read φ, where the curve is open or bounds no region.
     elements : FiniteElements
     loop : InitialLoop
     distance : (n,) float array
@@ -65,6 +76,7 @@ class Problem:
     working: WorkingMesh
     unit: float
     vertices: FloatArray
+    bundle: SignBundle | None
     elements: FiniteElements
     loop: InitialLoop
     distance: FloatArray
@@ -86,6 +98,7 @@ def build_problem(
     obstacles: FloatArray | None = None,
     alignment: FloatArray | None = None,
     smoothness: float = 1.0,
+    closed: bool = True,
 ) -> Problem:
     """Everything that comes before the network.
 
@@ -99,13 +112,15 @@ def build_problem(
         Weights in [0, 1] at the input mesh's vertices.
     smoothness : float
         Multiplies the weight of bending in the smoothing of φ₀, the fourth power of its length.
+    closed : bool
+        Whether the curve returns from the last point to the first.
 
     Raises
     ------
     MeshError
         If faces have no area.
     UnreachableError
-        If no simple loop that bounds a region passes the points in this order.
+        If no simple path passes the points in this order.
     """
     component = mesh.face_component == mesh.face_component[points.faces[0]]
     if not (mesh.face_areas[component] > 0.0).all():
@@ -113,16 +128,26 @@ def build_problem(
     importance = None
     if obstacles is not None or alignment is not None:
         importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
-    working, loop = build_initial_loop(mesh, points, order, importance)
+    working, loop = build_initial_loop(mesh, points, order, importance, closed)
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
     edge_length = loop.edge_length / unit
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
-    distance = signed_distance(working, elements, loop, edge_length)
+    plain, bundle = elements, None
+    side = bounding_side(working, elements, loop) if closed else None
+    if side is None:
+        bundle = build_sign_bundle(working, loop)
+        side = bundle.side
+        no_laplacian = working.on_boundary | _near_ends(working, loop)
+        elements = build_finite_elements(vertices, working.faces, no_laplacian, bundle)
+    distance = signed_distance(plain, loop, edge_length, side)
+    length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
     smoother = build_smoother(
-        elements, loop.control_vertices, smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
+        elements, loop.control_vertices, length, None if bundle is None else plain
     )
-    initial_distance, _ = keep_topology(working, loop, distance, smoother.smoothed(distance))
+    initial_distance, _ = keep_topology(
+        working, loop, distance, smoother.smoothed(distance), bundle
+    )
     if importance is not None:
         importance = working.interpolation @ importance
     features = input_features(
@@ -136,6 +161,7 @@ def build_problem(
         working=working,
         unit=unit,
         vertices=vertices,
+        bundle=bundle,
         elements=elements,
         loop=loop,
         distance=distance,
@@ -144,3 +170,17 @@ def build_problem(
         feature_map=importance,
         features=features,
     )
+
+
+def _near_ends(working: WorkingMesh, loop: InitialLoop) -> BoolArray:
+    """Vertices near an end of an open path, shape (n,)."""
+    if loop.closed:
+        return np.zeros(len(working.vertices), dtype=bool)
+    distance = csgraph.dijkstra(
+        working.edge_graph(),
+        directed=False,
+        indices=loop.vertices[[0, -1]],
+        min_only=True,
+        limit=END_RADIUS * loop.edge_length,
+    )
+    return np.isfinite(distance)

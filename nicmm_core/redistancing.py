@@ -17,6 +17,7 @@ from scipy import sparse
 
 from .array_types import FloatArray, IntArray
 from .contour import segment_ends, signs_with_zeros
+from .sign_bundle import SignBundle
 from .signed_distance import LEAST_DISTANCE
 
 SETTLED = 1e-6
@@ -34,21 +35,27 @@ class DistanceSurface:
     faces_around : (n, m) sparse array
         1 where a face has a vertex.
     edge_length : float
+    bundle : SignBundle or None
+        How the faces read the values of their corners.
     """
 
     vertices: FloatArray
     faces: IntArray
     faces_around: sparse.csr_array
     edge_length: float
+    bundle: SignBundle | None = None
 
 
 def build_distance_surface(
-    vertices: FloatArray, faces: IntArray, edge_length: float
+    vertices: FloatArray,
+    faces: IntArray,
+    edge_length: float,
+    bundle: SignBundle | None = None,
 ) -> DistanceSurface:
     """Index the faces of each vertex."""
     entries = (np.ones(faces.size), (faces.ravel(), np.repeat(np.arange(len(faces)), 3)))
     around = sparse.csr_array(sparse.coo_array(entries, shape=(len(vertices), len(faces))))
-    return DistanceSurface(vertices, faces, around, edge_length)
+    return DistanceSurface(vertices, faces, around, edge_length, bundle)
 
 
 def redistanced(
@@ -87,7 +94,7 @@ def _distance_at_the_curve(
     surface: DistanceSurface, field: FloatArray, sign: IntArray
 ) -> FloatArray:
     """Distance of the vertices of crossed faces to the segments in the faces about them."""
-    crossed, start, end = segment_ends(surface.vertices, surface.faces, field, sign)
+    crossed, start, end = segment_ends(surface.vertices, surface.faces, field, sign, surface.bundle)
     touching = surface.faces_around[:, crossed]
     face, segment = sparse.coo_array(touching.T @ touching).coords
     distance = np.full(len(field), np.inf)

@@ -7,7 +7,6 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import FloatArray, IntArray
-from .errors import UnreachableError
 from .finite_elements import FiniteElements
 from .initial_loop import InitialLoop
 from .sparse_solver import factorise
@@ -22,34 +21,29 @@ POISSON_SHIFT = 1e-8
 
 
 def signed_distance(
-    working: WorkingMesh, elements: FiniteElements, loop: InitialLoop, edge_length: float
+    elements: FiniteElements, loop: InitialLoop, edge_length: float, side: IntArray
 ) -> FloatArray:
-    """Distance to the loop along the surface, negative inside, zero on the loop.
-
-    Inside is the side with the smaller area.
+    """Distance to the initial path along the surface with the sign of each vertex's side.
 
     Parameters
     ----------
-    working : WorkingMesh
     elements : FiniteElements
         Of the working mesh; their unit is the unit of the distance.
     loop : InitialLoop
     edge_length : float
         Mean edge length in the unit of the elements.
+    side : (n,) int array
+        ±1, anything on the path.
 
     Returns
     -------
     (n,) float array
-
-    Raises
-    ------
-    UnreachableError
-        If the loop does not bound a region, as a loop round a torus's tube.
+        Zero on the path and nowhere else.
     """
     distance = heat_distance(elements, loop.vertices, edge_length**2)
     distance = np.maximum(distance, LEAST_DISTANCE * edge_length)
     distance[loop.vertices] = 0.0
-    return _side(working, elements, loop) * distance
+    return side * distance
 
 
 def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> FloatArray:
@@ -80,8 +74,14 @@ def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> F
     return distance - distance[sources].mean()
 
 
-def _side(working: WorkingMesh, elements: FiniteElements, loop: InitialLoop) -> IntArray:
-    """-1 inside, +1 outside and 0 on the loop, shape (n,), by flood fill."""
+def bounding_side(
+    working: WorkingMesh, elements: FiniteElements, loop: InitialLoop
+) -> IntArray | None:
+    """-1 inside a closed path, +1 outside and 0 on it, by flood fill, shape (n,).
+
+    Inside is the side with the smaller area. None where the path bounds no region, as one round a
+    torus's tube.
+    """
     n_vertices = len(working.vertices)
     on_loop = np.zeros(n_vertices, dtype=bool)
     on_loop[loop.vertices] = True
@@ -91,11 +91,7 @@ def _side(working: WorkingMesh, elements: FiniteElements, loop: InitialLoop) -> 
 
     region_side = _two_colouring(region, *_regions_across(working, loop, region).T)
     if region_side is None:
-        raise UnreachableError(
-            "control_points: the loop through them does not bound a region of the surface (it "
-            "runs round a handle or a hole), so no level set belongs to it; choose points or an "
-            "order whose loop separates the surface into two parts"
-        )
+        return None
     side = np.where(on_loop, 0, region_side[region])
     inside = elements.vertex_areas[side < 0].sum()
     outside = elements.vertex_areas[side > 0].sum()

@@ -49,16 +49,28 @@ class Smoother:
         return corrected
 
 
-def build_smoother(elements: FiniteElements, control_vertices: IntArray, length: float) -> Smoother:
+def build_smoother(
+    elements: FiniteElements,
+    control_vertices: IntArray,
+    length: float,
+    plain: FiniteElements | None = None,
+) -> Smoother:
     """Factorise the smoothing operator for a length ℓ in the unit of the elements.
 
-    Detail shorter than about 2 π ℓ disappears.
+    Detail shorter than about 2 π ℓ disappears. Where the elements read φ with signs, ``plain`` are
+    those of ordinary functions, which the responses to the control points are.
     """
-    mass = sparse.diags_array(elements.vertex_areas)
-    bending = elements.stiffness @ sparse.diags_array(1.0 / elements.vertex_areas)
-    factor = factorise(mass + length**4 * (bending @ elements.stiffness))
+    factor = factorise(_bending_operator(elements, length))
+    response_factor = factor if plain is None else factorise(_bending_operator(plain, length))
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
-    fields = factor.solve(loads)
+    fields = response_factor.solve(loads)
     response = np.linalg.solve(fields[control_vertices].T, fields.T).T
     return Smoother(factor, elements.vertex_areas, control_vertices, response)
+
+
+def _bending_operator(elements: FiniteElements, length: float) -> sparse.sparray:
+    """A = M + ℓ⁴ L M⁻¹ L."""
+    mass = sparse.diags_array(elements.vertex_areas)
+    bending = elements.stiffness @ sparse.diags_array(1.0 / elements.vertex_areas)
+    return mass + length**4 * (bending @ elements.stiffness)

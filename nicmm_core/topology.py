@@ -19,6 +19,7 @@ from scipy.sparse import csgraph
 from .array_types import FloatArray, IntArray
 from .contour import signs_with_zeros
 from .initial_loop import InitialLoop
+from .sign_bundle import SignBundle
 from .vertex_links import VertexLinks
 from .virtual_splits import WorkingMesh
 
@@ -34,7 +35,11 @@ FALLBACK_ATTEMPTS = 12
 
 
 def keep_topology(
-    working: WorkingMesh, loop: InitialLoop, start: FloatArray, wanted: FloatArray
+    working: WorkingMesh,
+    loop: InitialLoop,
+    start: FloatArray,
+    wanted: FloatArray,
+    bundle: SignBundle | None = None,
 ) -> tuple[FloatArray, int]:
     """Follow a field as far as its zero set stays isotopic to that of the start.
 
@@ -46,6 +51,8 @@ def keep_topology(
         A field whose zero set is one simple loop through the control vertices.
     wanted : (n,) float array
         The field to follow, in the same unit.
+    bundle : SignBundle, optional
+        How the faces read the values of their corners.
 
     Returns
     -------
@@ -55,7 +62,7 @@ def keep_topology(
         Number of vertices of ``wanted`` whose sign breaks the topology; 0 means that the field
         is returned as it came.
     """
-    links = VertexLinks(working)
+    links = VertexLinks(working, bundle)
     control_vertices = loop.control_vertices
     breaking = breaking_vertices(links, start, wanted, control_vertices)
     n_breaking = len(breaking)

@@ -95,8 +95,8 @@ def solve(
     """
     h = problem.edge_length
     controls = problem.loop.control_vertices
-    surface = build_distance_surface(problem.vertices, problem.working.faces, h)
-    links = VertexLinks(problem.working)
+    surface = build_distance_surface(problem.vertices, problem.working.faces, h, problem.bundle)
+    links = VertexLinks(problem.working, problem.bundle)
     reach = (config.half_width + 1.0) * h
     field = redistanced(surface, problem.initial_distance, controls, reach)
     best_field, losses, least = field, [], []

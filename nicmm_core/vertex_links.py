@@ -9,22 +9,25 @@ from __future__ import annotations
 import numpy as np
 
 from .array_types import IntArray
+from .sign_bundle import SignBundle
 from .virtual_splits import WorkingMesh
 
 
 class VertexLinks:
     """Vertices round each vertex in order, found when first asked for."""
 
-    def __init__(self, working: WorkingMesh) -> None:
+    def __init__(self, working: WorkingMesh, bundle: SignBundle | None = None) -> None:
         corners = working.faces.ravel()
         self._by_vertex = np.argsort(corners, kind="stable") // 3
         self._start = np.searchsorted(np.sort(corners), np.arange(len(working.vertices) + 1))
         self._faces = working.faces
+        self._corner_sign = None if bundle is None else bundle.corner_sign
+        self._ends = frozenset() if bundle is None else frozenset(bundle.ends.tolist())
         self._link: dict[int, tuple[list[int], bool] | None] = {}
 
     def neighbours(self, vertex: int) -> list[int]:
         """Vertices joined to a vertex by an edge."""
-        faces = self._faces[self._by_vertex[self._start[vertex] : self._start[vertex + 1]]]
+        faces = self._faces[self._faces_at(vertex)]
         return [v for v in np.unique(faces).tolist() if v != vertex]
 
     def is_simple(self, vertex: int, sign: IntArray) -> bool:
@@ -37,14 +40,39 @@ class VertexLinks:
 
         A control vertex in the link is a zero, where the curve passes the link itself.
         """
+        if vertex in self._ends:
+            return self._sign_changes_round_end(vertex, sign)
         link = self._ordered(vertex)
         if link is None:
             return -1
         ring, closed = link
-        signs = [int(sign[v]) for v in ring if sign[v] != 0]
+        relative = self._relative_signs(vertex)
+        signs = [int(sign[v]) * relative.get(v, 1) for v in ring if sign[v] != 0]
         if closed:
             signs += signs[:1]
         return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+
+    def _relative_signs(self, vertex: int) -> dict[int, int]:
+        """Signs with which neighbours are read where the vertex itself is read as it is."""
+        if self._corner_sign is None:
+            return {}
+        relative: dict[int, int] = {}
+        for face in self._faces_at(vertex).tolist():
+            corners, signs = self._faces[face].tolist(), self._corner_sign[face].tolist()
+            own = signs[corners.index(vertex)]
+            relative.update((v, own * s) for v, s in zip(corners, signs, strict=True))
+        return relative
+
+    def _sign_changes_round_end(self, vertex: int, sign: IntArray) -> int:
+        """Faces at an end of an open curve whose other corners lie on different sides."""
+        around = self._faces_at(vertex)
+        assert self._corner_sign is not None  # ends are those of a bundle
+        local = self._corner_sign[around] * sign[self._faces[around]]
+        local[self._faces[around] == vertex] = 0
+        return int(((local == 1).any(axis=1) & (local == -1).any(axis=1)).sum())
+
+    def _faces_at(self, vertex: int) -> IntArray:
+        return self._by_vertex[self._start[vertex] : self._start[vertex + 1]]
 
     def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
         """The link as a path and whether it closes; None when the surface branches here."""
@@ -54,7 +82,7 @@ class VertexLinks:
 
     def _trace(self, vertex: int) -> tuple[list[int], bool] | None:
         joined: dict[int, list[int]] = {}
-        faces = self._faces[self._by_vertex[self._start[vertex] : self._start[vertex + 1]]]
+        faces = self._faces[self._faces_at(vertex)]
         for face in faces.tolist():
             a, b = (v for v in face if v != vertex)
             joined.setdefault(a, []).append(b)

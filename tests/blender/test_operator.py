@@ -302,13 +302,22 @@ def test_separate_parts_are_reported(empty_scene):
     assert str(unreachable.value) in reported_error()
 
 
-def test_open_curves_are_refused_for_now(empty_scene):
+def test_open_curve_is_not_cyclic(empty_scene):
+    """From the first vertex selected to the last; two are enough."""
     sphere = scenes.sphere()
-    vertices = scenes.ring(sphere, 4)
-    scenes.select(sphere, vertices)
-    with pytest.raises(empty_scene.core.NicmmError) as refused:
-        design(empty_scene.core, sphere, vertices, closed=False)
-    assert str(refused.value) in reported_error(closed=False)
+    for count in (2, 4):
+        vertices = scenes.ring(sphere, 4)[:count]
+        scenes.select(sphere, vertices)
+        expected = design(empty_scene.core, sphere, vertices, closed=False)
+
+        bpy.ops.nicmm.design_curve(closed=False)
+
+        curve = bpy.context.active_object
+        assert not curve.data.splines[0].use_cyclic_u
+        points = scenes.points(curve)
+        np.testing.assert_allclose(points, expected.curves[0].points, atol=ROUNDING)
+        ends = scenes.positions(sphere)[[vertices[0], vertices[-1]]]
+        np.testing.assert_allclose(points[[0, -1]], ends, atol=ROUNDING)
 
 
 @pytest.mark.parametrize(

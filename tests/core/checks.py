@@ -14,21 +14,21 @@ ROUNDING = 1e-12
 """Of barycentric coordinates, and of positions relative to the bounding-box diagonal."""
 
 
-def assert_valid_curve(mesh, curve, control_positions=None):
-    """A closed curve on the surface, simple, through the control points in cyclic order."""
+def assert_valid_curve(mesh, curve, control_positions=None, closed=True):
+    """A curve on the surface, simple, through the control points in order."""
     assert_lies_on_surface(mesh, curve)
-    assert curve.closed
+    assert curve.closed == closed
     assert len(curve.points) >= 3
     assert_does_not_touch_itself(mesh, curve)
     if control_positions is not None:
         assert_visits(mesh, curve, control_positions)
 
 
-def assert_valid_design(mesh, design, control_positions=None):
+def assert_valid_design(mesh, design, control_positions=None, closed=True):
     """A usable result: one valid curve, a finite field and every term of the energy."""
     assert design.status in (nicmm.Status.CONVERGED, nicmm.Status.ITERATION_LIMIT), design.status
     assert len(design.curves) == 1
-    assert_valid_curve(mesh, design.curves[0], control_positions)
+    assert_valid_curve(mesh, design.curves[0], control_positions, closed)
     assert design.field.shape == (len(mesh.vertices),)
     assert np.isfinite(design.field).all()
     assert set(design.energy) == {"sdf", "int", "smooth", "fea"}
@@ -86,6 +86,10 @@ def assert_visits(mesh, curve, control_positions):
         rtol=0,
         atol=ROUNDING * np.linalg.norm(np.ptp(mesh.vertices, axis=0)),
     )
+    if not curve.closed:
+        assert curve.control_index[0] == 0 and curve.control_index[-1] == len(curve.points) - 1
+        assert (np.diff(curve.control_index) > 0).all(), "control points are met out of order"
+        return
     ahead = np.roll(curve.control_index, -1) > curve.control_index
     assert len(set(curve.control_index.tolist())) == len(curve.control_index)
     # Walking round once, the index falls back only where the walk passes the polyline's start.

@@ -99,7 +99,6 @@ BAD_COMMANDS = {
     "repeated points": (["MESH", "--points", "3,60,3"], "same point"),
     "smoothness negative": (["MESH", "--points", CHOSEN, "--smoothness", "-1"], "smoothness"),
     "unknown method": (["MESH", "--points", CHOSEN, "--method", "magic"], "magic"),
-    "open": (["MESH", "--points", CHOSEN, "--open"], "closed"),
 }
 
 

@@ -375,7 +375,6 @@ BAD_CALLS = {
         nicmm.ControlPointError,
         r"^control_points\[2\] is off",
     ),
-    "open": ({"closed": False}, nicmm.NicmmError, "^closed"),
     "method": ({"method": "magic"}, nicmm.ArgumentError, "^method is 'magic'"),
     "method a list": ({"method": ["nicmm"]}, nicmm.ArgumentError, "^method"),
     "order": ({"order": "longest"}, nicmm.ArgumentError, "^order is 'longest'"),

@@ -56,11 +56,7 @@ def test_network_and_variational_method_reach_the_same_curve(method):
 def test_curves_are_valid_on_every_surface(surface):
     """One simple loop on the surface, exactly through the points."""
     points = np.random.default_rng(4).choice(len(surface.vertices), 4, replace=False)
-    try:
-        result = design(surface, points, order="shortest")
-    except nicmm.UnreachableError:
-        assert len(surface.vertices) == 36 * 18, "only the torus has loops that do not bound"
-        return
+    result = design(surface, points, order="shortest")
     assert_valid_design(surface, result)
     assert result.breaking_vertices == 0
     assert_valid_curve(surface, result.curves[0])
