@@ -22,6 +22,15 @@ QUICK_OUTPUT = RESULTS.parent / "quick"
 """Where quick and smoke runs write instead; not under version control."""
 
 
+INTRODUCTION = """# Results
+
+The paper's tables and figures measured again, and more: one section for each
+`python -m benchmarks NAME`, which writes it. Only ratios can be compared with the paper's times
+and losses: the machine is another, and so are the units of its weights. Where a result
+contradicts the paper, its section says so.
+"""
+
+
 def output_folder(scale: Scale) -> Path:
     """Folder for the figures of a run, made when it is missing."""
     folder = FIGURES if scale is Scale.FULL else QUICK_OUTPUT / "figures"
@@ -44,7 +53,7 @@ def write_section(name: str, title: str, body: str, scale: Scale) -> None:
     """
     path = RESULTS if scale is Scale.FULL else QUICK_OUTPUT / "RESULTS.md"
     path.parent.mkdir(parents=True, exist_ok=True)
-    text = path.read_text() if path.exists() else "# Results\n"
+    text = path.read_text() if path.exists() else INTRODUCTION
     section = f"## {title}\n\n{environment(name, scale)}\n\n{body.strip()}\n"
     begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->\n"
     block = begin + section + end
