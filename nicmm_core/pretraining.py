@@ -130,7 +130,10 @@ def pretrain(
             "optimiser": optimiser.state_dict(),
             "losses": losses,
         }
-        torch.save(state, checkpoint)
+        # An interruption while writing must not cost the checkpoint before.
+        partial = checkpoint.with_suffix(".partial")
+        torch.save(state, partial)
+        partial.replace(checkpoint)
     save_network(output, network)
     checkpoint.unlink(missing_ok=True)
     return losses
