@@ -14,9 +14,17 @@ from nicmm_core.mesh import Mesh
 from nicmm_core.network import CurveNetwork, NetworkConfig
 from nicmm_core.prediction import PredictionConfig, predict
 
-from . import collections, plots, report
+from . import collections, report
 from .scale import Scale
-from .solving import Runs, level_set, random_samples, run_networks, train, typical_weights
+from .solving import (
+    Runs,
+    least_losses_figure,
+    level_set,
+    random_samples,
+    run_networks,
+    train,
+    typical_weights,
+)
 
 SEED = 11
 TEST_SEED = 12
@@ -91,6 +99,9 @@ def run(scale: Scale) -> None:
     stops = _early_stops(
         {label: networks[label] for label in FEATURES}, name, mesh, scale.choose(10, 1), cap
     )
+    figure = least_losses_figure(
+        runs, "Networks without their modules (Table 3)", "ablation", scale
+    )
     body = (
         f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices. Every variant "
         f"is pretrained on the same {sets} sets (seed {SEED}) × {epochs} epochs with λ_smooth = "
@@ -100,7 +111,7 @@ def run(scale: Scale) -> None:
         "here. Sets have 3–5 random vertices, shortest order.\n\n"
         f"### Modules (Table 3)\n\n{len(runs[FULL].seconds)} sets (seed {TEST_SEED}), "
         f"{ITERATIONS} iterations.\n\n{_module_table(runs)}\n\n{_module_findings(runs)}\n\n"
-        f"{_plot(runs, scale)}\n\n"
+        f"{figure}\n\n"
         f"### Input features (Table 4)\n\n{len(stops[ALL_FEATURES])} sets (seed {FEATURE_SEED}), "
         f"with early stop.\n\n{_feature_table(stops, cap)}\n\n{_feature_findings(stops)}"
     )
@@ -205,7 +216,7 @@ def _early_stops(
         counts = ", ".join(f"{label} {stops[label][-1].iterations}" for label in networks)
         print(f"  {name}: {counts}, {time.perf_counter() - started:.0f} s", flush=True)
     if not stops[ALL_FEATURES]:
-        raise SystemExit("No set had a loop that bounds a region; there is nothing to measure")
+        raise SystemExit("No set had a simple loop through its points; there is nothing to measure")
     return stops
 
 
@@ -276,12 +287,3 @@ def _feature_findings(stops: Mapping[str, Sequence[Stop]]) -> str:
         f"The early stop does not count stillness before {PredictionConfig.least_iterations} "
         "iterations."
     )
-
-
-def _plot(runs: Mapping[str, Runs], scale: Scale) -> str:
-    path = plots.least_losses(
-        {label: one.least_losses for label, one in runs.items()},
-        "Networks without their modules (Table 3)",
-        report.output_folder(scale) / "ablation.png",
-    )
-    return report.figure(path, "Least loss so far against the iteration, mean of the sets")

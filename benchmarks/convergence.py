@@ -78,7 +78,7 @@ def run(scale: Scale) -> None:
     meshes = collections.surfaces(scale, scale.choose(8, 1))
     courses = [_followed(network, sample) for sample in random_samples(meshes, 1, SEED)]
     if not courses:
-        raise SystemExit("No set had a loop that bounds a region; there is nothing to follow")
+        raise SystemExit("No set had a simple loop through its points; there is nothing to follow")
     body = (
         f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order, "
         f"{collections.label(scale)}, shipped weights. Distances are mean / greatest in percent "

@@ -114,7 +114,7 @@ def run(scale: Scale) -> None:
         compared.append(Comparison(sample, with_loop, without))
         print(f"  {sample.name}: {report.listed(with_loop)}", flush=True)
     if not compared:
-        raise SystemExit("No set had a loop that bounds a region; there is nothing to compare")
+        raise SystemExit("No set had a simple loop through its points; there is nothing to compare")
     body = (
         f"Seed {SEED}, one set of 3–5 random vertices a mesh, on {len(compared)} meshes "
         f"({collections.label(scale)}: {report.listed(c.sample.name for c in compared)}), shipped "

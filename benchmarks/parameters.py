@@ -84,7 +84,7 @@ def run(scale: Scale) -> None:
             outcomes[key].append(outcome)
         print(f"  {sample.name}", flush=True)
     if not samples:
-        raise SystemExit("No set had a loop that bounds a region; there is nothing to vary")
+        raise SystemExit("No set had a simple loop through its points; there is nothing to vary")
     lowered = [sample.weights.smooth for sample in samples]
     body = (
         f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order, on "

@@ -9,9 +9,18 @@ import numpy as np
 from nicmm_core.losses import LossWeights
 from nicmm_core.weights_file import load_network
 
-from . import collections, plots, report
+from . import collections, report
 from .scale import Scale
-from .solving import Runs, Trained, random_samples, run_networks, train, typical_weights, untrained
+from .solving import (
+    Runs,
+    Trained,
+    least_losses_figure,
+    random_samples,
+    run_networks,
+    train,
+    typical_weights,
+    untrained,
+)
 
 SEED = 7
 TEST_SEED = 8
@@ -46,13 +55,16 @@ def run(scale: Scale) -> None:
     }
     samples = random_samples([(name, mesh)], scale.choose(50, 2, 2), TEST_SEED)
     runs = run_networks(networks, samples, ITERATIONS)
+    figure = least_losses_figure(
+        runs, "Prediction after different pretraining (Table 1)", "pretraining", scale
+    )
     body = (
         f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices; pretraining "
         f"on {sets} sets (seed {SEED}), test on {len(runs[UNTRAINED].seconds)} others (seed "
         f"{TEST_SEED}), 3–5 random vertices each, shortest order. Losses are the least so far, "
         "averaged over the test sets.\n\n"
         f"{_table(runs, trained)}\n\n{_findings(runs, trained, weights, fixed, sets)}\n\n"
-        f"{_plot(runs, scale)}"
+        f"{figure}"
     )
     report.write_section("pretraining", "Pretraining (Table 1)", body, scale)
 
@@ -139,12 +151,3 @@ def _verdict_on_gain(share: float) -> str:
     if share > 2.0 * PAPER["2 min"] / PAPER[UNTRAINED]:
         return "It helps, but far less than in the paper."
     return "It helps as in the paper."
-
-
-def _plot(runs: Mapping[str, Runs], scale: Scale) -> str:
-    path = plots.least_losses(
-        {label: one.least_losses for label, one in runs.items()},
-        "Prediction after different pretraining (Table 1)",
-        report.output_folder(scale) / "pretraining.png",
-    )
-    return report.figure(path, "Least loss so far against the iteration, mean of the test sets")

@@ -25,8 +25,10 @@ from nicmm_core.surface_points import locate_control_points
 from nicmm_core.topology import keep_topology
 from nicmm_core.weights_file import load_network
 
+from . import plots, report
 from .measures import diagonal, distances
 from .samples import random_sets
+from .scale import Scale
 
 TYPICAL_SETS = 9
 """Sets whose middle λ_smooth is taken for pretraining."""
@@ -58,7 +60,7 @@ class Sample:
 def random_samples(
     meshes: Iterable[tuple[str, Mesh]], per_mesh: int, seed: int
 ) -> Iterator[Sample]:
-    """Problems of `random_sets`; a set without a loop that bounds a region is named and skipped."""
+    """Problems of `random_sets`; a set without a simple loop is named and skipped."""
     for name, mesh, points in random_sets(meshes, per_mesh, seed):
         try:
             problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
@@ -176,11 +178,21 @@ def run_networks(
         last = ", ".join(f"{label} {losses[label][-1][-1]:.3f}" for label in networks)
         print(f"  {sample.name}: {last}", flush=True)
     if not smooth:
-        raise SystemExit("No set had a loop that bounds a region; there is nothing to measure")
+        raise SystemExit("No set had a simple loop through its points; there is nothing to measure")
     return {
         label: Runs(np.array(losses[label]), np.array(seconds[label]), np.array(smooth))
         for label in networks
     }
+
+
+def least_losses_figure(runs: Mapping[str, Runs], title: str, name: str, scale: Scale) -> str:
+    """Plot the least losses of several networks as ``name``.png; the picture in Markdown."""
+    path = plots.least_losses(
+        {label: one.least_losses for label, one in runs.items()},
+        title,
+        report.output_folder(scale) / f"{name}.png",
+    )
+    return report.figure(path, "Least loss so far against the iteration, mean of the sets")
 
 
 def _least_so_far(losses: list[float], length: int) -> FloatArray:

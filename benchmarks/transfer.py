@@ -9,9 +9,18 @@ import numpy as np
 from nicmm_core.losses import LossWeights
 from nicmm_core.weights_file import load_network
 
-from . import collections, plots, report
+from . import collections, report
 from .scale import Scale
-from .solving import Runs, Trained, random_samples, run_networks, train, typical_weights, untrained
+from .solving import (
+    Runs,
+    Trained,
+    least_losses_figure,
+    random_samples,
+    run_networks,
+    train,
+    typical_weights,
+    untrained,
+)
 
 SEED = 9
 TEST_SEED = 10
@@ -33,13 +42,14 @@ def run(scale: Scale) -> None:
     networks = {UNTRAINED: untrained(), ONE_MESH: trained.network, SHIPPED: load_network()}
     samples = random_samples(rest, scale.choose(10, 1), TEST_SEED)
     runs = run_networks(networks, samples, ITERATIONS)
+    figure = least_losses_figure(runs, "Prediction on other meshes (Table 2)", "transfer", scale)
     body = (
         f"Pretrained on {name}: {sets} sets (seed {SEED}) × {epochs} epochs, λ_smooth = "
         f"{weights.smooth:.2g}, the median of what designs on this mesh take. Tested on "
         f"{len(runs[UNTRAINED].seconds)} sets (seed {TEST_SEED}) of {len(rest)} other meshes "
         f"({collections.label(scale)}: {report.listed(label for label, _ in rest)}), 3–5 random "
         "vertices each, shortest order. Losses are the least so far, averaged over the sets.\n\n"
-        f"{_table(runs, trained)}\n\n{_findings(runs)}\n\n{_plot(runs, scale)}"
+        f"{_table(runs, trained)}\n\n{_findings(runs)}\n\n{figure}"
     )
     report.write_section("transfer", "Pretraining for other meshes (Table 2)", body, scale)
 
@@ -91,12 +101,3 @@ def _findings(runs: Mapping[str, Runs]) -> str:
         "Out of reach: 30 minutes of pretraining on an RTX 4090; here it has one core and less "
         "time."
     )
-
-
-def _plot(runs: Mapping[str, Runs], scale: Scale) -> str:
-    path = plots.least_losses(
-        {label: one.least_losses for label, one in runs.items()},
-        "Prediction on other meshes (Table 2)",
-        report.output_folder(scale) / "transfer.png",
-    )
-    return report.figure(path, "Least loss so far against the iteration, mean of the sets")

@@ -27,8 +27,8 @@ class FiniteElements:
     stiffness : (n, n) sparse array
         Cotangent stiffness: positive semidefinite, zero on constants.
     laplacian : (n, n) sparse array
-        Pointwise Laplacian, ``-stiffness / vertex_areas``; zero rows on the boundary, where the
-        stiffness holds the flux through it and not a second derivative.
+        Pointwise Laplacian, ``-stiffness / vertex_areas``; zero rows where asked, as on the
+        boundary, where the stiffness holds the flux through it and not a second derivative.
     centroid : (m, n) sparse array
         Value of a linear function at the centroid of each face.
     plain_centroid : (m, n) sparse array
@@ -47,7 +47,7 @@ class FiniteElements:
 def build_finite_elements(
     vertices: FloatArray,
     faces: IntArray,
-    on_boundary: BoolArray,
+    without_laplacian: BoolArray,
     bundle: SignBundle | None = None,
 ) -> FiniteElements:
     """Assemble the operators of a mesh (in double precision).
@@ -56,8 +56,8 @@ def build_finite_elements(
     ----------
     vertices : (n, 3) float array
     faces : (m, 3) int array
-    on_boundary : (n,) bool array
-        Vertices of edges with a single face.
+    without_laplacian : (n,) bool array
+        Vertices whose row of the Laplacian is left zero, as on the boundary.
     bundle : SignBundle, optional
         How the faces read the values of their corners.
     """
@@ -80,7 +80,7 @@ def build_finite_elements(
         at_corners = vertices[faces].reshape(-1, 3)
         stiffness = sparse.csr_array(reading.T @ (-igl.cotmatrix(at_corners, apart)) @ reading)
         gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
-    inside = np.where(on_boundary, 0.0, 1.0 / vertex_areas)
+    inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)
     return FiniteElements(
         face_areas=face_areas,
         vertex_areas=vertex_areas,

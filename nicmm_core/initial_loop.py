@@ -1,4 +1,4 @@
-"""The initial loop (section 3.1): a closed path of mesh edges through the control points.
+"""The initial path (section 3.1): mesh edges through the control points, closed or open.
 
 Plain shortest paths between consecutive points share edges and cross, and then no signed
 distance belongs to them. Here each path avoids every vertex that an earlier one took, and where

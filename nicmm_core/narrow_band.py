@@ -19,6 +19,7 @@ from .losses import (
     LossWeights,
     bending_residual,
     feature_residual,
+    root_delta,
     slope_residual,
 )
 from .problem import Problem
@@ -162,8 +163,8 @@ def gauss_newton_system(
     slope = along @ band.gradient
     # √G has the derivative -φ / (2 σ²) √G.
     decay = -residuals.centroid / (2.0 * band.delta_width**2)
-    root_delta = feature_residual(1.0, residuals.centroid, band.delta_width)
-    bending = _rows(root_delta, band.laplacian) + _rows(residuals.bending * decay, band.centroid)
+    delta = root_delta(residuals.centroid, band.delta_width)
+    bending = _rows(delta, band.laplacian) + _rows(residuals.bending * decay, band.centroid)
     terms = [
         (weights.sdf * band.face_areas, slope, residuals.slope),
         (weights.smooth * band.inner_areas, bending, residuals.bending),

@@ -138,8 +138,8 @@ def build_problem(
     if side is None:
         bundle = build_sign_bundle(working, loop)
         side = bundle.side
-        no_laplacian = working.on_boundary | _near_ends(working, loop)
-        elements = build_finite_elements(vertices, working.faces, no_laplacian, bundle)
+        without_laplacian = working.on_boundary | _near_ends(working, loop)
+        elements = build_finite_elements(vertices, working.faces, without_laplacian, bundle)
     distance = signed_distance(plain, loop, edge_length, side)
     length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
     smoother = build_smoother(
