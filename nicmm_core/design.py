@@ -1,7 +1,7 @@
 """The main path: from a mesh and control points to a curve. Read this file first.
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
-→ prediction → one loop through the points → contour.
+→ prediction → one loop through the points → contour → relaxation of the curve.
 """
 
 from __future__ import annotations

@@ -55,6 +55,30 @@ class Mesh:
         return triangle_areas(self.vertices, self.faces)
 
     @cached_property
+    def face_normals(self) -> FloatArray:
+        """Unit normal of each face, shape (F, 3); zero where it has no area."""
+        corner = self.vertices[self.faces]
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return normal / np.where(length > 0.0, length, 1.0)
+
+    @cached_property
+    def face_neighbours(self) -> IntArray:
+        """The face beyond the side opposite each corner, shape (F, 3).
+
+        -1 where there is none, or where more than two faces have the side.
+        """
+        n_faces = len(self.faces)
+        low, high = np.sort(self.faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1).T
+        keys = low * (int(self.faces.max()) + 1) + high  # side 3 f + j of face f, corner j
+        order = np.argsort(keys, kind="stable")
+        _, first, count = np.unique(keys[order], return_index=True, return_counts=True)
+        one, other = order[first[count == 2]], order[first[count == 2] + 1]
+        neighbours = np.full(3 * n_faces, -1)
+        neighbours[one], neighbours[other] = other // 3, one // 3
+        return neighbours.reshape(n_faces, 3)
+
+    @cached_property
     def mean_edge_length(self) -> float:
         """Mean length of the edges, in mesh units."""
         start, end = unique_edges(self.faces)[0].T
@@ -126,6 +150,15 @@ def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
     # One key an edge: unique rows of a two-column array would take several times as long.
     keys, count = np.unique(low * size + high, return_counts=True)
     return np.stack([keys // size, keys % size], axis=1), count
+
+
+def unoriented_vertices(faces: IntArray) -> IntArray:
+    """Vertices of edges that two faces run along in the same direction, ascending."""
+    size = int(faces.max()) + 1
+    start, end = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
+    directed, count = np.unique(start * size + end, return_counts=True)
+    twice = directed[count > 1]
+    return np.unique([twice // size, twice % size])
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:

@@ -83,7 +83,7 @@ def redistanced(
     distance[zero_vertices] = 0.0
     if not np.isfinite(distance).any():
         return field.copy()
-    _spread(surface, distance, limit)
+    spread(surface, distance, limit)
     distance = np.maximum(distance, LEAST_DISTANCE * surface.edge_length)
     reached = np.isfinite(distance)
     distance[~reached] = distance[reached].max()
@@ -100,20 +100,21 @@ def _distance_at_the_curve(
     distance = np.full(len(field), np.inf)
     for corner in range(3):
         vertex = surface.faces[crossed[face], corner]
-        to_segment = _distance_to_segment(surface.vertices[vertex], start[segment], end[segment])
+        to_segment = distance_to_segments(surface.vertices[vertex], start[segment], end[segment])
         np.minimum.at(distance, vertex, to_segment)
     return distance
 
 
-def _distance_to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distance of each point to its segment, all of shape (p, 3)."""
     along = end - start
     squared = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
     share = np.clip(((points - start) * along).sum(axis=1) / squared, 0.0, 1.0)
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def _spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
-    """Lower distances by waves from the vertices that have one, as far as the limit."""
+def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
+    """Lower distances, in place, by waves from the vertices that have one, up to the limit."""
     settled = np.isfinite(distance)  # at the curve they are exact
     changed = np.flatnonzero(settled)
     least_gain = SETTLED * surface.edge_length

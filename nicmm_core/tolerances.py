@@ -14,3 +14,6 @@ COINCIDENT = 1e-9
 
 BARYCENTRIC_SUM = 1e-6
 """How far the barycentric coordinates that a caller gives may be from summing to one."""
+
+INSIDE = 1e-6
+"""Least barycentric coordinate of a point that has to lie strictly inside its face."""
