@@ -7,6 +7,7 @@ the boundary. So there is a way wherever the surface is still connected, however
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -97,9 +98,11 @@ class _Patch:
         Sorted.
     on_rim, branching : (E,) bool array
         Edges of one face, and of more than two.
+    positions : (n + E, 3) float array
+        Of the nodes.
+    weight : (n + E,) float array
+        Squared importance at the nodes.
     arcs : (a, 2) int array
-    lengths : (a,) float array
-        Of the arcs, weighted by importance.
     through_midpoints : (a,) bool array
     """
 
@@ -107,22 +110,43 @@ class _Patch:
     edges: IntArray
     on_rim: BoolArray
     branching: BoolArray
+    positions: FloatArray
+    weight: FloatArray
     arcs: IntArray
-    lengths: FloatArray
     through_midpoints: BoolArray
 
     @property
     def size(self) -> int:
         return len(self.vertices) + len(self.edges)
 
-    def graph(self, lengths: FloatArray, kept: BoolArray | None = None) -> sparse.csr_array:
-        """The arcs, or those that are kept, as a symmetric matrix."""
-        arcs = self.arcs
-        if kept is not None:
-            arcs, lengths = arcs[kept], lengths[kept]
-        rows, columns = np.concatenate([arcs, arcs[:, ::-1]]).T
-        entries = (np.concatenate([lengths, lengths]), (rows, columns))
-        return sparse.csr_array(sparse.coo_array(entries, shape=(self.size, self.size)))
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of the arcs, weighted by importance, shape (a,)."""
+        return self.step_lengths(self.arcs)
+
+    def step_lengths(self, steps: IntArray) -> FloatArray:
+        """Weighted lengths of pairs of nodes (s, 2), shape (s,)."""
+        start, end = steps.T
+        apart = np.linalg.norm(self.positions[start] - self.positions[end], axis=1)
+        return apart * (0.5 * (self.weight[start] + self.weight[end]))
+
+    def graph(self, lengths: FloatArray) -> sparse.csr_array:
+        """The arcs as a symmetric matrix; one with an infinite length cannot be passed."""
+        arc, indices, indptr = self._structure
+        return sparse.csr_array((lengths[arc], indices, indptr), shape=(self.size, self.size))
+
+    @cached_property
+    def _structure(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The arc of each matrix entry, then the entries' columns and where rows start."""
+        arc = np.arange(len(self.arcs))
+        rows, columns = np.concatenate([self.arcs, self.arcs[:, ::-1]]).T
+        entries = sparse.coo_array(
+            (np.concatenate([arc, arc]), (rows, columns)), shape=(self.size, self.size)
+        )
+        # Two faces with the same corners give arcs twice, whose numbers must not be added.
+        entries.has_canonical_format = True
+        matrix = entries.tocsr()
+        return matrix.data, matrix.indices, matrix.indptr
 
     def places(self, vertices: IntArray) -> IntArray:
         """Nodes of vertices of the split mesh, without those that are not here."""
@@ -171,6 +195,7 @@ class LegSearch:
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
         np.maximum.at(self._longest_edge, mesh.faces, sides[:, None])
+        self._kept: tuple[int, _Patch] | None = None
         self._least_factor = 1.0
         if importance is not None:
             self._least_factor = min(1.0, max(float((importance**2).min()), LEAST_WEIGHT))
@@ -190,7 +215,7 @@ class LegSearch:
             inside = self._component & near[self._mesh.faces].any(axis=1)
             whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
             limit = np.inf if whole else self._least_factor * reach
-            patch = self._patch(self._component if whole else inside)
+            patch = self._whole() if whole else self._patch(inside)
             leg = self._search(patch, source, target, obstacles, limit)
             if leg is not None or whole:
                 return leg
@@ -198,11 +223,14 @@ class LegSearch:
 
     def are_joinable(self, pairs: list[tuple[int, int]], obstacles: Obstacles) -> bool:
         """Whether each pair of vertices has a way, every one for itself."""
-        patch = self._patch(self._component)
+        patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
-        kept = free[patch.arcs].all(axis=1)
-        _, label = csgraph.connected_components(patch.graph(patch.lengths, kept), directed=False)
-        whole = patch.graph(np.ones(len(patch.arcs)))
+        free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
+        entries = (np.ones(len(free_arcs)), (free_arcs[:, 0], free_arcs[:, 1]))
+        _, label = csgraph.connected_components(
+            sparse.coo_array(entries, shape=(patch.size, patch.size)), directed=False
+        )
+        whole = patch.graph(patch.lengths)
 
         def reached(vertex: int) -> set[int]:
             (place,) = patch.places(np.array([vertex]))
@@ -225,17 +253,25 @@ class LegSearch:
 
         (here,), (there,) = (patch.places(np.array([vertex])) for vertex in (source, target))
         free = self._free(patch, obstacles, np.array([here, there]))
-        graph = patch.graph(lengths, free[patch.arcs].all(axis=1))
-        _, previous = csgraph.dijkstra(graph, indices=here, return_predecessors=True, limit=limit)
+        lengths[~free[patch.arcs].all(axis=1)] = np.inf
+        _, previous = csgraph.dijkstra(
+            patch.graph(lengths), indices=here, return_predecessors=True, limit=limit
+        )
         if previous[there] < 0:
             return None
         places = [int(there)]
         while places[-1] != here:
             places.append(int(previous[places[-1]]))
         places = self._without_crossing(patch, places[::-1])
-        steps = patch.graph(patch.lengths)
-        length = float(sum(steps[a, b] for a, b in zip(places[:-1], places[1:], strict=True)))
+        steps = np.stack([places[:-1], places[1:]], axis=1)
+        length = float(patch.step_lengths(steps).sum())
         return Leg([patch.node(place) for place in places], length)
+
+    def _whole(self) -> _Patch:
+        """The component, kept until something is split."""
+        if self._kept is None or self._kept[0] != self._split.n_faces:
+            self._kept = self._split.n_faces, self._patch(self._component)
+        return self._kept[1]
 
     def _patch(self, inside: BoolArray) -> _Patch:
         """Graph of the living faces in some input faces.
@@ -267,18 +303,19 @@ class LegSearch:
                 side_node[:, [2, 0]],
             ]
         )
-        lengths = np.linalg.norm(node_position[arcs[:, 0]] - node_position[arcs[:, 1]], axis=1)
+        weight = np.ones(len(node_position))
         if self._importance is not None:
             importance = self._importance_at(vertices)
             at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
-            lengths *= np.maximum(at_nodes**2, LEAST_WEIGHT)[arcs].mean(axis=1)
+            weight = np.maximum(at_nodes**2, LEAST_WEIGHT)
         return _Patch(
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
             branching=count > 2,
+            positions=node_position,
+            weight=weight,
             arcs=arcs,
-            lengths=lengths,
             through_midpoints=np.arange(len(arcs)) >= len(midpoint),
         )
 

@@ -79,12 +79,30 @@ class Legs:
         closed = self.count == len(self._waypoints)
         return path if closed else [*path, self._waypoints[-1]]
 
-    def unhindered_lengths(self) -> FloatArray:
-        """Length that each leg would have if there were no others, shape (number of legs,)."""
+    @property
+    def lengths(self) -> dict[int, float]:
+        """Length of each leg that is laid."""
+        return dict(self._length)
+
+    def unhindered_lengths(self, laid: dict[int, float], straight: float) -> FloatArray:
+        """Length that each leg would have if there were no others, shape (number of legs,).
+
+        Parameters
+        ----------
+        laid : dict of int to float
+            Lengths that legs came to have beside one another.
+        straight : float
+            Ratio to the distance of its ends in space up to which a leg laid is taken to be one
+            that nothing hindered.
+        """
         nothing = np.zeros(0, dtype=np.int64)
         free = Obstacles(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
         lengths = np.zeros(self.count)
         for leg in range(self.count):
+            start, end = (self._split.position(vertex) for vertex in self.ends(leg))
+            lengths[leg] = laid.get(leg, np.inf)
+            if lengths[leg] <= straight * np.linalg.norm(end - start):
+                continue
             for vertex in self.ends(leg):
                 self._open_corners(vertex)
             way = self._search.shortest(*self.ends(leg), free)

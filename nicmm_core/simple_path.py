@@ -84,6 +84,8 @@ def lay_path(
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
     clearance *= min(1.0, (ROOMY / len(points)) ** 0.5)
     generator = np.random.default_rng(0)
+    laid: dict[int, float] = {}
+    unhindered = np.zeros(0)
     best: Path | None = None
     failure: UnreachableError | None = None
     for attempt in range(MOST_TRIES):
@@ -94,7 +96,7 @@ def lay_path(
         legs = Legs(split, search, waypoints.tolist(), closed)
         sequence = np.arange(legs.count)
         if attempt == 1:
-            unhindered = legs.unhindered_lengths()
+            unhindered = legs.unhindered_lengths(laid, LONG)
             if best is not None and best.length <= LONG * unhindered.sum():
                 break
         if attempt >= 1:
@@ -103,8 +105,9 @@ def lay_path(
         try:
             done = legs.lay_all(sequence.tolist(), np.inf if best is None else best.length)
         except UnreachableError as error:
-            failure = error
-            continue
+            failure, done = error, False
+        if attempt == 0:
+            laid = legs.lengths
         if done:
             best = Path(split, legs.vertices, waypoints, legs.length)
     if best is not None:

@@ -141,6 +141,11 @@ class SplitMesh:
         """Vertices of the input mesh and new ones."""
         return len(self._mesh.vertices) + len(self._new_weights)
 
+    @property
+    def n_faces(self) -> int:
+        """Faces of the input mesh and new ones, living or not."""
+        return len(self._mesh.faces) + len(self._new_faces)
+
     def living_faces(self, inside: BoolArray) -> IntArray:
         """Corners of the faces that lie in some of the input faces, shape (m, 3).
 
