@@ -11,6 +11,7 @@ from .design import METHODS
 from .errors import ArgumentError, NicmmError
 from .files import check_curve_path, read_mesh, write_curve, write_mesh
 from .initial_loop import ORDERS
+from .via_points import parse_via_points
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -36,6 +37,13 @@ def _parser() -> argparse.ArgumentParser:
     design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
     design.add_argument("--open", action="store_true", help="end at the last point")
     design.add_argument("--order", choices=ORDERS, default="given")
+    design.add_argument(
+        "--via",
+        action="append",
+        default=[],
+        metavar="I:A,B",
+        help="vertices that the curve is led by after the I-th of the points, from 0; repeatable",
+    )
     design.add_argument("--method", choices=METHODS, default="nicmm")
     design.add_argument("--smoothness", type=float, default=1.0)
     design.set_defaults(run=_design)
@@ -71,6 +79,7 @@ def _design(options: argparse.Namespace) -> None:
         points,
         closed=not options.open,
         order=options.order,
+        via_points=parse_via_points(options.via) or None,
         method=options.method,
         smoothness=options.smoothness,
     )

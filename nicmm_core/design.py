@@ -26,6 +26,7 @@ from .mesh import Mesh, real_array
 from .problem import Problem, build_problem
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
+from .via_points import ViaPoints
 
 if TYPE_CHECKING:
     from .network import CurveNetwork
@@ -119,6 +120,7 @@ class Designer:
         *,
         closed: bool = True,
         order: str = "given",
+        via_points: ViaPoints | None = None,
         method: str = "nicmm",
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
@@ -141,6 +143,7 @@ class Designer:
             _checked_map("alignment", alignment, self.mesh),
             _checked_smoothness(smoothness),
             closed,
+            via_points,
         )
         return self._solve(problem, method, float(smoothness), progress, started)
 
@@ -222,6 +225,7 @@ def design_curve(
     *,
     closed: bool = True,
     order: str = "given",
+    via_points: ViaPoints | None = None,
     method: str = "nicmm",
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
@@ -240,6 +244,11 @@ def design_curve(
         A closed curve, or an open one from the first point visited to the last.
     order : {"given", "shortest"}
         Visit the points in this order, or in the shortest one: cyclic where the curve is closed.
+    via_points : mapping, optional
+        Which way the curve goes from one control point to the next, where there are several: from
+        the index of a control point to points, in any form that control points may have, that the
+        initial path passes on its way from there, such as ``{1: [57]}``. The curve does not pass
+        them exactly. Only for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
         The network of the paper (both names are the same for now), or the same energy minimised
         without a network.
@@ -260,7 +269,7 @@ def design_curve(
     ControlPointError
         If there are too few points, or one is repeated, out of range or off the surface.
     UnreachableError
-        If no such curve exists on the surface.
+        If no such curve exists on the surface, or only one that winds round itself too often.
     ArgumentError
         If another argument cannot be used.
     MissingPackageError
@@ -279,6 +288,7 @@ def design_curve(
         control_points,
         closed=closed,
         order=order,
+        via_points=via_points,
         method=method,
         obstacles=obstacles,
         alignment=alignment,

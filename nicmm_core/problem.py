@@ -29,6 +29,7 @@ from .smoothing import Smoother, build_smoother
 from .sparse_solver import DEGENERATE
 from .surface_points import SurfacePoints
 from .topology import keep_topology
+from .via_points import ViaPoints
 from .virtual_splits import WorkingMesh
 
 SMOOTHING_LENGTH = 1.5
@@ -99,6 +100,7 @@ def build_problem(
     alignment: FloatArray | None = None,
     smoothness: float = 1.0,
     closed: bool = True,
+    via_points: ViaPoints | None = None,
 ) -> Problem:
     """Everything that comes before the network.
 
@@ -114,6 +116,8 @@ def build_problem(
         Multiplies the weight of bending in the smoothing of φ₀, the fourth power of its length.
     closed : bool
         Whether the curve returns from the last point to the first.
+    via_points : mapping, optional
+        From the index of a control point to points that steer the initial path from there.
 
     Raises
     ------
@@ -128,7 +132,7 @@ def build_problem(
     importance = None
     if obstacles is not None or alignment is not None:
         importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
-    working, loop = build_initial_loop(mesh, points, order, importance, closed)
+    working, loop = build_initial_loop(mesh, points, order, importance, closed, via_points)
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
     edge_length = loop.edge_length / unit

@@ -66,28 +66,47 @@ def locate_control_points(
     UnreachableError
         If the points lie on different components of the mesh.
     """
-    if isinstance(control_points, SurfacePoints):
-        points = _checked_surface_points(mesh, control_points)
-    else:
-        try:
-            given = np.asarray(control_points)
-        except ValueError as error:
-            raise ControlPointError(f"control_points is ragged ({error}); {_FORMS}") from error
-        if given.size == 0:
-            points = SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
-        elif given.ndim == 1 and np.issubdtype(given.dtype, np.integer):
-            points = _points_at_vertices(mesh, given.astype(np.int64))
-        elif given.ndim == 2 and given.shape[1] == 3 and _is_real(given):
-            points = _points_in_space(mesh, given.astype(np.float64))
-        else:
-            raise ControlPointError(
-                f"control_points has shape {given.shape} and type {given.dtype}; {_FORMS}"
-            )
+    points = locate_points(mesh, control_points, "control_points")
     _check_count(len(points), closed)
-    points = _snapped(points)
-    _check_distinct(mesh, points)
-    _check_one_component(mesh, points)
+    names = [f"control_points[{index}]" for index in range(len(points))]
+    check_distinct(mesh, points, names)
+    check_one_component(mesh, points, names)
     return points
+
+
+def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> SurfacePoints:
+    """Bring any number of points to faces and barycentrics, each checked for itself.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    given : (k,) int array_like, (k, 3) float array_like or SurfacePoints
+    name : str
+        Of the argument, for messages.
+
+    Returns
+    -------
+    SurfacePoints
+        With coordinates below `tolerances.SNAP` set to exactly zero.
+
+    Raises
+    ------
+    ControlPointError
+        If a point is out of range or off the surface.
+    """
+    if isinstance(given, SurfacePoints):
+        return _snapped(_checked_surface_points(mesh, given, name))
+    try:
+        values = np.asarray(given)
+    except ValueError as error:
+        raise ControlPointError(f"{name} is ragged ({error}); {_FORMS}") from error
+    if values.size == 0:
+        return SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
+    if values.ndim == 1 and np.issubdtype(values.dtype, np.integer):
+        return _snapped(_points_at_vertices(mesh, values.astype(np.int64), name))
+    if values.ndim == 2 and values.shape[1] == 3 and _is_real(values):
+        return _snapped(_points_in_space(mesh, values.astype(np.float64), name))
+    raise ControlPointError(f"{name} has shape {values.shape} and type {values.dtype}; {_FORMS}")
 
 
 _FORMS = "pass vertex indices (k,), points on the surface (k, 3) or SurfacePoints"
@@ -97,23 +116,23 @@ def _is_real(values: NDArray[Any]) -> bool:
     return np.issubdtype(values.dtype, np.integer) or np.issubdtype(values.dtype, np.floating)
 
 
-def _checked_surface_points(mesh: Mesh, given: SurfacePoints) -> SurfacePoints:
+def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> SurfacePoints:
     try:
         faces = np.asarray(given.faces)
         barycentric = real_array(given.barycentric)
     except (TypeError, ValueError) as error:
-        raise ControlPointError(f"control_points cannot be read ({error}); {_FORMS}") from error
+        raise ControlPointError(f"{name} cannot be read ({error}); {_FORMS}") from error
     if faces.ndim != 1 or not (faces.size == 0 or np.issubdtype(faces.dtype, np.integer)):
         raise ControlPointError(
-            f"control_points.faces has shape {faces.shape} and type {faces.dtype}; pass face "
+            f"{name}.faces has shape {faces.shape} and type {faces.dtype}; pass face "
             "indices of shape (k,)"
         )
     if barycentric.shape != (len(faces), 3):
         raise ControlPointError(
-            f"control_points.barycentric has shape {barycentric.shape}; pass ({len(faces)}, 3), "
+            f"{name}.barycentric has shape {barycentric.shape}; pass ({len(faces)}, 3), "
             "one row a face"
         )
-    _check_range("control_points.faces", faces, len(mesh.faces), "faces")
+    _check_range(f"{name}.faces", faces, len(mesh.faces), "faces")
     sums = barycentric.sum(axis=1)
     bad = (
         ~np.isfinite(barycentric).all(axis=1)
@@ -123,18 +142,18 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints) -> SurfacePoints:
     if bad.any():
         first = int(bad.argmax())
         raise ControlPointError(
-            f"control_points.barycentric[{first}] = {barycentric[first].tolist()} is no point of "
+            f"{name}.barycentric[{first}] = {barycentric[first].tolist()} is no point of "
             "its face; coordinates must not be negative and must sum to 1"
         )
     return SurfacePoints(faces.astype(np.int64), barycentric)
 
 
-def _points_at_vertices(mesh: Mesh, indices: IntArray) -> SurfacePoints:
-    _check_range("control_points", indices, len(mesh.vertices), "vertices")
+def _points_at_vertices(mesh: Mesh, indices: IntArray, name: str) -> SurfacePoints:
+    _check_range(name, indices, len(mesh.vertices), "vertices")
     loose = ~mesh.referenced[indices]
     if loose.any():
         raise ControlPointError(
-            f"control_points[{int(loose.argmax())}] = {indices[loose][0]} is a vertex that no "
+            f"{name}[{int(loose.argmax())}] = {indices[loose][0]} is a vertex that no "
             "face uses, so it is off the surface; choose a vertex of a face"
         )
     around = mesh.vertex_faces
@@ -143,11 +162,11 @@ def _points_at_vertices(mesh: Mesh, indices: IntArray) -> SurfacePoints:
     return SurfacePoints(faces, barycentric)
 
 
-def _points_in_space(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
+def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoints:
     bad = ~np.isfinite(positions).all(axis=1)
     if bad.any():
         raise ControlPointError(
-            f"control_points[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
+            f"{name}[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
         )
     squared, faces, nearest = igl.point_mesh_squared_distance(positions, mesh.vertices, mesh.faces)
     distance = np.sqrt(np.atleast_1d(squared))
@@ -155,7 +174,7 @@ def _points_in_space(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
     if off.any():
         first = int(off.argmax())
         raise ControlPointError(
-            f"control_points[{first}] is off the surface by {distance[first]:.3g}, more than "
+            f"{name}[{first}] is off the surface by {distance[first]:.3g}, more than "
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
         )
     faces = np.atleast_1d(faces).astype(np.int64)
@@ -164,7 +183,7 @@ def _points_in_space(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
     degenerate = ~np.isfinite(barycentric).all(axis=1)
     if degenerate.any():
         raise ControlPointError(
-            f"control_points[{int(degenerate.argmax())}] lies in a face without area "
+            f"{name}[{int(degenerate.argmax())}] lies in a face without area "
             f"({int(faces[degenerate][0])}); remove such faces or choose another point"
         )
     barycentric = np.clip(barycentric, 0.0, None)
@@ -195,24 +214,26 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
     return SurfacePoints(points.faces, barycentric / barycentric.sum(axis=1, keepdims=True))
 
 
-def _check_distinct(mesh: Mesh, points: SurfacePoints) -> None:
+def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
+    """Refuse two points that are the same."""
     positions = points.positions(mesh)
     separation = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     same = np.triu(separation <= tolerances.COINCIDENT * mesh.diagonal, k=1)
     if same.any():
         first, second = (int(i[0]) for i in np.nonzero(same))
         raise ControlPointError(
-            f"control_points[{first}] and control_points[{second}] are the same point; "
+            f"{names[first]} and {names[second]} are the same point; "
             "remove one of them (a closed curve returns to its first point by itself)"
         )
 
 
-def _check_one_component(mesh: Mesh, points: SurfacePoints) -> None:
+def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
+    """Refuse points on different components."""
     component = mesh.face_component[points.faces]
     other = component != component[0]
     if other.any():
         raise UnreachableError(
-            f"control_points[0] and control_points[{int(other.argmax())}] lie on different "
+            f"{names[0]} and {names[int(other.argmax())]} lie on different "
             "components of the mesh, so no curve joins them; join the components or merge "
             "vertices by distance"
         )

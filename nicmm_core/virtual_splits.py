@@ -92,7 +92,9 @@ class SplitMesh:
         self._new_weights: list[Weights] = []
         self._new_faces: list[tuple[int, int, int]] = []
         self._new_parents: list[int] = []
-        self._dead: set[int] = set()
+        self._new_positions: list[FloatArray] = []
+        self._alive = np.ones(len(mesh.faces), dtype=bool)
+        self._new_alive = bytearray()
         self._faces_around: dict[int, set[int]] = {}
         self._children: dict[int, set[int]] = {}
 
@@ -119,9 +121,41 @@ class SplitMesh:
 
     def position(self, vertex: int) -> FloatArray:
         """Where a vertex is in space, shape (3,)."""
-        weights = self.weights(vertex)
-        corners = self._mesh.vertices[list(weights)]
-        return np.fromiter(weights.values(), dtype=np.float64) @ corners
+        n_input = len(self._mesh.vertices)
+        return (
+            self._new_positions[vertex - n_input]
+            if vertex >= n_input
+            else self._mesh.vertices[vertex]
+        )
+
+    def positions(self, vertices: IntArray) -> FloatArray:
+        """Where several vertices are, shape (q, 3)."""
+        n_input = len(self._mesh.vertices)
+        result = self._mesh.vertices[np.minimum(vertices, n_input - 1)]
+        for place in np.flatnonzero(vertices >= n_input).tolist():
+            result[place] = self._new_positions[vertices[place] - n_input]
+        return result
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the input mesh and new ones."""
+        return len(self._mesh.vertices) + len(self._new_weights)
+
+    @property
+    def n_faces(self) -> int:
+        """Faces of the input mesh and new ones, living or not."""
+        return len(self._mesh.faces) + len(self._new_faces)
+
+    def living_faces(self, inside: BoolArray) -> IntArray:
+        """Corners of the faces that lie in some of the input faces, shape (m, 3).
+
+        Parameters
+        ----------
+        inside : (F,) bool array
+            Which of the input faces.
+        """
+        new, parents = self._living_new_faces()
+        return np.concatenate([self._mesh.faces[inside & self._alive], new[inside[parents]]])
 
     def neighbours(self, vertex: int) -> set[int]:
         """Vertices joined to a vertex by an edge."""
@@ -189,12 +223,8 @@ class SplitMesh:
             The working vertex of each vertex of this mesh, or -1 when it is on another component.
         """
         mesh = self._mesh
-        alive = mesh.face_component == component
-        alive[[face for face in self._dead if face < len(mesh.faces)]] = False
-        kept = np.flatnonzero(alive)
-        new = [i for i in range(len(self._new_faces)) if i + len(mesh.faces) not in self._dead]
-        new_faces = np.array([self._new_faces[i] for i in new], dtype=np.int64).reshape(-1, 3)
-        new_parents = np.array([self._new_parents[i] for i in new], dtype=np.int64)
+        kept = np.flatnonzero(self._alive & (mesh.face_component == component))
+        new_faces, new_parents = self._living_new_faces()
 
         faces = np.concatenate([mesh.faces[kept], new_faces])
         used = np.unique(faces)
@@ -248,7 +278,7 @@ class SplitMesh:
     ) -> tuple[int, FloatArray]:
         """Find the living face inside an input face that holds a point, and its coordinates."""
         best: tuple[int, FloatArray] = (input_face, barycentric)
-        if input_face not in self._dead:
+        if self._alive[input_face]:
             return best
         best_inside = -np.inf
         for face in sorted(self._children[input_face]):
@@ -282,9 +312,18 @@ class SplitMesh:
         self._replace_face(face, [(a, b, middle), (b, c, middle), (c, a, middle)])
         return middle
 
+    def _living_new_faces(self) -> tuple[IntArray, IntArray]:
+        """Corners and input face of the faces that splits have made and that are left."""
+        new = np.flatnonzero(np.frombuffer(bytes(self._new_alive), dtype=bool))
+        faces = np.array(self._new_faces, dtype=np.int64).reshape(-1, 3)
+        parents = np.array(self._new_parents, dtype=np.int64)
+        return faces[new], parents[new]
+
     def _add_vertex(self, weights: Weights) -> int:
-        vertex = len(self._mesh.vertices) + len(self._new_weights)
+        vertex = self.n_vertices
         self._new_weights.append(weights)
+        corners = self._mesh.vertices[list(weights)]
+        self._new_positions.append(np.fromiter(weights.values(), dtype=np.float64) @ corners)
         self._faces_around[vertex] = set()
         return vertex
 
@@ -298,13 +337,17 @@ class SplitMesh:
         parent = self._parent(face)
         siblings = self._children.setdefault(parent, set())
         siblings.discard(face)
-        self._dead.add(face)
+        if face < n_input:
+            self._alive[face] = False
+        else:
+            self._new_alive[face - n_input] = False
         for corner in self.corners(face):
             self.faces_around(corner).discard(face)
         for a, b, c in children:
             child = n_input + len(self._new_faces)
             self._new_faces.append((a, b, c))
             self._new_parents.append(parent)
+            self._new_alive.append(True)
             siblings.add(child)
             for corner in (a, b, c):
                 self.faces_around(corner).add(child)

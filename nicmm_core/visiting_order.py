@@ -9,6 +9,9 @@ from .array_types import FloatArray, IntArray
 EXACT_UP_TO = 9
 """Tours of more points are improved by exchanges instead of being optimal (2^k states)."""
 
+LONGEST_MOVE = 3
+"""Points that are moved to another place of the tour together, at most."""
+
 
 def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
     """Order that makes the tour through all points short, starting at point 0.
@@ -24,7 +27,8 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
     -------
     (k,) int array
         Optimal for up to `EXACT_UP_TO` points (Held and Karp 1962); beyond, the nearest
-        neighbour's tour improved until no reversal of a stretch shortens it (2-opt, Croes 1958).
+        neighbour's tour improved until no reversal of a stretch (2-opt, Croes 1958) and no move of
+        up to three points to another place (Or 1976) shortens it.
     """
     if not closed:
         # An open tour is a closed one through an extra point at distance zero from all.
@@ -32,7 +36,7 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
         return shortest_order(padded, closed=True)[1:] - 1
     if len(distance) <= EXACT_UP_TO:
         return _held_karp(distance)
-    return _two_opt(distance, _nearest_neighbour(distance))
+    return _improved(distance, _nearest_neighbour(distance))
 
 
 def _held_karp(distance: FloatArray) -> IntArray:
@@ -73,17 +77,54 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
     return np.array(tour, dtype=np.int64)
 
 
-def _two_opt(distance: FloatArray, tour: IntArray) -> IntArray:
-    k = len(tour)
+def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
+    """The tour after the best exchange again and again, starting at point 0."""
+    # Below rounding an exchange could undo itself for ever.
+    least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
     while True:
-        following = np.roll(tour, -1)
-        leg = distance[tour, following]
-        # gain[i, j]: what replacing legs i and j by their two cross connections saves.
-        gain = leg[:, None] + leg[None] - distance[np.ix_(tour, tour)]
-        gain -= distance[np.ix_(following, following)]
-        gain[np.tril_indices(k)] = -np.inf
-        i, j = np.unravel_index(gain.argmax(), gain.shape)
-        # Below rounding an exchange could undo itself for ever.
-        if gain[i, j] <= 1e-12 * leg.sum():
+        gain, i, j = _best_reversal(distance, tour)
+        if gain > least:
+            tour[i + 1 : j + 1] = tour[i + 1 : j + 1][::-1].copy()
+            continue
+        gain, moved = _best_move(distance, tour)
+        if gain <= least:
             return np.roll(tour, -int(np.flatnonzero(tour == 0)[0]))
-        tour[i + 1 : j + 1] = tour[i + 1 : j + 1][::-1].copy()
+        tour = moved
+
+
+def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, int]:
+    """What reversing the stretch from i + 1 to j saves, and the best i and j."""
+    following = np.roll(tour, -1)
+    leg = distance[tour, following]
+    gain = leg[:, None] + leg[None] - distance[np.ix_(tour, tour)]
+    gain -= distance[np.ix_(following, following)]
+    gain[np.tril_indices(len(tour))] = -np.inf
+    i, j = np.unravel_index(gain.argmax(), gain.shape)
+    return float(gain[i, j]), int(i), int(j)
+
+
+def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
+    """What moving a few points to another leg saves at best, and the tour after it."""
+    k = len(tour)
+    best, moved = 0.0, tour
+    for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
+        # Row i: the points moved are those at i … i + count - 1; column j: to the leg after j.
+        before, first = np.roll(tour, 1), tour
+        last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
+        saved = distance[before, first] + distance[last, after] - distance[before, after]
+        start, end = tour, np.roll(tour, -1)
+        straight = distance[np.ix_(first, start)] + distance[np.ix_(last, end)]
+        turned = distance[np.ix_(last, start)] + distance[np.ix_(first, end)]
+        gain = saved[:, None] + distance[start, end] - np.minimum(straight, turned)
+        offset = (np.arange(k)[None] - np.arange(k)[:, None]) % k
+        gain[(offset < count) | (offset == k - 1)] = -np.inf
+        i, j = np.unravel_index(gain.argmax(), gain.shape)
+        if gain[i, j] > best:
+            best = float(gain[i, j])
+            onward = np.roll(tour, -int(i))
+            stretch, rest = onward[:count], onward[count:]
+            if turned[i, j] < straight[i, j]:
+                stretch = stretch[::-1]
+            place = int(offset[i, j]) - count + 1
+            moved = np.concatenate([rest[:place], stretch, rest[place:]])
+    return best, moved
