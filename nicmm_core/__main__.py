@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from . import Status, design_curve
-from .design import METHODS
+from .arguments import METHODS
 from .errors import ArgumentError, NicmmError
 from .files import check_curve_path, read_mesh, write_curve, write_mesh
 from .initial_loop import ORDERS

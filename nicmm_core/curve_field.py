@@ -70,7 +70,7 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     here = np.zeros(n_vertices, dtype=bool)
     here[mesh.faces[mesh.face_component == mesh.face_component[curve.faces[0]]]] = True
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n_vertices)
-    largest = np.bincount(part[here & ~on_curve], area[here & ~on_curve]).argmax()
+    largest = np.bincount(part, np.where(here & ~on_curve, area, 0.0)).argmax()
     here &= part == largest
     side = np.where(here & (positive > negative), -1, 1)
     inside, outside = (area[here & (side == sign)].sum() for sign in (-1, 1))

@@ -26,11 +26,14 @@ class CurveSurface:
         Unit vectors. Their signs are of no account: every face reads them to its own side.
     feature_map : (V,) float array or None
         φ_fea.
+    feature_weight : float
+        λ_fea / λ_smooth of Eq. 2, in 1/length², where there is a feature map.
     """
 
     mesh: Mesh
     vertex_normals: FloatArray
-    feature_map: FloatArray | None
+    feature_map: FloatArray | None = None
+    feature_weight: float = 0.0
 
 
 def unsigned_normals(mesh: Mesh) -> FloatArray:

@@ -10,20 +10,28 @@ import enum
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import field as dataclass_field
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import variational
+from .arguments import check_choices, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray
 from .contour import extract_curves
+from .crossings import crossing_segments
 from .curve import SurfaceCurve
-from .errors import ArgumentError, MissingPackageError
-from .initial_loop import ORDERS
+from .curve_field import curve_field
+from .curve_nodes import CurveSurface, unsigned_normals
+from .errors import ArgumentError
+from .exact_curve import ExactCurve
 from .losses import LossWeights, balanced
-from .mesh import Mesh, real_array
+from .mesh import Mesh
 from .problem import Problem, build_problem
+from .relaxation import RelaxationConfig, Relaxed, relax
+from .solution import Solution
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
 from .via_points import ViaPoints
@@ -31,15 +39,12 @@ from .via_points import ViaPoints
 if TYPE_CHECKING:
     from .network import CurveNetwork
 
-METHODS = ("nicmm", "nicmm-paper", "variational")
-"""``"nicmm"`` is the same as ``"nicmm-paper"`` until the fast method lands."""
-
-SMOOTHNESS_RANGE = (1e-3, 1e3)
-
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
 
 Progress = Callable[[float, FloatArray], object]
+
+State = TypeVar("State")
 
 
 class Status(enum.Enum):
@@ -74,12 +79,8 @@ class Design:
     status : Status
     curves : list of SurfaceCurve
         One entry when all is well.
-    field : (V,) float array
-        Level-set values in mesh units at the input mesh's vertices, negative inside, or the
-        distance without sign where the curve is open or bounds no region. Vertices that are not
-        connected to the control points get the largest value: they are outside.
     iterations : int
-        Of the prediction stage.
+        Of the network's training, of the solver, or of the relaxation.
     seconds : float
     energy : dict of str to float
         The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
@@ -87,15 +88,27 @@ class Design:
     breaking_vertices : int
         Vertices whose predicted sign would have split the curve or missed a point, so that the
         initial level set replaces the predicted one around them; 0 when it was one loop by itself.
+    find_field : callable
+        Finds `field` when it is first asked for.
     """
 
     status: Status
     curves: list[SurfaceCurve]
-    field: FloatArray
     iterations: int
     seconds: float
     energy: dict[str, float]
     breaking_vertices: int
+    find_field: Callable[[], FloatArray] = dataclass_field(repr=False, compare=False)
+
+    @cached_property
+    def field(self) -> FloatArray:
+        """Level-set values in mesh units at the input mesh's vertices, shape (V,).
+
+        Negative inside, or the distance without sign where the curve is open or bounds no region.
+        Vertices that are not connected to the control points get the largest value: they are
+        outside.
+        """
+        return self.find_field()
 
 
 class Designer:
@@ -129,19 +142,19 @@ class Designer:
     ) -> Design:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
-        _check_choices(order, method)
+        check_choices(order, method)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method != "variational":
-            _check_torch()
+            check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         problem = build_problem(
             self.mesh,
             points,
             order,
-            _checked_map("obstacles", obstacles, self.mesh),
-            _checked_map("alignment", alignment, self.mesh),
-            _checked_smoothness(smoothness),
+            checked_map("obstacles", obstacles, self.mesh),
+            checked_map("alignment", alignment, self.mesh),
+            checked_smoothness(smoothness),
             closed,
             via_points,
         )
@@ -156,29 +169,59 @@ class Designer:
         started: float,
     ) -> Design:
         weights = balanced(LossWeights(smooth=smoothness * LossWeights.smooth), problem)
-        watch = None if progress is None else self._watcher(problem, progress)
-        if method == "variational":
-            solution = variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        else:
-            # This imports PyTorch, which nothing before needs.
-            from . import prediction
-
-            network = self._network(problem.features.shape[1])
-            config = prediction.PredictionConfig()
-            solution = prediction.predict(network, problem, weights, config, watch)
+        solution = self._solution(problem, method, weights, progress)
         field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        status = _STATUS[solution.stopped]
-        if not is_one_curve(curves, problem.loop.closed):
+        stopped, iterations, energy = solution.stopped, solution.iterations, solution.terms
+        find_field = partial(_at_input_vertices, self.mesh, problem, field)
+        if method == "nicmm" and is_one_curve(curves, problem.loop.closed):
+            relaxed = self._relaxed(problem, curves[0], smoothness, progress)
+            curves, stopped, iterations = [relaxed.curve], relaxed.stopped, relaxed.iterations
+            energy = _sharp_energy(relaxed, problem)
+            find_field = partial(curve_field, self.mesh, relaxed.curve)
+        status = _STATUS[stopped]
+        if not is_one_curve(curves, problem.loop.closed) or _crosses(self.mesh, curves[0]):
             status = Status.NOT_ONE_CURVE
         return Design(
             status=status,
             curves=curves,
-            field=_at_input_vertices(self.mesh, problem, field),
-            iterations=solution.iterations,
+            iterations=iterations,
             seconds=time.perf_counter() - started,
-            energy=solution.terms,
+            energy=energy,
             breaking_vertices=breaking,
+            find_field=find_field,
         )
+
+    def _solution(
+        self, problem: Problem, method: str, weights: LossWeights, progress: Progress | None
+    ) -> Solution:
+        """The level set that a method finds."""
+        watch = None if progress is None else self._field_watcher(problem, progress)
+        if method == "variational":
+            return variational.solve(problem, weights, variational.VariationalConfig(), watch)
+        # This imports PyTorch, which nothing before needs.
+        from . import prediction
+
+        network = self._network(problem.features.shape[1])
+        if method == "nicmm":
+            return prediction.predict_once(network, problem)
+        return prediction.predict(network, problem, weights, prediction.PredictionConfig(), watch)
+
+    def _relaxed(
+        self, problem: Problem, curve: SurfaceCurve, smoothness: float, progress: Progress | None
+    ) -> Relaxed:
+        watch = None if progress is None else self._curve_watcher(progress)
+        importance, weight = None, 0.0
+        if problem.feature_map is not None:
+            importance = np.ones(len(self.mesh.vertices))
+            inputs = problem.working.input_vertex
+            importance[inputs[inputs >= 0]] = problem.feature_map[inputs >= 0]
+            weight = LossWeights.feature / LossWeights.smooth / problem.unit**2
+        surface = CurveSurface(self.mesh, self._normals, importance, weight)
+        return relax(surface, curve, smoothness, RelaxationConfig(), watch)
+
+    @cached_property
+    def _normals(self) -> FloatArray:
+        return unsigned_normals(self.mesh)
 
     def _network(self, channels: int) -> CurveNetwork:
         if channels not in self._networks:
@@ -204,19 +247,33 @@ class Designer:
         curves = extract_curves(self.mesh, problem.working, field, controls, problem.bundle)
         return field, breaking, curves
 
-    def _watcher(self, problem: Problem, progress: Progress) -> Callable[[float, FloatArray], bool]:
-        last_call = -np.inf
-
-        def watch(fraction: float, field: FloatArray) -> bool:
-            nonlocal last_call
-            if time.perf_counter() - last_call < PROGRESS_INTERVAL:
-                return True
-            last_call = time.perf_counter()
+    def _field_watcher(
+        self, problem: Problem, progress: Progress
+    ) -> Callable[[float, FloatArray], bool]:
+        def points(field: FloatArray) -> FloatArray:
             curves = self._curves(problem, field)[2]
-            points = curves[0].points if curves else np.zeros((0, 3))
-            return progress(fraction, points) is not False
+            return curves[0].points if curves else np.zeros((0, 3))
 
-        return watch
+        return _seldom(progress, points)
+
+    def _curve_watcher(self, progress: Progress) -> Callable[[float, ExactCurve], bool]:
+        return _seldom(progress, lambda curve: curve.polyline.positions(self.mesh))
+
+
+def _seldom(
+    progress: Progress, points: Callable[[State], FloatArray]
+) -> Callable[[float, State], bool]:
+    """Call a progress function with the points of a state, but not too often."""
+    last_call = -np.inf
+
+    def watch(fraction: float, state: State) -> bool:
+        nonlocal last_call
+        if time.perf_counter() - last_call < PROGRESS_INTERVAL:
+            return True
+        last_call = time.perf_counter()
+        return progress(fraction, points(state)) is not False
+
+    return watch
 
 
 def design_curve(
@@ -250,8 +307,9 @@ def design_curve(
         initial path passes on its way from there, such as ``{1: [57]}``. The curve does not pass
         them exactly. Only for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
-        The network of the paper (both names are the same for now), or the same energy minimised
-        without a network.
+        The pretrained network's level set, relaxed on the surface (the default); the paper's own
+        method, which trains the network on for every curve; or the same energy minimised without
+        a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
         What the curve shall avoid and what it shall follow.
     smoothness : float, default 1
@@ -305,57 +363,24 @@ _STATUS = {
 }
 
 
+def _sharp_energy(relaxed: Relaxed, problem: Problem) -> dict[str, float]:
+    """The terms of Eq. 2 where φ is exactly the distance to the curve."""
+    feature = 0.0 if problem.feature_map is None else 0.5 * relaxed.feature / problem.unit
+    smooth = 0.5 * relaxed.bending * problem.unit
+    return {"sdf": 0.0, "int": 0.0, "smooth": smooth, "fea": feature}
+
+
+def _crosses(mesh: Mesh, curve: SurfaceCurve) -> bool:
+    """Whether a curve crosses or touches itself."""
+    polyline = SurfacePoints(curve.faces, curve.barycentric)
+    return len(crossing_segments(mesh, polyline, curve.closed)) > 0
+
+
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
     """Whether curves are a single one, closed or open, through all control points."""
     if len(curves) != 1 or curves[0].closed != closed:
         return False
     return bool((curves[0].control_index >= 0).all())
-
-
-def _check_choices(order: str, method: str) -> None:
-    if method not in METHODS:
-        raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
-    if order not in ORDERS:
-        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
-
-
-def _check_torch() -> None:
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise MissingPackageError(
-            f"method needs PyTorch, which cannot be imported ({error}); install it into this "
-            "Python with 'pip install torch', or choose the method \"variational\""
-        ) from error
-
-
-def _checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
-    if weights is None:
-        return None
-    try:
-        checked = real_array(weights)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
-    if checked.shape != (len(mesh.vertices),):
-        raise ArgumentError(
-            f"{name} has shape {checked.shape}; pass one weight a vertex, ({len(mesh.vertices)},)"
-        )
-    bad = ~((checked >= 0.0) & (checked <= 1.0))
-    if bad.any():
-        first = int(bad.argmax())
-        raise ArgumentError(f"{name}[{first}] is {checked[first]}; weights must lie in 0 … 1")
-    return checked
-
-
-def _checked_smoothness(smoothness: float) -> float:
-    try:
-        value = float(smoothness)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
-    low, high = SMOOTHNESS_RANGE
-    if not low <= value <= high:
-        raise ArgumentError(f"smoothness is {smoothness!r}; pass a number in {low:g} … {high:g}")
-    return value
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:

@@ -2,11 +2,12 @@
 
 There |∇φ| = 1, the level-set term vanishes and the integrals over the surface run along the curve:
 
-    E = ∮ κ_g² ds + τ ∮ φ_fea² ds,   τ = (2π / L)² / smoothness.
+    E = ∮ κ_g² ds + τ ∮ φ_fea² ds.
 
-Without maps φ_fea is 1 and the second term is the length. With this τ a circle in the plane neither
-grows nor shrinks, so the balance has no length of its own. Where strands of the curve may not
-cross, a third term keeps them apart (`strand_contact`).
+With maps τ is λ_fea / λ_smooth of Eq. 2. Without, φ_fea is 1 and the second term is the length; it
+keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a circle in
+the plane neither grows nor shrinks, so that the balance has no length of its own. Where strands of
+the curve may not cross, a third term keeps them apart (`strand_contact`).
 
 The unknowns are sideways moves of nodes in their tangent planes. A node's residuals know only its
 two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
@@ -49,9 +50,12 @@ class Balance:
     contact: float
 
 
-def balance(nodes: Nodes, smoothness: float, apart: bool) -> Balance:
+def balance(surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool) -> Balance:
     """The weights at a curve; ``apart`` keeps its strands apart."""
-    tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2 / smoothness)
+    tension = surface.feature_weight
+    if surface.feature_map is None:
+        tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2)
+    tension /= smoothness
     if not apart:
         return Balance(tension, 0.0)
     energy = elastic_energy(nodes, Balance(tension, 0.0))

@@ -117,6 +117,20 @@ def predict(
     return Solution(best_field, best_terms, losses, stopped)
 
 
+@single_thread()
+@torch.no_grad()
+def predict_once(network: CurveNetwork, problem: Problem) -> Solution:
+    """What the network says as it is, without any training on the problem."""
+    device = torch.device("cpu")
+    surface = surface_tensors(problem, device)
+    phi = network(network_input(problem, device))  # (n,)
+    terms = _as_floats(loss_terms(surface, phi))
+    field = phi.numpy().astype(np.float64)
+    if not np.isfinite(field).all():
+        return Solution(problem.initial_distance, terms, [], "diverged")
+    return Solution(field, terms, [], "converged")
+
+
 @torch.no_grad()
 def narrow_band_energy(
     surface: EnergySurface, phi: Tensor, weights: LossWeights, edge_length: float

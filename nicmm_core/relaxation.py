@@ -221,7 +221,9 @@ class _Relaxation:
         released = False
         while self.iterations < last_iteration:
             self.iterations += 1
-            weights = balance(curve.nodes, self.smoothness, drawing is _Drawing.SIMPLE)
+            weights = balance(
+                self.surface, curve.nodes, self.smoothness, drawing is _Drawing.SIMPLE
+            )
             before = elastic_energy(curve.nodes, weights)
             step = self._step(curve, held, weights, damping, drawing)
             if step is not None:

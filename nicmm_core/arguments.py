@@ -1,0 +1,64 @@
+"""Arguments of `design_curve` that need no mesh stage to be checked."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from .array_types import FloatArray
+from .errors import ArgumentError, MissingPackageError
+from .initial_loop import ORDERS
+from .mesh import Mesh, real_array
+
+METHODS = ("nicmm", "nicmm-paper", "variational")
+
+SMOOTHNESS_RANGE = (1e-3, 1e3)
+
+
+def check_choices(order: str, method: str) -> None:
+    """Raise ArgumentError unless both are known."""
+    if method not in METHODS:
+        raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
+    if order not in ORDERS:
+        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+
+
+def check_torch() -> None:
+    """Raise MissingPackageError unless PyTorch can be imported."""
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise MissingPackageError(
+            f"method needs PyTorch, which cannot be imported ({error}); install it into this "
+            "Python with 'pip install torch', or choose the method \"variational\""
+        ) from error
+
+
+def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
+    """Weights in [0, 1] at the vertices, (V,), or an ArgumentError that names them."""
+    if weights is None:
+        return None
+    try:
+        checked = real_array(weights)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
+    if checked.shape != (len(mesh.vertices),):
+        raise ArgumentError(
+            f"{name} has shape {checked.shape}; pass one weight a vertex, ({len(mesh.vertices)},)"
+        )
+    bad = ~((checked >= 0.0) & (checked <= 1.0))
+    if bad.any():
+        first = int(bad.argmax())
+        raise ArgumentError(f"{name}[{first}] is {checked[first]}; weights must lie in 0 … 1")
+    return checked
+
+
+def checked_smoothness(smoothness: float) -> float:
+    """A number in `SMOOTHNESS_RANGE`, or an ArgumentError."""
+    try:
+        value = float(smoothness)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
+    low, high = SMOOTHNESS_RANGE
+    if not low <= value <= high:
+        raise ArgumentError(f"smoothness is {smoothness!r}; pass a number in {low:g} … {high:g}")
+    return value
