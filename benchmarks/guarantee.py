@@ -357,7 +357,9 @@ def _figure(outcomes: Sequence[Outcome], scale: Scale) -> str:
     for closed, colour in ((True, "tab:blue"), (False, "tab:orange")):
         for label, (value, style) in lines.items():
             values = _values(outcomes, closed, len(SAMPLINGS) - 1, value)
-            shares = np.arange(1, len(values) + 1) / max(len(values), 1)
+            shares = np.linspace(0.0, 1.0, len(values) + 1)
+            values = values[:1] + values
+            shares = shares[: len(values)]
             axes.step(
                 values, shares, style, where="post", color=colour, label=f"{KIND[closed]}, {label}"
             )
