@@ -60,7 +60,7 @@ def clean(count: int) -> Iterator[tuple[str, Mesh]]:
 
 
 def bodies(count: int) -> Iterator[tuple[str, Mesh]]:
-    """People and animals in the sizes that shape correspondence uses, as they are."""
+    """People, animals and a cortex, in the sizes that shape correspondence uses, as they are."""
     for path in _spread(mesh_files("shapes"), count):
         yield path.stem, read_mesh(path)
 

@@ -154,7 +154,7 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
         return
     yield "SHREC16, two Loop subdivisions", collections.shrec16(scale.choose(384, 38))
     yield "closed manifold", collections.clean(scale.choose(36, 3))
-    yield "people and animals", collections.bodies(scale.choose(11, 1))
+    yield "people, animals and a cortex", collections.bodies(scale.choose(11, 1))
 
 
 def _compared_every(scale: Scale) -> int:
