@@ -13,6 +13,7 @@ from .scale import Scale
 
 MEASUREMENTS = (
     "one_loop",
+    "guarantee",
     "pretraining",
     "transfer",
     "convergence",

@@ -59,6 +59,12 @@ def clean(count: int) -> Iterator[tuple[str, Mesh]]:
         yield path.stem, read_mesh(path)
 
 
+def bodies(count: int) -> Iterator[tuple[str, Mesh]]:
+    """People, animals and a cortex, in the sizes that shape correspondence uses, as they are."""
+    for path in _spread(mesh_files("shapes"), count):
+        yield path.stem, read_mesh(path)
+
+
 def creatures(count: int) -> Iterator[tuple[str, Mesh]]:
     """Generated shapes with limbs, small."""
     for seed in range(count):

@@ -1,8 +1,9 @@
 """A discrete elastic curve on a surface: the yardstick of how fair a curve could be.
 
-Nodes move sideways in their tangent planes by Gauss-Newton steps on L ∮ κ_g² ds, are projected
-to the mesh and respaced between the control points, which stay where they are. Nothing keeps the
-curve from crossing itself, and what it finds is a local optimum near its start.
+Nodes move sideways in their tangent planes by Gauss-Newton steps on L ∫ κ_g² ds, are projected
+to the mesh and respaced between the control points, which stay where they are. An open curve has
+no curvature at its ends. Nothing keeps the curve from crossing itself, and what it finds is a local
+optimum near its start.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class ElasticCurve:
     curve : SurfaceCurve
         Its points are on the surface, `REFINEMENT` times as many as nodes.
     energies : list of float
-        L ∮ κ_g² ds at the nodes, before the first step and after each; they only fall.
+        L ∫ κ_g² ds at the nodes, before the first step and after each; they only fall.
     """
 
     curve: SurfaceCurve
@@ -63,7 +64,7 @@ def elastic_curve(mesh: Mesh, start: SurfaceCurve, nodes: int = NODES) -> Elasti
     ----------
     mesh : Mesh
     start : SurfaceCurve
-        Closed and through all of its control points.
+        Through all of its control points, with one at each end where it is open.
     nodes : int
         Rounded up to a multiple of three.
 
@@ -80,17 +81,19 @@ class _State:
 
     points: FloatArray
     normals: FloatArray
+    closed: bool
 
     @property
     def spacing(self) -> FloatArray:
-        """Half the length of the two segments at each node, shape (n,)."""
-        lengths = np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
-        return 0.5 * (lengths + np.roll(lengths, 1))
+        """Half the length of the two segments at each node, of the one at an end, shape (n,)."""
+        lengths = np.linalg.norm(_neighbour(self.points, 1, self.closed) - self.points, axis=1)
+        before = np.linalg.norm(_neighbour(self.points, -1, self.closed) - self.points, axis=1)
+        return 0.5 * (lengths + before)
 
     @property
     def roots(self) -> FloatArray:
         """κ_g √ds at each node, shape (n,)."""
-        return geodesic_curvature(self.points, self.normals) * np.sqrt(self.spacing)
+        return geodesic_curvature(self.points, self.normals, self.closed) * np.sqrt(self.spacing)
 
     @property
     def energy(self) -> float:
@@ -99,20 +102,31 @@ class _State:
     @property
     def sideways(self) -> FloatArray:
         """Unit vectors in the tangent planes, across the curve."""
-        along = np.roll(self.points, -1, axis=0) - np.roll(self.points, 1, axis=0)
+        along = _neighbour(self.points, 1, self.closed) - _neighbour(self.points, -1, self.closed)
         across = np.cross(self.normals, along)
         return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+def _neighbour(points: FloatArray, step: int, closed: bool) -> FloatArray:
+    """The next node of each (step 1) or the one before (-1); an end is its own."""
+    moved = np.roll(points, -step, axis=0)
+    if not closed:
+        end = -1 if step == 1 else 0
+        moved[end] = points[end]
+    return moved
 
 
 class _Iteration:
     def __init__(self, mesh: Mesh, start: SurfaceCurve, nodes: int) -> None:
         self.surface = NearestPoints(mesh)
+        self.closed = bool(start.closed)
         legs = _legs(start)
-        self.counts = _nodes_of_legs(legs, nodes)
-        self.controls = np.concatenate([[0], np.cumsum(self.counts)[:-1]])
+        self.counts = _nodes_of_legs(legs, nodes if self.closed else nodes - 1)
+        before = np.concatenate([[0], np.cumsum(self.counts)])
+        self.controls = before[:-1] if self.closed else before
         self.free = np.setdiff1d(np.arange(nodes), self.controls)
         self.fixed = start.points[start.control_index]
-        self.state = self.projected(_respaced(legs, self.counts))
+        self.state = self.projected(self.respaced(legs))
 
     def solve(self) -> ElasticCurve:
         energies = [self.state.energy]
@@ -138,11 +152,21 @@ class _Iteration:
 
         Chords between nodes have corners wherever curvature is sampled at other places.
         """
-        ring = np.concatenate([self.state.points, self.state.points[:1]])
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
-        spline = CubicSpline(arc, ring, bc_type="periodic")
-        fine = np.interp(np.arange(REFINEMENT * (len(ring) - 1)) / REFINEMENT, range(len(arc)), arc)
-        return self.surface.curve(spline(fine), REFINEMENT * self.controls)
+        line = self.line(self.state.points)
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        spline = CubicSpline(arc, line, bc_type="periodic" if self.closed else "natural")
+        count = REFINEMENT * (len(line) - 1) + (not self.closed)
+        fine = np.interp(np.arange(count) / REFINEMENT, range(len(arc)), arc)
+        return self.surface.curve(spline(fine), REFINEMENT * self.controls, self.closed)
+
+    def line(self, points: FloatArray) -> FloatArray:
+        """Points from the first control point to the last, which is the first again if closed."""
+        return np.concatenate([points, points[:1]]) if self.closed else points
+
+    def respaced(self, legs: list[FloatArray]) -> FloatArray:
+        """Evenly spaced nodes on each leg."""
+        nodes = _respaced(legs, self.counts)
+        return nodes if self.closed else np.concatenate([nodes, legs[-1][-1:]])
 
     def projected(self, points: FloatArray) -> _State:
         """Nodes moved to the surface, and the control points exactly to their places."""
@@ -150,7 +174,7 @@ class _Iteration:
         points[self.controls] = self.fixed
         _, faces, barycentric = self.surface.project(points)
         on_surface = self.surface.curve(points, self.controls).points
-        return _State(on_surface, self.surface.normals(faces, barycentric))
+        return _State(on_surface, self.surface.normals(faces, barycentric), self.closed)
 
     def normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Gauss-Newton matrix and slope of the energy for the free nodes' sideways moves.
@@ -172,8 +196,10 @@ class _Iteration:
             changed = _State(
                 (barycentric[:, :, None] * corners).sum(axis=1),
                 self.surface.normals(faces, barycentric),
+                self.closed,
             )
-            # The moved one among a node and its two neighbours.
+            # The moved one among a node and its two neighbours. An end has one neighbour only:
+            # what it is given for the other falls on a control point, and these do not move.
             cause = (rows + (first - rows + 1) % 3 - 1) % n
             jacobian[rows, cause] = (changed.roots - roots) / step
             np.add.at(length_slope, cause, (changed.spacing - spacing) / step)
@@ -190,25 +216,28 @@ class _Iteration:
         points = self.state.points.copy()
         points[self.free] += step[:, None] * self.state.sideways[self.free]
         points = self.projected(points).points
-        bounds = [*self.controls, len(points)]
-        ring = np.concatenate([points, points[:1]])
-        legs = [ring[a : b + 1] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        return self.projected(_respaced(legs, self.counts))
+        line = self.line(points)
+        bounds = np.concatenate([[0], np.cumsum(self.counts)])
+        legs = [line[a : b + 1] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        return self.projected(self.respaced(legs))
 
 
 def _legs(curve: SurfaceCurve) -> list[FloatArray]:
     """Polylines between consecutive control points, both ends included."""
     first, n = curve.control_index[0], len(curve.points)
-    bounds = [*((curve.control_index - first) % n), n]
+    if curve.closed:
+        bounds = [*((curve.control_index - first) % n), n]
+        line = np.roll(curve.points, -first, axis=0)
+        line = np.concatenate([line, line[:1]])
+    else:
+        bounds, line = [*curve.control_index], curve.points
     if any(b <= a for a, b in zip(bounds[:-1], bounds[1:], strict=True)):
         raise ValueError("the control points do not follow one another along the curve")
-    ring = np.roll(curve.points, -first, axis=0)
-    ring = np.concatenate([ring, ring[:1]])
-    return [ring[a : b + 1] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [line[a : b + 1] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
 
 
 def _nodes_of_legs(legs: list[FloatArray], nodes: int) -> IntArray:
-    """Nodes of each leg, its first control point included, in proportion to its length."""
+    """Nodes of each leg, its first control point included and not its last, by its length."""
     lengths = np.array([np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() for leg in legs])
     counts = np.maximum(FEWEST_NODES_OF_A_LEG, np.round(nodes * lengths / lengths.sum()))
     counts[lengths.argmax()] += nodes - counts.sum()

@@ -23,18 +23,26 @@ def diagonal(mesh: Mesh) -> float:
 
 
 def curvature_along(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> FloatArray:
-    """Geodesic curvature (Eq. 10) at evenly spaced points of a closed curve, in 1/length."""
-    points, segment = resample(curve.points, samples)
+    """Geodesic curvature (Eq. 10) at evenly spaced points of a curve, in 1/length.
+
+    The ends of an open curve are among the points and have none.
+    """
+    points, segment = resample(curve.points, samples, curve.closed)
     at_corners = vertex_normals(mesh.vertices, mesh.faces)[mesh.faces[curve.faces[segment]]]
     normals = (curve.barycentric[segment][:, :, None] * at_corners).sum(axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return geodesic_curvature(points, normals)
+    return geodesic_curvature(points, normals, curve.closed)
+
+
+def squared_curvature(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> float:
+    """∫ κ_g² ds along a curve, in 1/length."""
+    steps = samples if curve.closed else samples - 1
+    return float((curvature_along(mesh, curve, samples) ** 2).sum() * curve.length / steps)
 
 
 def bending(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> float:
-    """Scale-free bending L ∮ κ_g² ds; a circle in the plane has 4 π²."""
-    curvature = curvature_along(mesh, curve, samples)
-    return float((curvature**2).mean() * curve.length**2)
+    """Scale-free bending L ∫ κ_g² ds; a circle in the plane has 4 π²."""
+    return curve.length * squared_curvature(mesh, curve, samples)
 
 
 def distances(first: SurfaceCurve, second: SurfaceCurve) -> tuple[float, float]:

@@ -50,13 +50,15 @@ class NearestPoints:
         normals = (barycentric[:, :, None] * corners).sum(axis=1)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
-    def curve(self, positions: FloatArray, control_index: IntArray) -> SurfaceCurve:
-        """A closed curve whose points are the nearest ones of the mesh.
+    def curve(
+        self, positions: FloatArray, control_index: IntArray, closed: bool = True
+    ) -> SurfaceCurve:
+        """A curve whose points are the nearest ones of the mesh.
 
         Its points lie on the surface, while the segments between them may leave it.
         """
         _, faces, barycentric = self.project(positions)
-        return curve_on_mesh(self.mesh, True, faces, barycentric, control_index)
+        return curve_on_mesh(self.mesh, closed, faces, barycentric, control_index)
 
     def greatest_distance(self, positions: FloatArray) -> float:
         """Greatest distance of the segments of a closed polyline to the mesh."""

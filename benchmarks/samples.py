@@ -21,9 +21,14 @@ def random_sets(
     The points of a mesh depend on the seed and its place in the list alone.
     """
     for number, (name, mesh) in enumerate(meshes):
-        generator = np.random.default_rng([seed, number])
-        component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
-        vertices = np.unique(mesh.faces[mesh.face_component == component])
-        for _ in range(per_mesh):
-            count = generator.integers(FEWEST_POINTS, MOST_POINTS + 1)
-            yield name, mesh, generator.choice(vertices, size=count, replace=False)
+        for points in point_sets(mesh, per_mesh, np.random.default_rng([seed, number])):
+            yield name, mesh, points
+
+
+def point_sets(mesh: Mesh, count: int, generator: np.random.Generator) -> Iterator[IntArray]:
+    """Sets of random vertices of the component with the largest area."""
+    component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
+    vertices = np.unique(mesh.faces[mesh.face_component == component])
+    for _ in range(count):
+        size = generator.integers(FEWEST_POINTS, MOST_POINTS + 1)
+        yield generator.choice(vertices, size=size, replace=False)

@@ -58,8 +58,8 @@ def curve_on_mesh(
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
-def geodesic_curvature(points: FloatArray, normals: FloatArray) -> FloatArray:
-    """Geodesic curvature at the points of a closed polyline on a surface (Eq. 10).
+def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = True) -> FloatArray:
+    """Geodesic curvature at the points of a polyline on a surface (Eq. 10).
 
     Parameters
     ----------
@@ -67,15 +67,25 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray) -> FloatArray:
         Evenly spaced, or the values of short segments are noise: see `resample`.
     normals : (n, 3) float array
         Unit surface normals at the points.
+    closed : bool, default True
+        Whether the last point joins the first.
 
     Returns
     -------
     (n,) float array
         Signed, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i); positive
-        where the curve turns left seen against the normal.
+        where the curve turns left seen against the normal. Zero at the ends of an open polyline.
     """
-    before = np.roll(points, 1, axis=0) - points
-    after = np.roll(points, -1, axis=0) - points
+    if not closed:
+        return np.pad(_turns(points[:-2], points[1:-1], points[2:], normals[1:-1]), 1)
+    return _turns(np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0), normals)
+
+
+def _turns(
+    previous: FloatArray, points: FloatArray, following: FloatArray, normals: FloatArray
+) -> FloatArray:
+    """Geodesic curvature at points between two neighbours each."""
+    before, after = previous - points, following - points
     before -= (before * normals).sum(axis=1, keepdims=True) * normals
     after -= (after * normals).sum(axis=1, keepdims=True) * normals
     across = np.linalg.norm(after - before, axis=1)
@@ -84,17 +94,19 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray) -> FloatArray:
     return 2.0 * sine / across
 
 
-def resample(points: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Points at equal distances along a closed polyline, and the segment that each lies on.
+def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[FloatArray, IntArray]:
+    """Points at equal distances along a polyline, and the segment that each lies on.
+
+    They begin at its first point, and end at the last one where it is open.
 
     Returns
     -------
     (count, 3) float array
     (count,) int array
     """
-    ring = np.concatenate([points, points[:1]])
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
-    wanted = np.arange(count) * arc[-1] / count
-    even = np.stack([np.interp(wanted, arc, ring[:, axis]) for axis in range(3)], axis=1)
-    segment = np.clip(np.searchsorted(arc, wanted, side="right") - 1, 0, len(points) - 1)
+    line = np.concatenate([points, points[:1]]) if closed else points
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    wanted = np.linspace(0.0, arc[-1], count, endpoint=not closed)
+    even = np.stack([np.interp(wanted, arc, line[:, axis]) for axis in range(3)], axis=1)
+    segment = np.clip(np.searchsorted(arc, wanted, side="right") - 1, 0, len(line) - 2)
     return even, segment.astype(np.int64)

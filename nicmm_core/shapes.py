@@ -54,6 +54,47 @@ def disc(rings: int = 24) -> Mesh:
     return Mesh(np.pad(flat, ((0, 0), (0, 1))), _counter_clockwise(flat, faces))
 
 
+def annulus(rings: int = 16, hole: float = 0.3) -> Mesh:
+    """The unit disc without its middle, out to the rings that lie beyond the hole's radius."""
+    whole = disc(rings)
+    outside = np.linalg.norm(whole.vertices, axis=1) > hole
+    return _used_part(whole.vertices, whole.faces[outside[whole.faces].all(axis=1)])
+
+
+def moebius_strip(around: int = 48, across: int = 8) -> Mesh:
+    """A strip of width 0.8 about the unit circle, turned over once."""
+    u, v = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around, np.linspace(-0.4, 0.4, across + 1), indexing="ij"
+    )
+    radius = 1.0 + v * np.cos(0.5 * u)
+    vertices = np.stack([radius * np.cos(u), radius * np.sin(u), v * np.sin(0.5 * u)], axis=-1)
+    index = np.arange(u.size).reshape(u.shape)
+    onward = np.concatenate([index[1:], index[:1, ::-1]])
+    a, b, c, d = index[:, :-1], onward[:, :-1], onward[:, 1:], index[:, 1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def double_torus(faces: int = 700, subdivisions: int = 1) -> Mesh:
+    """A surface of genus two: two rings side by side along the x axis.
+
+    Parameters
+    ----------
+    faces : int
+        Faces after decimation, before subdivision.
+    subdivisions : int
+        Loop steps, each with four times the faces.
+    """
+    x, y, z = (np.linspace(-a, a, n) for a, n in ((1.7, 46), (1.0, 28), (0.5, 16)))
+    grid = np.stack([g.ravel() for g in np.meshgrid(z, y, x, indexing="ij")][::-1], axis=1)
+    lemniscate = (grid[:, 0] ** 2 * (1.9 - grid[:, 0] ** 2) - 1.6 * grid[:, 1] ** 2) ** 2
+    vertices, triangles = igl.marching_cubes(
+        lemniscate + 3.0 * grid[:, 2] ** 2 - 0.25, grid, len(x), len(y), len(z), 0.0
+    )[:2]
+    vertices, triangles = igl.decimate(vertices, triangles, faces)[:2]
+    return Mesh(*igl.loop(vertices, triangles, subdivisions))
+
+
 def creature(seed: int, resolution: int = 48, faces: int = 500, subdivisions: int = 2) -> Mesh:
     """A random body with two to five limbs, decimated and Loop subdivided.
 
@@ -116,9 +157,14 @@ def _capsules(
 def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     mesh = Mesh(vertices, faces)
     largest = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
-    kept = faces[mesh.face_component == largest]
-    used, kept = np.unique(kept, return_inverse=True)
-    return vertices[used], kept.reshape(-1, 3).astype(np.int64)
+    part = _used_part(vertices, faces[mesh.face_component == largest])
+    return part.vertices, part.faces
+
+
+def _used_part(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """Faces with the vertices that they use and no others."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return Mesh(vertices[used], renumbered.reshape(-1, 3).astype(np.int64))
 
 
 def _hull_faces(vertices: FloatArray) -> IntArray:

@@ -72,6 +72,24 @@ def test_resampled_points_are_evenly_spaced_on_the_polyline(count):
     np.testing.assert_allclose(before[segment] + along, np.arange(count) * total / count, atol=1e-9)
 
 
+def test_open_arc_has_the_curvature_of_its_radius_between_its_ends():
+    arc = circle(ANGLES[:20], 2.0)
+    curvature = geodesic_curvature(arc, UP[:20], closed=False)
+    np.testing.assert_allclose(curvature[1:-1], 0.5)
+    np.testing.assert_array_equal(curvature[[0, -1]], 0.0)
+
+
+@pytest.mark.parametrize("count", [2, 60, 501])
+def test_resampled_open_polyline_keeps_its_ends(count):
+    line = circle(np.sort(np.random.default_rng(4).uniform(0, 4.0, 80)))
+    points, segment = resample(line, count, closed=False)
+    np.testing.assert_allclose(points[[0, -1]], line[[0, -1]], atol=1e-12)
+    lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.linalg.norm(points - line[segment], axis=1)
+    places = np.concatenate([[0.0], np.cumsum(lengths)])[segment] + along
+    np.testing.assert_allclose(places, np.linspace(0.0, lengths.sum(), count), atol=1e-9)
+
+
 def test_length_and_steps_of_closed_and_open_curves(ball):
     points = random_surface_points(ball, 5, seed=1)
     place = points.positions(ball)

@@ -1,10 +1,10 @@
 """Open curves, loops that bound no region, and one-sided surfaces: all by the signs of corners."""
 
-import igl
 import numpy as np
 import pytest
 
 import nicmm_core as nicmm
+from benchmarks.named_curves import handle_points, torus_points
 from nicmm_core import shapes
 from nicmm_core.finite_elements import build_finite_elements
 from nicmm_core.problem import build_problem
@@ -24,42 +24,6 @@ def assert_one_curve(mesh, result, points, closed=True):
     assert_valid_design(mesh, result, closed=closed)
     positions = mesh.vertices[points]
     assert_valid_curve(mesh, result.curves[0], positions, closed=closed)
-
-
-def torus_points(mesh, along, across, turns):
-    """Vertices on the curve that winds ``along`` times round the axis and ``across`` the tube."""
-    t = np.arange(turns) * 2 * np.pi / turns
-    u, v = along * t, across * t
-    radius = 1.0 + 0.4 * np.cos(v)
-    return nearest_vertices(
-        mesh, np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=1)
-    )
-
-
-def double_torus():
-    """A surface of genus two: two rings side by side."""
-    x, y, z = (np.linspace(-a, a, n) for a, n in ((1.7, 46), (1.0, 28), (0.5, 16)))
-    grid = np.stack([g.ravel() for g in np.meshgrid(z, y, x, indexing="ij")][::-1], axis=1)
-    lemniscate = (grid[:, 0] ** 2 * (1.9 - grid[:, 0] ** 2) - 1.6 * grid[:, 1] ** 2) ** 2
-    vertices, faces = igl.marching_cubes(
-        lemniscate + 3.0 * grid[:, 2] ** 2 - 0.25, grid, len(x), len(y), len(z), 0.0
-    )[:2]
-    vertices, faces = igl.loop(*igl.decimate(vertices, faces, 700)[:2], 1)
-    return nicmm.Mesh(vertices, faces)
-
-
-def moebius_strip(around=48, across=8):
-    """A strip of width 0.8 about the unit circle, turned over once."""
-    u, v = np.meshgrid(
-        np.arange(around) * 2 * np.pi / around, np.linspace(-0.4, 0.4, across + 1), indexing="ij"
-    )
-    radius = 1.0 + v * np.cos(0.5 * u)
-    vertices = np.stack([radius * np.cos(u), radius * np.sin(u), v * np.sin(0.5 * u)], axis=-1)
-    index = np.arange(u.size).reshape(u.shape)
-    onward = np.concatenate([index[1:], index[:1, ::-1]])
-    a, b, c, d = index[:, :-1], onward[:, :-1], onward[:, 1:], index[:, 1:]
-    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
-    return nicmm.Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
 
 
 class TestLoopsThatBoundNothing:
@@ -93,34 +57,21 @@ class TestLoopsThatBoundNothing:
     @pytest.mark.parametrize("half", [-1.0, 1.0])
     def test_round_each_handle_of_a_double_torus(self, half):
         """Through the hole and back on the outside, on either handle."""
-        mesh = double_torus()
-        plane = np.abs(mesh.vertices[:, 1]) < 0.08
-        there = plane & (half * mesh.vertices[:, 0] > 0.2)
-        candidates = np.flatnonzero(there)
-        reach = np.abs(mesh.vertices[candidates, 0])
-        middle = 0.5 * (reach.max() + reach[reach > 1.0].min())
-        outer = candidates[np.argsort(-reach)[0]]
-        tube = candidates[np.argsort(np.abs(reach - middle))]
-        top = tube[mesh.vertices[tube, 2] > 0.02][0]
-        bottom = tube[mesh.vertices[tube, 2] < -0.02][0]
-        points = np.array([outer, top, bottom])
+        mesh = shapes.double_torus()
+        points = handle_points(mesh, half)
         result = design(mesh, points, order="shortest")
         assert_valid_design(mesh, result)
         assert_valid_curve(mesh, result.curves[0], mesh.vertices[points])
 
     def test_round_a_boundary(self):
         """Round the hole of an annulus, which bounds together with the rim only."""
-        disc = shapes.disc(16)
-        radius = np.linalg.norm(disc.vertices, axis=1)
-        kept = (radius[disc.faces] > 0.3).all(axis=1)
-        used, faces = np.unique(disc.faces[kept], return_inverse=True)
-        annulus = nicmm.Mesh(disc.vertices[used], faces.reshape(-1, 3))
+        annulus = shapes.annulus()
         points = nearest_vertices(annulus, circle([0.0, 1.5, 3.0, 4.5], radius=0.6))
         assert_one_curve(annulus, design(annulus, points), points)
 
     def test_core_of_a_moebius_strip(self):
         """After one turn left has become right; the middle circle is a geodesic."""
-        strip = moebius_strip()
+        strip = shapes.moebius_strip()
         middle = circle([0.0, 2.0, 4.0])
         points = nearest_vertices(strip, middle)
         result = design(strip, points)

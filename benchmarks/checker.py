@@ -1,0 +1,438 @@
+"""The verdict on a design, from outside: one simple curve on the surface through all points.
+
+Nothing here looks behind the public interface: a mesh is its vertices and faces, a curve its
+points, faces, barycentrics and control indices. A point is known by its nonzero weights at the
+mesh's vertices, so one on an edge is the same point from either face. Whether strands cross or
+touch is decided for the numbers as they stand, by exact arithmetic where rounding could matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import nicmm_core as nicmm
+from nicmm_core.array_types import BoolArray, FloatArray, IntArray
+
+ROUNDING = 1e-12
+"""Of sums of barycentric coordinates, and of control points in bounding-box diagonals."""
+
+POSITION_ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Of a point computed from its barycentrics, relative to the greatest coordinate."""
+
+FEWEST_POINTS = {True: 3, False: 2}
+"""Of the polyline of a closed and of an open curve."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a curve is, in numbers.
+
+    Attributes
+    ----------
+    curves : int
+        Of the design; the other attributes are those of the first one.
+    readable : bool
+        Whether its arrays fit one another and the mesh, are finite and long enough; nothing else
+        is known where they do not.
+    closed_as_asked : bool
+    points : int
+        Of the polyline.
+    position_error : float
+        Greatest distance of a coordinate from what the barycentrics give, relative to the
+        greatest coordinate.
+    weight_error : float
+        Greatest amount by which a barycentric coordinate is negative or a sum is not 1.
+    chords_off_face : int
+        Pairs of consecutive points that lie on no common face.
+    points_twice : int
+        Points that were passed before.
+    crossings : int
+        Pairs of strands that cross inside a face.
+    touchings : int
+        Points that lie on another strand, between its ends.
+    interpolation_error : float
+        Greatest distance of a control point to where the curve says it is, in bounding-box
+        diagonals; 0 where no control points are asked for, infinite where one is left out.
+    in_order : bool
+        Whether the control points are met in the order asked for, each once.
+    """
+
+    curves: int
+    readable: bool = False
+    closed_as_asked: bool = False
+    points: int = 0
+    position_error: float = np.inf
+    weight_error: float = np.inf
+    chords_off_face: int = 0
+    points_twice: int = 0
+    crossings: int = 0
+    touchings: int = 0
+    interpolation_error: float = np.inf
+    in_order: bool = False
+
+    @property
+    def self_crossings(self) -> int:
+        """Places where the curve meets itself."""
+        return self.points_twice + self.crossings + self.touchings
+
+    @property
+    def off_surface(self) -> list[str]:
+        """What is wrong with where the curve lies."""
+        if not self.readable:
+            return [
+                "its arrays are too short, do not fit one another or the mesh, or are not finite"
+            ]
+        return _words(
+            (
+                self.position_error > POSITION_ROUNDING,
+                f"points are {self.position_error:.1e} beside their barycentrics",
+            ),
+            (
+                self.weight_error > ROUNDING,
+                f"barycentrics are negative or do not sum to 1, by {self.weight_error:.1e}",
+            ),
+            (
+                self.chords_off_face > 0,
+                f"chords lie on no common face: {self.chords_off_face}",
+            ),
+        )
+
+    @property
+    def not_simple(self) -> list[str]:
+        """What keeps it from being a simple curve."""
+        return _words(
+            (self.points_twice > 0, f"points are passed twice: {self.points_twice}"),
+            (self.crossings > 0, f"strands cross: {self.crossings}"),
+            (self.touchings > 0, f"points touch another strand: {self.touchings}"),
+        )
+
+    @property
+    def not_through_points(self) -> list[str]:
+        """How it fails its control points."""
+        if not self.readable:
+            return []
+        return _words(
+            (
+                not self.interpolation_error <= ROUNDING,
+                f"control points are missed by {self.interpolation_error:.1e} diagonals",
+            ),
+            (not self.in_order, "control points are met out of order"),
+        )
+
+    @property
+    def faults(self) -> list[str]:
+        """All that is wrong, in words; empty where the curve is what was asked for."""
+        if self.curves == 0:
+            return ["there is no curve"]
+        return [
+            *_words(
+                (self.curves > 1, f"there are {self.curves} curves"),
+                (self.readable and not self.closed_as_asked, "it is not closed or open as asked"),
+            ),
+            *self.off_surface,
+            *self.not_simple,
+            *self.not_through_points,
+        ]
+
+
+def judge(
+    mesh: nicmm.Mesh,
+    design: nicmm.Design,
+    control_points: ArrayLike | nicmm.SurfacePoints,
+    closed: bool = True,
+    order: str = "given",
+) -> Verdict:
+    """Judge a design by what was asked for, in `nicmm_core.design_curve`'s own words."""
+    if not design.curves:
+        return Verdict(curves=0)
+    positions = control_positions(mesh, control_points)
+    return judge_curve(mesh, design.curves[0], positions, closed, order, len(design.curves))
+
+
+def control_positions(
+    mesh: nicmm.Mesh, control_points: ArrayLike | nicmm.SurfacePoints
+) -> FloatArray:
+    """Where control points in any accepted form are, shape (k, 3)."""
+    if isinstance(control_points, nicmm.SurfacePoints):
+        return control_points.positions(mesh)
+    given = np.asarray(control_points)
+    return mesh.vertices[given] if given.ndim == 1 else given.astype(np.float64)
+
+
+def judge_curve(
+    mesh: nicmm.Mesh,
+    curve: nicmm.SurfaceCurve,
+    positions: ArrayLike | None = None,
+    closed: bool = True,
+    order: str = "given",
+    curves: int = 1,
+) -> Verdict:
+    """Judge one curve.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    curve : SurfaceCurve
+    positions : (k, 3) array_like of float, optional
+        Of the control points; without them nothing is said about these.
+    closed : bool
+        Whether a closed curve was asked for.
+    order : {"given", "shortest"}
+        Whether the points must be met as they are given, or each once in any order.
+    curves : int
+        How many the design has.
+
+    Returns
+    -------
+    Verdict
+    """
+    n = len(curve.points)
+    if not _readable(mesh, curve) or n < FEWEST_POINTS[bool(curve.closed)]:
+        return Verdict(curves, points=n)
+    vertices, weights = _places(mesh, curve)
+    first = np.arange(n if curve.closed else n - 1)
+    chords = np.stack([first, (first + 1) % n], axis=1)
+    simplices, on_face = _common_simplices(mesh, vertices, chords)
+    crossings, touchings = _contacts(vertices, weights, chords[on_face], simplices[on_face])
+    missed, in_order = 0.0, True
+    if positions is not None:
+        missed, in_order = _visits(mesh, curve, np.asarray(positions, dtype=float), order)
+    combined = (curve.barycentric[:, :, None] * mesh.vertices[mesh.faces[curve.faces]]).sum(axis=1)
+    return Verdict(
+        curves=curves,
+        readable=True,
+        closed_as_asked=bool(curve.closed) == closed,
+        points=n,
+        position_error=float(
+            np.abs(curve.points - combined).max()
+            / np.abs(mesh.vertices[mesh.faces[curve.faces]]).max()
+        ),
+        weight_error=float(
+            max(-curve.barycentric.min(), np.abs(curve.barycentric.sum(axis=1) - 1.0).max(), 0.0)
+        ),
+        chords_off_face=int((~on_face).sum()),
+        points_twice=n - len(np.unique(np.concatenate([vertices, weights], axis=1), axis=0)),
+        crossings=crossings,
+        touchings=touchings,
+        interpolation_error=missed,
+        in_order=in_order,
+    )
+
+
+def _words(*cases: tuple[bool, str]) -> list[str]:
+    return [word for wrong, word in cases if wrong]
+
+
+def _readable(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> bool:
+    """Whether the arrays can be looked at any further."""
+    n = len(curve.points)
+    return bool(
+        curve.points.shape == curve.barycentric.shape == (n, 3)
+        and curve.faces.shape == (n,)
+        and np.issubdtype(curve.faces.dtype, np.integer)
+        and ((curve.faces >= 0) & (curve.faces < len(mesh.faces))).all()
+        and np.isfinite(curve.points).all()
+        and np.isfinite(curve.barycentric).all()
+        and (curve.barycentric > 0.0).any(axis=1).all()
+        and ((curve.control_index >= -1) & (curve.control_index < n)).all()
+    )
+
+
+def _places(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> tuple[IntArray, FloatArray]:
+    """What each point is, regardless of the face named.
+
+    Returns
+    -------
+    (n, 3) int array
+        Vertices where its weight is not zero, ascending, after -1 for each other corner.
+    (n, 3) float array
+        The weights there, 0 for the others.
+    """
+    positive = curve.barycentric > 0.0
+    vertices = np.where(positive, mesh.faces[curve.faces], -1)
+    order = np.argsort(vertices, axis=1, kind="stable")
+    weights = np.where(positive, curve.barycentric, 0.0)
+    return np.take_along_axis(vertices, order, 1), np.take_along_axis(weights, order, 1)
+
+
+def _common_simplices(
+    mesh: nicmm.Mesh, vertices: IntArray, chords: IntArray
+) -> tuple[IntArray, BoolArray]:
+    """The smallest face, edge or vertex that holds both ends of each chord.
+
+    Returns
+    -------
+    (n, 3) int array
+        Its vertices, as `_places` writes them.
+    (n,) bool array
+        Whether the mesh has it.
+    """
+    both = np.sort(vertices[chords].reshape(len(chords), 6), axis=1)
+    both[:, 1:][both[:, 1:] == both[:, :-1]] = -1
+    simplices = np.sort(both, axis=1)[:, 3:]
+    small = (both >= 0).sum(axis=1) <= 3
+
+    # Only faces near the curve are sorted, and only its own vertices have numbers in the keys.
+    used = np.zeros(len(mesh.vertices) + 1, dtype=bool)
+    used[vertices[vertices >= 0]] = True
+    number = np.cumsum(used)
+    number[~used] = 0
+    near = mesh.faces[used[mesh.faces].sum(axis=1) >= 2]
+    near = np.sort(number[near], axis=1)
+    edges = np.concatenate([near[:, [0, 1]], near[:, [1, 2]], near[:, [0, 2]]])
+    corners = np.arange(1, number.max() + 1)
+    known = np.concatenate(
+        [near, np.pad(edges, ((0, 0), (1, 0))), np.pad(corners[:, None], ((0, 0), (2, 0)))]
+    )
+    here = np.where(simplices >= 0, number[simplices], 0)
+    return simplices, small & np.isin(_keys(here), _keys(known))
+
+
+def _keys(triples: IntArray) -> IntArray:
+    """One number a row, of values below 2²⁰: more vertices than any curve here passes."""
+    return (triples[:, 0] << 40) + (triples[:, 1] << 20) + triples[:, 2]
+
+
+def _contacts(
+    vertices: IntArray, weights: FloatArray, chords: IntArray, simplices: IntArray
+) -> tuple[int, int]:
+    """Pairs of chords that cross, and points that lie inside a chord of another strand.
+
+    Two chords can only meet between their ends inside a face that holds both, or along an edge:
+    coming from another face, one has a point on the edge.
+    """
+    dimension = (simplices >= 0).sum(axis=1) - 1
+    inside, along = dimension == 2, dimension == 1
+    crossings, touchings = _contacts_in_faces(vertices, weights, chords[inside], simplices[inside])
+    touchings += _contacts_on_edges(vertices, weights, chords[along], simplices[along])
+    return crossings, touchings
+
+
+def _contacts_in_faces(
+    vertices: IntArray, weights: FloatArray, chords: IntArray, faces: IntArray
+) -> tuple[int, int]:
+    """Contacts of chords through the inside of a face."""
+    face = np.unique(faces, axis=0, return_inverse=True)[1].ravel()
+    pairs = _pairs_within(face)
+    names = pairs.T
+    ends = [[_weights_in(vertices, weights, chords[n, e], faces[n]) for e in (0, 1)] for n in names]
+    cross = np.ones(len(pairs), dtype=bool)
+    touching: set[tuple[int, int]] = set()
+    for this, other in ((0, 1), (1, 0)):
+        chord, start, end = names[this], *ends[this]
+        sides = []
+        for which in (0, 1):
+            point, place = chords[names[other], which], ends[other][which]
+            # Chords that follow one another share a point, which says nothing.
+            shared = (point[:, None] == chords[chord]).any(axis=1)
+            side = np.where(shared, 0, _side(start, end, place))
+            for pair in np.flatnonzero((side == 0) & ~shared):
+                if _between(place[pair], start[pair], end[pair]):
+                    touching.add((int(point[pair]), int(chord[pair])))
+            sides.append(side)
+        cross &= sides[0] * sides[1] < 0
+    return int(cross.sum()), len(touching)
+
+
+def _contacts_on_edges(
+    vertices: IntArray, weights: FloatArray, chords: IntArray, edges: IntArray
+) -> int:
+    """Points inside chords that run along an edge."""
+    if not len(edges):
+        return 0
+    n = len(vertices)
+    group = np.unique(np.concatenate([vertices, edges]), axis=0, return_inverse=True)[1].ravel()
+    rows_of: dict[int, list[int]] = {}
+    for row, edge in enumerate(group[n:].tolist()):
+        rows_of.setdefault(edge, []).append(row)
+    touching = 0
+    for point in np.flatnonzero(np.isin(group[:n], group[n:])).tolist():
+        for row in rows_of[int(group[point])]:
+            if point not in chords[row]:
+                three = np.array([point, *chords[row]])
+                edge = np.tile(edges[row], (3, 1))
+                touching += _between(*_weights_in(vertices, weights, three, edge))
+    return touching
+
+
+def _weights_in(
+    vertices: IntArray, weights: FloatArray, points: IntArray, simplices: IntArray
+) -> FloatArray:
+    """Weights of points at the vertices of the simplex that each lies in, shape (m, 3)."""
+    same = vertices[points][:, None, :] == simplices[:, :, None]
+    return (same * weights[points][:, None, :]).sum(axis=2)
+
+
+def _pairs_within(group: IntArray) -> IntArray:
+    """All pairs of elements of one group, shape (m, 2)."""
+    order = np.argsort(group, kind="stable")
+    size = np.bincount(group)
+    rank = np.arange(len(group)) - (np.cumsum(size) - size)[group[order]]
+    later = np.repeat(np.arange(len(group)), rank)
+    nth = np.arange(len(later)) - np.repeat(np.cumsum(rank) - rank, rank)
+    earlier = later - rank[later] + nth
+    return np.stack([order[earlier], order[later]], axis=1)
+
+
+def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> IntArray:
+    """On which side of a line a point of the same face lies: 1, 0 or -1, exactly.
+
+    Weights are homogeneous coordinates, so the sign is that of a determinant, shapes (m, 3).
+    """
+    products = np.stack(
+        [
+            sign * start[:, i] * end[:, j] * point[:, k]
+            for sign, i, j, k in (
+                (1, 0, 1, 2), (1, 1, 2, 0), (1, 2, 0, 1),
+                (-1, 2, 1, 0), (-1, 1, 0, 2), (-1, 0, 2, 1),
+            )
+        ]
+    )  # fmt: skip
+    value = products.sum(axis=0)
+    side = np.sign(value).astype(np.int64)
+    uncertain = np.abs(value) <= 16.0 * np.finfo(float).eps * np.abs(products).sum(axis=0)
+    for row in np.flatnonzero(uncertain):
+        p, q, r = ([Fraction(float(w)) for w in corner[row]] for corner in (start, end, point))
+        exact = (
+            p[0] * (q[1] * r[2] - q[2] * r[1])
+            + p[1] * (q[2] * r[0] - q[0] * r[2])
+            + p[2] * (q[0] * r[1] - q[1] * r[0])
+        )
+        side[row] = (exact > 0) - (exact < 0)
+    return side
+
+
+def _between(point: FloatArray, start: FloatArray, end: FloatArray) -> bool:
+    """Whether a point of a line lies strictly between two others, exactly; weights (3,)."""
+    places = []
+    for weights in (point, start, end):
+        exact = [Fraction(float(weight)) for weight in weights]
+        places.append([weight / sum(exact) for weight in exact])
+    return any(p < max(a, b) and p > min(a, b) for p, a, b in zip(*places, strict=True))
+
+
+def _visits(
+    mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve, positions: FloatArray, order: str
+) -> tuple[float, bool]:
+    """How far control points are missed, in diagonals, and whether they are met in order."""
+    index = curve.control_index
+    if index.shape != (len(positions),) or (index < 0).any():
+        return np.inf, False
+    referenced = np.zeros(len(mesh.vertices), dtype=bool)
+    referenced[mesh.faces] = True
+    diagonal = np.linalg.norm(np.ptp(mesh.vertices[referenced], axis=0))
+    distance = np.linalg.norm(curve.points[index][:, None] - positions[None], axis=2)
+    asked = np.arange(len(index)) if order == "given" else distance.argmin(axis=1)
+    missed = float(distance[np.arange(len(index)), asked].max() / diagonal)
+    each_once = len(np.unique(asked)) == len(np.unique(index)) == len(index)
+    if curve.closed:
+        # Walking round once, the index falls back only where the walk passes the polyline's start.
+        onward = int((np.roll(index, -1) <= index).sum()) == 1
+    else:
+        onward = bool((np.diff(index) > 0).all())
+        onward &= index[0] == 0 and index[-1] == len(curve.points) - 1
+    return missed, bool(each_once and onward)

@@ -1,0 +1,85 @@
+"""Closed curves that have a name: round tubes, handles and holes, and along a one-sided strip.
+
+None of them bounds a region, except together with others or with a rim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nicmm_core import shapes
+from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class NamedCurve:
+    """What is asked for: vertices to visit in an order that `nicmm_core.design_curve` knows."""
+
+    name: str
+    mesh: Mesh
+    points: IntArray
+    order: str
+
+
+def named_curves() -> Iterator[NamedCurve]:
+    """All of them, on generated shapes."""
+    ring = shapes.torus(around=72, across=36)
+    for name, along, across, count in (
+        ("meridian of a torus", 0, 1, 3),
+        ("parallel of a torus", 1, 0, 6),
+        ("(1, 1) curve of a torus", 1, 1, 6),
+    ):
+        yield NamedCurve(name, ring, torus_points(ring, along, across, count), "given")
+    double = shapes.double_torus()
+    for half, side in ((-1.0, "left"), (1.0, "right")):
+        points = handle_points(double, half)
+        yield NamedCurve(f"{side} handle of a double torus", double, points, "shortest")
+    strip = shapes.moebius_strip()
+    core = nearest_vertices(strip, _circle([0.0, 2.0, 4.0], 1.0))
+    yield NamedCurve("core of a Möbius strip", strip, core, "given")
+    annulus = shapes.annulus()
+    hole = nearest_vertices(annulus, _circle([0.0, 1.5, 3.0, 4.5], 0.6))
+    yield NamedCurve("round the hole of an annulus", annulus, hole, "given")
+
+
+def torus_points(mesh: Mesh, along: int, across: int, count: int) -> IntArray:
+    """Vertices on the curve that winds ``along`` times round the axis and ``across`` the tube.
+
+    The mesh is `shapes.torus` with its default radii.
+    """
+    t = np.arange(count) * 2 * np.pi / count
+    u, v = along * t, across * t
+    radius = 1.0 + 0.4 * np.cos(v)
+    return nearest_vertices(
+        mesh, np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=1)
+    )
+
+
+def handle_points(mesh: Mesh, half: float) -> IntArray:
+    """Vertices of `shapes.double_torus` through a hole and back on the outside.
+
+    Its left handle is that with ``half`` -1, its right one that with 1.
+    """
+    plane = np.abs(mesh.vertices[:, 1]) < 0.08
+    candidates = np.flatnonzero(plane & (half * mesh.vertices[:, 0] > 0.2))
+    reach = np.abs(mesh.vertices[candidates, 0])
+    middle = 0.5 * (reach.max() + reach[reach > 1.0].min())
+    outer = candidates[np.argsort(-reach)[0]]
+    tube = candidates[np.argsort(np.abs(reach - middle))]
+    top = tube[mesh.vertices[tube, 2] > 0.02][0]
+    bottom = tube[mesh.vertices[tube, 2] < -0.02][0]
+    return np.array([outer, top, bottom])
+
+
+def nearest_vertices(mesh: Mesh, positions: FloatArray) -> IntArray:
+    """Index of the vertex nearest to each position."""
+    offset = mesh.vertices[None] - np.asarray(positions)[:, None]
+    return np.linalg.norm(offset, axis=2).argmin(axis=1)
+
+
+def _circle(angles: Sequence[float], radius: float) -> FloatArray:
+    return radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
