@@ -8,7 +8,6 @@ import re
 from functools import cache
 
 import numpy as np
-import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -126,12 +125,6 @@ ANNULUS, DISC = ("annulus", 2, False), ("disc", 2, False)
 ROUND_THE_HOLE = (ANNULUS, at_vertices(ANNULUS, [67, 34, 29]), True, "given")
 ALONG_THE_RIM = (DISC, at_vertices(DISC, [73, 75, 32]), False, "given")
 
-runs_off_the_rim = pytest.mark.xfail(
-    reason="an open curve, or one that bounds no region, breaks where its initial path follows "
-    "the boundary: Status.NOT_ONE_CURVE instead of one curve",
-    raises=AssertionError,
-)
-
 
 @settings(max_examples=14)
 @given(requests(WITHOUT_BOUNDARY))
@@ -145,7 +138,6 @@ def test_nicmm_without_boundary(request):
     assert_promise_is_kept(*request, "nicmm")
 
 
-@runs_off_the_rim
 @settings(max_examples=10)
 @given(requests(WITH_BOUNDARY))
 @example(ROUND_THE_HOLE)
@@ -154,7 +146,6 @@ def test_variational_with_boundary(request):
     assert_promise_is_kept(*request, "variational")
 
 
-@runs_off_the_rim
 @settings(max_examples=5)
 @given(requests(WITH_BOUNDARY))
 @example(ROUND_THE_HOLE)
