@@ -71,6 +71,8 @@ class Picture:
         Shade the mesh smoothly; flat shading shows its faces.
     edges : bool
         Draw the mesh's edges as thin dark lines.
+    marks : (m, 3) float array or None
+        Places to show as small balls, such as via points.
     """
 
     title: str
@@ -80,6 +82,7 @@ class Picture:
     alignment: FloatArray | None = None
     smooth: bool = True
     edges: bool = False
+    marks: FloatArray | None = None
 
 
 def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None = None) -> None:
@@ -109,6 +112,10 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     balls = _material("Control points", BLACK)
     for place in _control_positions(picture) @ axes.T / unit - centre:
         _add_ball(place, BALL * width, balls)
+    if picture.marks is not None:
+        marks = _material("Marks", BLUE)
+        for place in picture.marks @ axes.T / unit - centre:
+            _add_ball(place, 0.8 * BALL * width, marks)
     _add_lights()
     _add_camera(width)
     _render(path, scale)

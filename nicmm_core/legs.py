@@ -79,45 +79,38 @@ class Legs:
         closed = self.count == len(self._waypoints)
         return path if closed else [*path, self._waypoints[-1]]
 
-    @property
-    def lengths(self) -> dict[int, float]:
-        """Length of each leg that is laid."""
-        return dict(self._length)
-
-    def unhindered_lengths(self, laid: dict[int, float], straight: float) -> FloatArray:
-        """Length that each leg would have if there were no others, shape (number of legs,).
+    def unhindered_lengths(self, straight: float) -> FloatArray:
+        """Length that each leg would have if there were no others, shape (count,).
 
         Parameters
         ----------
-        laid : dict of int to float
-            Lengths that legs came to have beside one another.
         straight : float
-            Ratio to the distance of its ends in space up to which a leg laid is taken to be one
-            that nothing hindered.
+            Ratio to the distance of its ends in space up to which nothing has hindered a leg that
+            is laid.
         """
         nothing = np.zeros(0, dtype=np.int64)
         free = Obstacles(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
         lengths = np.zeros(self.count)
         for leg in range(self.count):
             start, end = (self._split.position(vertex) for vertex in self.ends(leg))
-            lengths[leg] = laid.get(leg, np.inf)
-            if lengths[leg] <= straight * np.linalg.norm(end - start):
-                continue
-            for vertex in self.ends(leg):
-                self._open_corners(vertex)
-            way = self._search.shortest(*self.ends(leg), free)
-            if way is None:
-                raise CrossingError(leg)
-            lengths[leg] = way.length
+            lengths[leg] = self._length.get(leg, np.inf)
+            if lengths[leg] > straight * np.linalg.norm(end - start):
+                for vertex in self.ends(leg):
+                    self._open_corners(vertex)
+                way = self._search.shortest(*self.ends(leg), free)
+                if way is None:
+                    raise CrossingError(leg)
+                lengths[leg] = way.length
         return lengths
 
-    def lay_all(self, sequence: list[int], most_length: float = np.inf) -> bool:
+    def lay_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
         """Lay every leg; False when the path has become longer than it may be.
 
         Parameters
         ----------
-        sequence : list of int
-            All legs; earlier ones are more direct.
+        sequence : (count,) int array, optional
+            All legs in the order in which they are laid, by default that of the path; earlier ones
+            are more direct.
         most_length : float
 
         Raises
@@ -127,7 +120,8 @@ class Legs:
         UnreachableError
             If the path winds round itself too often.
         """
-        safe, separating = self._by_separation(sequence)
+        legs = list(range(self.count)) if sequence is None else sequence.tolist()
+        safe, separating = self._by_separation(legs)
         for leg in safe:
             found = self._find(leg)
             if found is None:

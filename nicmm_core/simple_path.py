@@ -14,7 +14,7 @@ import numpy as np
 from .array_types import FloatArray, IntArray
 from .errors import UnreachableError
 from .leg_search import LegSearch
-from .legs import Legs
+from .legs import CrossingError, Legs
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 from .virtual_splits import SplitMesh
@@ -84,32 +84,30 @@ def lay_path(
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
     clearance *= min(1.0, (ROOMY / len(points)) ** 0.5)
     generator = np.random.default_rng(0)
-    laid: dict[int, float] = {}
-    unhindered = np.zeros(0)
     best: Path | None = None
     failure: UnreachableError | None = None
+    sequence: IntArray | None = None
     for attempt in range(MOST_TRIES):
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
         separate(split, waypoints)
         search = LegSearch(mesh, split, component, importance, clearance)
         legs = Legs(split, search, waypoints.tolist(), closed)
-        sequence = np.arange(legs.count)
-        if attempt == 1:
-            unhindered = legs.unhindered_lengths(laid, LONG)
-            if best is not None and best.length <= LONG * unhindered.sum():
-                break
-        if attempt >= 1:
-            shuffle = generator.normal(scale=SHUFFLE, size=legs.count) if attempt > 1 else 0.0
-            sequence = np.argsort(unhindered * np.exp(shuffle), kind="stable")
+        done = False
         try:
-            done = legs.lay_all(sequence.tolist(), np.inf if best is None else best.length)
+            done = legs.lay_all(sequence, np.inf if best is None else best.length)
         except UnreachableError as error:
-            failure, done = error, False
-        if attempt == 0:
-            laid = legs.lengths
+            # Winding too often says no more than that; crossing, that no path may exist.
+            if failure is None or not isinstance(error, CrossingError):
+                failure = error
         if done:
             best = Path(split, legs.vertices, waypoints, legs.length)
+        if attempt == 0:
+            unhindered = legs.unhindered_lengths(LONG)
+        if best is not None and best.length <= LONG * unhindered.sum():
+            break
+        shuffle = generator.normal(scale=SHUFFLE, size=legs.count) if attempt > 0 else 0.0
+        sequence = np.argsort(unhindered * np.exp(shuffle), kind="stable")
     if best is not None:
         return best
     assert failure is not None
