@@ -7,13 +7,13 @@ the boundary. So there is a way wherever the surface is still connected, however
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
+from .leg_graph import Node, Patch, pinched_vertices
 from .mesh import Mesh, unique_edges
 from .virtual_splits import SplitMesh
 
@@ -48,9 +48,6 @@ REACH_GROWTH = 2.0
 WHOLE_SHARE = 0.5
 """Share of the faces beyond which a part of the surface is no cheaper to search than the whole."""
 
-Node = int | tuple[int, int]
-"""A vertex of the split mesh, or an edge of it for its midpoint."""
-
 
 @dataclass(frozen=True)
 class Obstacles:
@@ -84,80 +81,6 @@ class Leg:
 
     nodes: list[Node]
     length: float
-
-
-@dataclass(frozen=True)
-class _Patch:
-    """Some faces of the split mesh as a graph of n vertices and then E edge midpoints.
-
-    Attributes
-    ----------
-    vertices : (n,) int array
-        Vertices of the split mesh, sorted.
-    edges : (E, 2) int array
-        Sorted.
-    on_rim, branching : (E,) bool array
-        Edges of one face, and of more than two.
-    positions : (n + E, 3) float array
-        Of the nodes.
-    weight : (n + E,) float array
-        Squared importance at the nodes.
-    arcs : (a, 2) int array
-    through_midpoints : (a,) bool array
-    """
-
-    vertices: IntArray
-    edges: IntArray
-    on_rim: BoolArray
-    branching: BoolArray
-    positions: FloatArray
-    weight: FloatArray
-    arcs: IntArray
-    through_midpoints: BoolArray
-
-    @property
-    def size(self) -> int:
-        return len(self.vertices) + len(self.edges)
-
-    @cached_property
-    def lengths(self) -> FloatArray:
-        """Lengths of the arcs, weighted by importance, shape (a,)."""
-        return self.step_lengths(self.arcs)
-
-    def step_lengths(self, steps: IntArray) -> FloatArray:
-        """Weighted lengths of pairs of nodes (s, 2), shape (s,)."""
-        start, end = steps.T
-        apart = np.linalg.norm(self.positions[start] - self.positions[end], axis=1)
-        return apart * (0.5 * (self.weight[start] + self.weight[end]))
-
-    def graph(self, lengths: FloatArray) -> sparse.csr_array:
-        """The arcs as a symmetric matrix; one with an infinite length cannot be passed."""
-        arc, indices, indptr = self._structure
-        return sparse.csr_array((lengths[arc], indices, indptr), shape=(self.size, self.size))
-
-    @cached_property
-    def _structure(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The arc of each matrix entry, then the entries' columns and where rows start."""
-        arc = np.arange(len(self.arcs))
-        rows, columns = np.concatenate([self.arcs, self.arcs[:, ::-1]]).T
-        entries = sparse.coo_array(
-            (np.concatenate([arc, arc]), (rows, columns)), shape=(self.size, self.size)
-        )
-        # Two faces with the same corners give arcs twice, whose numbers must not be added.
-        entries.has_canonical_format = True
-        matrix = entries.tocsr()
-        return matrix.data, matrix.indices, matrix.indptr
-
-    def places(self, vertices: IntArray) -> IntArray:
-        """Nodes of vertices of the split mesh, without those that are not here."""
-        place = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
-        return place[self.vertices[place] == vertices]
-
-    def node(self, place: int) -> Node:
-        if place < len(self.vertices):
-            return int(self.vertices[place])
-        start, end = self.vertices[self.edges[place - len(self.vertices)]]
-        return int(start), int(end)
 
 
 class LegSearch:
@@ -195,7 +118,7 @@ class LegSearch:
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
         np.maximum.at(self._longest_edge, mesh.faces, sides[:, None])
-        self._kept: tuple[int, _Patch] | None = None
+        self._kept: tuple[int, Patch] | None = None
         self._least_factor = 1.0
         if importance is not None:
             self._least_factor = min(1.0, max(float((importance**2).min()), LEAST_WEIGHT))
@@ -240,7 +163,7 @@ class LegSearch:
         return all(reached(first) & reached(second) for first, second in pairs)
 
     def _search(
-        self, patch: _Patch, source: int, target: int, obstacles: Obstacles, limit: float
+        self, patch: Patch, source: int, target: int, obstacles: Obstacles, limit: float
     ) -> Leg | None:
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
         factor = self._branch_factor(patch)
@@ -267,13 +190,13 @@ class LegSearch:
         length = float(patch.step_lengths(steps).sum())
         return Leg([patch.node(place) for place in places], length)
 
-    def _whole(self) -> _Patch:
+    def _whole(self) -> Patch:
         """The component, kept until something is split."""
         if self._kept is None or self._kept[0] != self._split.n_faces:
             self._kept = self._split.n_faces, self._patch(self._component)
         return self._kept[1]
 
-    def _patch(self, inside: BoolArray) -> _Patch:
+    def _patch(self, inside: BoolArray) -> Patch:
         """Graph of the living faces in some input faces.
 
         Arcs are edges, halves of edges, and the three lines between midpoints in every face. Lines
@@ -308,7 +231,7 @@ class LegSearch:
             importance = self._importance_at(vertices)
             at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
             weight = np.maximum(at_nodes**2, LEAST_WEIGHT)
-        return _Patch(
+        return Patch(
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
@@ -319,7 +242,7 @@ class LegSearch:
             through_midpoints=np.arange(len(arcs)) >= len(midpoint),
         )
 
-    def _free(self, patch: _Patch, obstacles: Obstacles, ends: IntArray) -> BoolArray:
+    def _free(self, patch: Patch, obstacles: Obstacles, ends: IntArray) -> BoolArray:
         """Nodes that a leg between two ends may use: off the boundary and the obstacles."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
@@ -336,7 +259,7 @@ class LegSearch:
         free[ends] = True
         return free
 
-    def _branch_factor(self, patch: _Patch) -> FloatArray | None:
+    def _branch_factor(self, patch: Patch) -> FloatArray | None:
         """How much longer each node counts, or None on a manifold."""
         pinched = self._pinched_here(patch)
         if not (len(pinched) or patch.branching.any()):
@@ -347,7 +270,7 @@ class LegSearch:
         factor[len(patch.vertices) + np.flatnonzero(patch.branching)] = BRANCH_FACTOR
         return factor
 
-    def _pinched_here(self, patch: _Patch) -> IntArray:
+    def _pinched_here(self, patch: Patch) -> IntArray:
         n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
         return np.flatnonzero(self._pinched[patch.vertices[:n_input]])
 
@@ -360,7 +283,7 @@ class LegSearch:
             result[place] = sum(w * self._importance[vertex] for vertex, w in weights.items())
         return result
 
-    def _without_crossing(self, patch: _Patch, places: list[int]) -> list[int]:
+    def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:
         """Cut short a way that runs along an edge and also passes its midpoint.
 
         Where way counts as longer beside other legs than a little farther off, such a way may be
@@ -379,29 +302,6 @@ class LegSearch:
                 first, last = (here, high) if here < low else (low, here)
                 return self._without_crossing(patch, places[: first + 1] + places[last:])
         return places
-
-
-def pinched_vertices(mesh: Mesh) -> BoolArray:
-    """Vertices whose faces form more than one fan, shape (V,).
-
-    Faces belong to one fan of a vertex when edges at that vertex lead from one to the other.
-    """
-    faces = mesh.faces
-    n_vertices = len(mesh.vertices)
-    # Corner 3 f + c is a node; two corners at one vertex are joined by a common edge there.
-    corner = np.arange(faces.size).reshape(-1, 3)
-    vertex = np.concatenate([faces.ravel(), faces.ravel()])
-    other = np.concatenate([np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()])
-    node = np.concatenate([corner.ravel(), corner.ravel()])
-    by_edge = np.argsort(vertex * n_vertices + other, kind="stable")
-    vertex, other, node = vertex[by_edge], other[by_edge], node[by_edge]
-    same = (vertex[1:] == vertex[:-1]) & (other[1:] == other[:-1])
-    entries = (np.ones(same.sum(), dtype=np.int8), (node[:-1][same], node[1:][same]))
-    graph = sparse.coo_array(entries, shape=(faces.size, faces.size))
-    n_fans, fan = csgraph.connected_components(graph, directed=False)
-    vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
-    vertex_of_fan[fan] = faces.ravel()
-    return np.bincount(vertex_of_fan, minlength=n_vertices) > 1
 
 
 def _closeness(

@@ -12,7 +12,8 @@ import numpy as np
 
 from .array_types import FloatArray, IntArray
 from .errors import UnreachableError
-from .leg_search import Leg, LegSearch, Node, Obstacles
+from .leg_graph import Node
+from .leg_search import Leg, LegSearch, Obstacles
 from .virtual_splits import SplitMesh
 
 MOST_PATH_SPLITS = 20_000

@@ -29,9 +29,12 @@ LONG = 1.3
 """Length of a path, relative to its legs without obstacles, above which other paths are tried."""
 
 MOST_TRIES = 6
-"""Paths that are laid at most."""
+"""Paths that are laid at most, to find a shorter one."""
 
-SHUFFLE = 0.35
+MOST_TRIES_WHILE_CROSSING = 14
+"""Paths that are laid at most as long as legs of each would cross."""
+
+SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0
 """How far a try changes which legs come first: standard deviation of the logarithm of lengths."""
 
 
@@ -87,7 +90,7 @@ def lay_path(
     best: Path | None = None
     failure: UnreachableError | None = None
     sequence: IntArray | None = None
-    for attempt in range(MOST_TRIES):
+    for attempt in range(MOST_TRIES_WHILE_CROSSING):
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
         separate(split, waypoints)
@@ -106,7 +109,11 @@ def lay_path(
             unhindered = legs.unhindered_lengths(LONG)
         if best is not None and best.length <= LONG * unhindered.sum():
             break
-        shuffle = generator.normal(scale=SHUFFLE, size=legs.count) if attempt > 0 else 0.0
+        crossing = best is None and isinstance(failure, CrossingError)
+        if attempt + 1 >= MOST_TRIES and not crossing:
+            break
+        scale = SHUFFLE_WHILE_CROSSING if crossing else SHUFFLE
+        shuffle = generator.normal(scale=scale, size=legs.count) if attempt > 0 else 0.0
         sequence = np.argsort(unhindered * np.exp(shuffle), kind="stable")
     if best is not None:
         return best
