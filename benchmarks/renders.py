@@ -102,7 +102,8 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     # Cycles has lengths built in, so everything is shown at the size of the mesh's diagonal.
     unit = picture.mesh.diagonal
     placed = picture.mesh.vertices @ axes.T / unit
-    shown = np.concatenate([curve.points for curve, _ in picture.curves]) @ axes.T / unit
+    marks = np.zeros((0, 3)) if picture.marks is None else picture.marks
+    shown = np.concatenate([*(curve.points for curve, _ in picture.curves), marks]) @ axes.T / unit
     centre = 0.5 * (shown.min(axis=0) + shown.max(axis=0))
     width = max(MARGIN * float(np.ptp(shown, axis=0)[:2].max()), LEAST_WIDTH)
     _add_mesh(picture, placed - centre, width)
@@ -112,10 +113,9 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     balls = _material("Control points", BLACK)
     for place in _control_positions(picture) @ axes.T / unit - centre:
         _add_ball(place, BALL * width, balls)
-    if picture.marks is not None:
-        marks = _material("Marks", BLUE)
-        for place in picture.marks @ axes.T / unit - centre:
-            _add_ball(place, 0.8 * BALL * width, marks)
+    blue = _material("Marks", BLUE)
+    for place in marks @ axes.T / unit - centre:
+        _add_ball(place, 0.8 * BALL * width, blue)
     _add_lights()
     _add_camera(width)
     _render(path, scale)
