@@ -117,6 +117,11 @@ def ensure_environment() -> None:
     stamp = VENV / "installed.sha256"
     if VENV_PYTHON.exists() and stamp.is_file() and stamp.read_text() == fingerprint:
         return
+    if VENV.is_symlink():
+        raise BuildError(
+            f"{VENV.name}/ is a link and does not hold what {REQUIREMENTS.name} asks for; it is not "
+            "emptied for another project: remove the link, or bring its target up to date there"
+        )
     say(f"Making {VENV.name}/ and installing {REQUIREMENTS.name} (some minutes, once)")
     if run([sys.executable, "-m", "venv", "--clear", VENV]) != 0:
         raise BuildError(f"{VENV.name}/ could not be made: see the lines above")
