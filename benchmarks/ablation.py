@@ -11,8 +11,9 @@ import numpy as np
 from nicmm_core.design import is_one_curve
 from nicmm_core.losses import LossWeights
 from nicmm_core.mesh import Mesh
-from nicmm_core.network import CurveNetwork, NetworkConfig
+from nicmm_core.network import NetworkConfig
 from nicmm_core.prediction import PredictionConfig, predict
+from nicmm_core.trainable_network import CurveNetwork
 
 from . import collections, report
 from .scale import Scale

@@ -14,12 +14,12 @@ from nicmm_core.curve import SurfaceCurve
 from nicmm_core.design import is_one_curve
 from nicmm_core.features import BASE_CHANNELS
 from nicmm_core.mesh import Mesh
-from nicmm_core.network import DISTANCE_CHANNEL, CurveNetwork
+from nicmm_core.network import DISTANCE_CHANNEL
 from nicmm_core.prediction import PredictionConfig, predict
 from nicmm_core.problem import Problem, build_problem
 from nicmm_core.signed_distance import heat_distance
 from nicmm_core.surface_points import locate_control_points
-from nicmm_core.weights_file import load_network
+from nicmm_core.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
 from .polylines import initial_path

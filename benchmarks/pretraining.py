@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from nicmm_core.losses import LossWeights
-from nicmm_core.weights_file import load_network
+from nicmm_core.trainable_network import load_network
 
 from . import collections, report
 from .scale import Scale

@@ -17,13 +17,13 @@ from nicmm_core.contour import extract_curves
 from nicmm_core.curve import SurfaceCurve
 from nicmm_core.losses import LossWeights, balanced
 from nicmm_core.mesh import Mesh
-from nicmm_core.network import CurveNetwork, NetworkConfig
+from nicmm_core.network import NetworkConfig
 from nicmm_core.prediction import PredictionConfig, predict
 from nicmm_core.pretraining import PretrainingConfig, pretrain
 from nicmm_core.problem import Problem, build_problem
 from nicmm_core.surface_points import locate_control_points
 from nicmm_core.topology import keep_topology
-from nicmm_core.weights_file import load_network
+from nicmm_core.trainable_network import CurveNetwork, load_network
 
 from . import plots, report
 from .measures import diagonal, distances

@@ -33,8 +33,12 @@ class DesignProperties:
         description="How the curve is computed",
         items=(
             ("NICMM", "NICMM", "The default method"),
-            ("NICMM_PAPER", "NICMM (Paper)", "The method exactly as the paper describes it"),
-            ("VARIATIONAL", "Variational", "The same energy without a network or PyTorch"),
+            (
+                "NICMM_PAPER",
+                "NICMM (Paper)",
+                "The method exactly as the paper describes it. Needs PyTorch",
+            ),
+            ("VARIATIONAL", "Variational", "The same energy without a network"),
         ),
         default="NICMM",
     )

@@ -28,8 +28,8 @@ def check_torch() -> None:
         import torch  # noqa: F401
     except ImportError as error:
         raise MissingPackageError(
-            f"method needs PyTorch, which cannot be imported ({error}); install it into this "
-            "Python with 'pip install torch', or choose the method \"variational\""
+            f'method "nicmm-paper" needs PyTorch, which cannot be imported ({error}); install it '
+            "into this Python with 'pip install torch', or choose the method \"nicmm\""
         ) from error
 
 

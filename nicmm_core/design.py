@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,15 +29,15 @@ from .errors import ArgumentError
 from .exact_curve import ExactCurve
 from .losses import LossWeights, balanced
 from .mesh import Mesh
+from .network import NetworkWeights
 from .problem import Problem, build_problem
 from .relaxation import RelaxationConfig, Relaxed, relax
+from .single_pass import predict_once
 from .solution import Solution
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
 from .via_points import ViaPoints
-
-if TYPE_CHECKING:
-    from .network import CurveNetwork
+from .weights_file import load_weights
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -125,7 +125,7 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._networks: dict[int, CurveNetwork] = {}
+        self._weights: dict[int, NetworkWeights] = {}
 
     def design(
         self,
@@ -145,7 +145,7 @@ class Designer:
         check_choices(order, method)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
-        if method != "variational":
+        if method == "nicmm-paper":
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         problem = build_problem(
@@ -198,13 +198,14 @@ class Designer:
         watch = None if progress is None else self._field_watcher(problem, progress)
         if method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        # This imports PyTorch, which nothing before needs.
-        from . import prediction
-
-        network = self._network(problem.features.shape[1])
+        pretrained = self._pretrained(problem.features.shape[1])
         if method == "nicmm":
-            return prediction.predict_once(network, problem)
-        return prediction.predict(network, problem, weights, prediction.PredictionConfig(), watch)
+            return predict_once(pretrained, problem)
+        # These import PyTorch, which nothing else needs.
+        from .prediction import PredictionConfig, predict
+        from .trainable_network import build_network
+
+        return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 
     def _relaxed(
         self, problem: Problem, curve: SurfaceCurve, smoothness: float, progress: Progress | None
@@ -223,12 +224,10 @@ class Designer:
     def _normals(self) -> FloatArray:
         return unsigned_normals(self.mesh)
 
-    def _network(self, channels: int) -> CurveNetwork:
-        if channels not in self._networks:
-            from .weights_file import load_network
-
-            self._networks[channels] = load_network(channels=channels)
-        return self._networks[channels]
+    def _pretrained(self, channels: int) -> NetworkWeights:
+        if channels not in self._weights:
+            self._weights[channels] = load_weights(channels=channels)
+        return self._weights[channels]
 
     def _curves(
         self, problem: Problem, field: FloatArray, keeps_topology: bool = False

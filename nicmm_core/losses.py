@@ -13,12 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
+from .array_types import Array
 from .problem import Problem
-
-Array = Any
-"""A NumPy array or a tensor."""
 
 Operator = Callable[[Array], Array]
 """A linear map of vectors."""

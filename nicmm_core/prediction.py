@@ -19,11 +19,11 @@ from .losses import (
     smoothness_density,
     total_loss,
 )
-from .network import CurveNetwork
 from .problem import Problem
 from .solution import Solution
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
+from .trainable_network import CurveNetwork
 
 BAND_WIDTH = 3.0
 """Width of the narrow band about the curve, in mean edge lengths (section 4.1)."""
@@ -115,20 +115,6 @@ def predict(
         loss.backward()
         optimiser.step()
     return Solution(best_field, best_terms, losses, stopped)
-
-
-@single_thread()
-@torch.no_grad()
-def predict_once(network: CurveNetwork, problem: Problem) -> Solution:
-    """What the network says as it is, without any training on the problem."""
-    device = torch.device("cpu")
-    surface = surface_tensors(problem, device)
-    phi = network(network_input(problem, device))  # (n,)
-    terms = _as_floats(loss_terms(surface, phi))
-    field = phi.numpy().astype(np.float64)
-    if not np.isfinite(field).all():
-        return Solution(problem.initial_distance, terms, [], "diverged")
-    return Solution(field, terms, [], "converged")
 
 
 @torch.no_grad()

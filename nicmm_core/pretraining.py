@@ -15,12 +15,13 @@ import torch
 from .errors import ArgumentError, UnreachableError
 from .losses import LossWeights, loss_terms, total_loss
 from .mesh import Mesh
-from .network import CurveNetwork, NetworkConfig
+from .network import NetworkConfig
 from .problem import Problem, build_problem
 from .surface_points import locate_control_points
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
-from .weights_file import save_network
+from .trainable_network import CurveNetwork, network_weights
+from .weights_file import save_weights
 
 GRADIENT_LIMIT = 1.0
 """Norm to which a step's gradient is clipped; single sets with a bad loop would throw training."""
@@ -134,7 +135,7 @@ def pretrain(
         partial = checkpoint.with_suffix(".partial")
         torch.save(state, partial)
         partial.replace(checkpoint)
-    save_network(output, network)
+    save_weights(output, network_weights(network))
     checkpoint.unlink(missing_ok=True)
     return losses
 

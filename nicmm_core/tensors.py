@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from . import single_pass
 from .array_types import FloatArray
 from .losses import EnergySurface, energy_surface
 from .network import NetworkInput
@@ -30,14 +31,8 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
 
 def network_input(problem: Problem, device: torch.device) -> NetworkInput:
     """Move what the network sees of a problem to a device."""
-    areas = problem.elements.vertex_areas
-    return NetworkInput(
-        features=_tensor(problem.features, device),
-        initial_distance=_tensor(problem.initial_distance, device),
-        area_share=_tensor(areas / areas.sum(), device),
-        response=_tensor(problem.smoother.response, device),
-        control_vertices=torch.as_tensor(problem.loop.control_vertices, device=device),
-    )
+    arrays = single_pass.network_input(problem)
+    return NetworkInput(*(torch.as_tensor(array, device=device) for array in arrays))
 
 
 def _tensor(array: FloatArray, device: torch.device) -> Tensor:

@@ -21,9 +21,18 @@ MENUS = (
 )
 ENABLE = """
 import sys
+import bpy
 import addon_utils
 addon_utils.extensions_refresh()
 assert addon_utils.enable("bl_ext.user_default.nicmm_curves", default_set=True) is not None
+"""
+DESIGN = """
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+bpy.context.object.data.vertices.foreach_set("select", [i in (3, 60, 100) for i in range(162)])
+assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+"""
+REPORT = """
 loaded = {name.partition(".")[0] for name in sys.modules}
 addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
 print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}))
@@ -45,11 +54,12 @@ def test_runs_from_the_installed_zip(extension):
     assert not (libraries / "numpy").exists()
 
 
-def test_enabling_loads_no_library(tmp_path):
+@pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy"])])
+def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded):
     build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
     ran = subprocess.run(
-        [sys.executable, "-c", f"import bpy\n{ENABLE}"],
+        [sys.executable, "-c", ENABLE + steps + REPORT],
         env=environment,
         capture_output=True,
         text=True,
@@ -57,7 +67,7 @@ def test_enabling_loads_no_library(tmp_path):
         check=False,
     )
     assert ran.returncode == 0, ran.stderr
-    assert ran.stdout.splitlines()[-1].split() == ["loaded:"]
+    assert ran.stdout.splitlines()[-1].split() == ["loaded:", *loaded]
 
 
 def test_menus_and_panel(extension):

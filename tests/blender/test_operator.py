@@ -321,9 +321,10 @@ def test_open_curve_is_not_cyclic(empty_scene):
 
 
 @pytest.mark.parametrize(
-    ("library", "remedy"), [("igl", "Install the zip"), ("torch", "built with --with-torch")]
+    ("library", "method", "remedy"),
+    [("igl", "NICMM", "Install the zip"), ("torch", "NICMM_PAPER", "built with --with-torch")],
 )
-def test_missing_library_is_reported(empty_scene, monkeypatch, library, remedy):
+def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, remedy):
     import_module(f"{empty_scene.name}.nicmm_blender.designers").forget()
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
@@ -333,7 +334,7 @@ def test_missing_library_is_reported(empty_scene, monkeypatch, library, remedy):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.delattr(empty_scene.module, "nicmm_core")
     monkeypatch.setitem(sys.modules, library, None)
-    report = reported_error()
+    report = reported_error(method=method)
     assert library in report
     assert remedy in report
 

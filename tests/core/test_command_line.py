@@ -13,7 +13,7 @@ import nicmm_core as nicmm
 from nicmm_core.__main__ import main
 from nicmm_core.curve import SurfaceCurve
 from nicmm_core.files import read_mesh, write_mesh
-from nicmm_core.weights_file import load_network
+from nicmm_core.weights_file import load_weights
 from tests.core.checks import assert_valid_curve
 
 ROOT = Path(__file__).parents[2]
@@ -136,7 +136,7 @@ def test_pretrain_writes_weights_with_the_switches_asked_for(mesh_file, tmp_path
     output = tmp_path / "weights.npz"
     options = ["--sets", "2", "--epochs", "1", "--no-attention"]
     assert main(["pretrain", str(mesh_file), "-o", str(output), *options]) == 0
-    config = load_network(output).config
+    config = load_weights(output).config
     assert (config.attention, config.gating) == (False, True)
     # The bar goes to standard error.
     assert capsys.readouterr().out == ""

@@ -554,20 +554,31 @@ def python(program):
     )
 
 
-def test_import_needs_no_torch():
-    result = python("import sys, nicmm_core; assert 'torch' not in sys.modules")
-    assert result.returncode == 0, result.stderr
+DESIGN = """
+import sys
+import nicmm_core as nicmm
+from nicmm_core import shapes
+mesh = shapes.sphere(2)
+maps = {"obstacles": [0.0] * 100 + [1.0] * 62}
+for method in ("nicmm", "variational"):
+    for given in ({}, maps):
+        design = nicmm.design_curve(mesh, [3, 60, 100], method=method, **given)
+        assert design.status is nicmm.Status.CONVERGED, design.status
+"""
 
 
-def test_design_without_torch_says_what_to_install():
+def test_import_and_default_method_do_not_load_torch():
+    result = python(f"{DESIGN}\nassert 'torch' not in sys.modules")
+    assert result.returncode == 0, result.stderr + result.stdout
+
+
+def test_without_torch_only_the_method_of_the_paper_says_what_to_install():
     result = python(
         "import sys\n"
         "sys.modules['torch'] = None  # makes its import fail\n"
-        "import nicmm_core as nicmm\n"
-        "from nicmm_core import shapes\n"
-        "mesh = shapes.sphere(2)\n"
+        f"{DESIGN}\n"
         "try:\n"
-        "    nicmm.design_curve(mesh, [3, 60, 100])\n"
+        "    nicmm.design_curve(mesh, [3, 60, 100], method='nicmm-paper')\n"
         "except nicmm.MissingPackageError as error:\n"
         "    assert 'torch' in str(error) and 'install' in str(error), error\n"
         "else:\n"

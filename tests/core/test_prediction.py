@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from nicmm_core.losses import LossWeights, loss_terms, total_loss
-from nicmm_core.network import CurveNetwork, NetworkConfig
+from nicmm_core.network import NetworkConfig
 from nicmm_core.prediction import PredictionConfig, narrow_band_energy, predict
 from nicmm_core.problem import build_problem
 from nicmm_core.surface_points import locate_control_points
 from nicmm_core.tensors import surface_tensors
-from nicmm_core.weights_file import load_network
+from nicmm_core.trainable_network import CurveNetwork, load_network
 
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
