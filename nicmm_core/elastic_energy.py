@@ -133,8 +133,9 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
     bands[1] -= stiffness
     if weights.contact:
         contact = contact_residuals(nodes)
-        np.add.at(bands[0], contact.node, weights.contact * contact.derivative**2)
-        np.add.at(slope, contact.node, weights.contact * contact.overlap * contact.derivative)
+        weight = 2.0 * weights.contact  # a move changes what both nodes of a pair have
+        np.add.at(bands[0], contact.node, weight * contact.derivative**2)
+        np.add.at(slope, contact.node, weight * contact.overlap * contact.derivative)
     return ElasticSystem(bands, slope)
 
 
