@@ -152,3 +152,12 @@ def renumbered(mesh, seed):
 def scaled(mesh, factor):
     """The same shape in another size."""
     return nicmm.Mesh(factor * mesh.vertices, mesh.faces)
+
+
+def grid(count):
+    """The unit square in squares with sides of a power of a half, cut along their diagonals."""
+    x, y = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")
+    index = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return nicmm.Mesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces.reshape(-1, 3))

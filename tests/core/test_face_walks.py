@@ -12,9 +12,11 @@ from nicmm_core.curve import curve_on_mesh
 from nicmm_core.face_walks import join, moved, strictly_inside
 from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import (
+    assert_does_not_touch_itself,
     assert_lies_on_surface,
     chosen,
     flipped,
+    grid,
     points_near,
     random_surface_points,
     renumbered,
@@ -163,6 +165,17 @@ def test_a_vertex_is_reached_from_every_face_round_it(ball):
         for way in ways(ball, from_points, end, normals):
             np.testing.assert_allclose(way.points[-1], ball.vertices[100], atol=1e-15)
             assert_lies_on_surface(ball, way)
+
+
+@pytest.mark.parametrize(("end", "through"), [((0.21875, 0.1875), True), ((0.21875, 0.18), False)])
+def test_a_way_through_a_vertex_passes_it_once(end, through):
+    """Past it, the way turns from face to face on the spot."""
+    mesh = grid(8)
+    start = points_near(mesh, [[0.03125, 0.0625, 0.0]])
+    way = ways(mesh, start, points_near(mesh, [[*end, 0.0]]))[0]
+    assert_lies_on_surface(mesh, way)
+    assert_does_not_touch_itself(mesh, way)
+    assert (way.barycentric == 1.0).any() == through
 
 
 def test_points_of_one_face_need_no_crossing(ball):
