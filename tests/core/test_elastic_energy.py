@@ -68,6 +68,12 @@ def test_a_parallel_of_the_sphere_bends_by_the_tangent_of_its_latitude(latitude)
     assert feature_energy(nodes) == pytest.approx(2 * np.pi * np.cos(latitude), rel=5e-3)
 
 
+def test_the_core_of_a_moebius_strip_bends_across_its_seam_as_elsewhere():
+    """κ_g = cos(u / 2), as rulings make that angle with the radius: π for one turn."""
+    core = nodes_on(shapes.moebius_strip(96, 7), circle(angles(96)))
+    assert bending_energy(core) == pytest.approx(np.pi, rel=0.01)
+
+
 def test_an_open_arc_bends_between_its_ends_only(flat_disc):
     """Half a circle bends by π / r, and a straight line not at all."""
     arc = nodes_on(flat_disc, circle(np.linspace(0, np.pi, 65), 0.6), closed=False)
@@ -234,6 +240,22 @@ def test_a_step_solves_the_dense_system_of_the_free_nodes(count, held):
     kept = kept + 0.01 * np.diag(kept).max() * np.eye(free.sum())
     np.testing.assert_array_equal(step[~free], 0.0)
     np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_faces_turned_over_only_turn_the_moves_of_their_nodes(flat_disc, seed):
+    """Matrix and slope are the same but for the signs of nodes whose left is the other side."""
+    mesh = flipped(flat_disc, seed)
+    weights = Balance(3.0, 0.0)
+    here, there = nodes_on(flat_disc, wobble(41)), nodes_on(mesh, wobble(41))
+    one = elastic_system(surface_of(flat_disc), here, weights)
+    other = elastic_system(surface_of(mesh), there, weights)
+    side = there.normals[:, 2]
+    assert set(np.round(side)) == {-1.0, 1.0}
+    np.testing.assert_allclose(
+        dense(other), side[:, None] * dense(one) * side, rtol=0, atol=1e-3 * one.bands.max()
+    )
+    np.testing.assert_allclose(other.slope, side * one.slope, atol=1e-3 * np.abs(one.slope).max())
 
 
 @pytest.mark.parametrize("closed", [True, False])
