@@ -1,18 +1,20 @@
 """Where a polyline on a mesh crosses or touches itself, exactly face by face.
 
 Every segment lies in one face, so two strands can only meet inside a face that both pass, or at a
-point of an edge that belongs to segments of both sides.
+point of an edge that belongs to segments of both sides, or at a vertex.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .array_types import FloatArray, IntArray
+from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
 TOUCHING = 1e-12
+"""Distance in barycentric coordinates at which strands touch: where they cross on an edge, rounding
+may put the point on the near side of it in either face."""
 
 
 def crossing_segments(mesh: Mesh, polyline: SurfacePoints, closed: bool) -> IntArray:
@@ -35,13 +37,27 @@ def crossing_segments(mesh: Mesh, polyline: SurfacePoints, closed: bool) -> IntA
     neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
     first, second = first[~neighbours], second[~neighbours]
     a, b, c, d = start[first], end[first], start[second], end[second]
-    meets = (_turn(a, b, c) * _turn(a, b, d) <= TOUCHING**2) & (
-        _turn(c, d, a) * _turn(c, d, b) <= TOUCHING**2
-    )
+    meets = _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
     # Collinear segments pass both tests wherever they lie on their common line.
-    overlap = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
+    overlap = np.minimum(a, b) <= np.maximum(c, d) + TOUCHING
+    overlap &= np.minimum(c, d) <= np.maximum(a, b) + TOUCHING
     meets &= overlap.all(axis=1)
-    return np.stack([first[meets], second[meets]], axis=1)
+    in_faces = np.stack([first[meets], second[meets]], axis=1)
+    return np.concatenate([in_faces, _vertices_passed_twice(mesh, polyline, n_segments)])
+
+
+def _vertices_passed_twice(mesh: Mesh, polyline: SurfacePoints, n_segments: int) -> IntArray:
+    """Segments from a vertex that strands of different faces pass, shape (p, 2)."""
+    n = len(polyline)
+    here = polyline.barycentric > 0.0
+    place = np.flatnonzero(here.sum(axis=1) == 1)
+    vertex = mesh.faces[polyline.faces[place]][here[place]]
+    order = np.argsort(vertex, kind="stable")
+    first, second = place[order[:-1]], place[order[1:]]
+    apart = second - first
+    again = (vertex[order[:-1]] == vertex[order[1:]]) & (apart > 1)
+    again &= (n_segments < n) | (apart < n - 1)
+    return np.minimum(np.stack([first, second], axis=1)[again], n_segments - 1)
 
 
 def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
@@ -54,6 +70,13 @@ def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
         first.append((at + i).ravel())
         second.append((at + j).ravel())
     return np.concatenate(first), np.concatenate(second)
+
+
+def _reaches_across(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:
+    """Whether c and d lie on different sides of the line ab, or one of them on it."""
+    one, other = _turn(a, b, c), _turn(a, b, d)
+    width = TOUCHING * np.linalg.norm(b - a, axis=1)
+    return (np.minimum(one, other) <= width) & (np.maximum(one, other) >= -width)
 
 
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

@@ -130,11 +130,14 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
     stiffness[: len(nodes.lengths)] = weights.tension / np.maximum(nodes.lengths, _TINY)
     stiffness *= nodes.importance**2
     bands[0] += stiffness + np.roll(stiffness, 1)
-    bands[1] -= stiffness
+    # Without an orientation of the surface, neighbours may have opposite moves to one side.
+    opposite = (nodes.normals * np.roll(nodes.normals, -1, axis=0)).sum(axis=1) < 0.0
+    bands[1] -= np.where(opposite, -stiffness, stiffness)
     if weights.contact:
         contact = contact_residuals(nodes)
-        np.add.at(bands[0], contact.node, weights.contact * contact.derivative**2)
-        np.add.at(slope, contact.node, weights.contact * contact.overlap * contact.derivative)
+        weight = 2.0 * weights.contact  # a move changes what both nodes of a pair have
+        np.add.at(bands[0], contact.node, weight * contact.derivative**2)
+        np.add.at(slope, contact.node, weight * contact.overlap * contact.derivative)
     return ElasticSystem(bands, slope)
 
 

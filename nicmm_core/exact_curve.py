@@ -207,7 +207,10 @@ def _with_nodes(
     dropped = inside & (nearest < SAME_PLACE * arc[-1])
     dropped[control_place] = True
     old = np.flatnonzero(~dropped)
-    order = np.argsort(np.concatenate([at, arc[old]]), kind="stable")
+    # A node comes after the point where its segment begins, also where it has the same place.
+    segment[control_nodes] = control_place
+    before = np.concatenate([segment, old])
+    order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
     merged = SurfacePoints(
         np.concatenate([faces, polyline.faces[old]])[order],
         np.concatenate([barycentric, polyline.barycentric[old]])[order],

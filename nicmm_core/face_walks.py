@@ -91,7 +91,19 @@ def join(
         np.concatenate([*faces, np.zeros(0, np.int64)])[kept],
         np.concatenate([*barycentrics, np.zeros((0, 3))])[kept],
     )
-    return Joins(reached, pair[kept], crossings)
+    once = _last_of_each_vertex(mesh, pair[kept], crossings)
+    crossings = SurfacePoints(crossings.faces[once], crossings.barycentric[once])
+    return Joins(reached, pair[kept][once], crossings)
+
+
+def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> BoolArray:
+    """False where a way that turns about a vertex, from face to face, crosses there once more."""
+    here = crossings.barycentric > 0.0
+    vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
+    vertex[here.sum(axis=1) > 1] = -1
+    last = np.ones(len(pair), dtype=bool)
+    last[:-1] = (vertex[:-1] < 0) | (vertex[:-1] != vertex[1:]) | (pair[:-1] != pair[1:])
+    return last
 
 
 def moved(

@@ -40,15 +40,15 @@ class Contacts:
 
 def contact_residuals(nodes: Nodes) -> Contacts:
     """Which nodes of different strands are closer than the clearance."""
-    n = len(nodes.positions)
     clearance = CLEARANCE * float(nodes.lengths.mean())
     first, second = cKDTree(nodes.positions).query_pairs(clearance, output_type="ndarray").T
-    along = np.abs(first - second)
+    arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])
+    along = np.abs(arc[first] - arc[second])
     if nodes.closed:
-        along = np.minimum(along, n - along)
+        along = np.minimum(along, arc[-1] - along)
     cosine = (nodes.normals[first] * nodes.normals[second]).sum(axis=1)
     # Without an orientation of the surface, normals may differ in sign on one side of it too.
-    kept = (along > ALONG * CLEARANCE) & (cosine > SAME_SIDE)
+    kept = (along > ALONG * clearance) & (cosine > SAME_SIDE)
     first, second = first[kept], second[kept]
     node, other = np.concatenate([first, second]), np.concatenate([second, first])
     offset = nodes.positions[node] - nodes.positions[other]

@@ -3,11 +3,14 @@
 `benchmarks.checker` is the one definition of what is right.
 """
 
+import igl
 import numpy as np
 
 import nicmm_core as nicmm
 from benchmarks.checker import judge_curve
 from benchmarks.named_curves import nearest_vertices  # noqa: F401 - several tests take it from here
+from nicmm_core.curve import curve_on_mesh
+from nicmm_core.face_walks import join, strictly_inside
 
 
 def assert_valid_curve(mesh, curve, control_positions=None, closed=True):
@@ -93,3 +96,68 @@ def joined(*meshes):
         np.concatenate([mesh.vertices for mesh in meshes]),
         np.concatenate([mesh.faces + o for mesh, o in zip(meshes, offsets, strict=True)]),
     )
+
+
+def chosen(points, index):
+    """Some of the points."""
+    return nicmm.SurfacePoints(points.faces[index], points.barycentric[index])
+
+
+def points_near(mesh, positions):
+    """The nearest points of a mesh, strictly inside faces."""
+    positions = np.asarray(positions, dtype=float)
+    _, faces, nearest = igl.point_mesh_squared_distance(positions, mesh.vertices, mesh.faces)
+    corners = np.ascontiguousarray(mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2))
+    barycentric = igl.barycentric_coordinates(nearest, *corners)
+    return nicmm.SurfacePoints(faces.astype(np.int64), strictly_inside(barycentric))
+
+
+def curve_through(mesh, positions, controls, closed=True):
+    """A curve along the positions, straight from each to the next, for places near one another.
+
+    The controls are those of its points that stand for these positions.
+    """
+    points = points_near(mesh, positions)
+    here = np.arange(len(points) if closed else len(points) - 1)
+    there = (here + 1) % len(points)
+    normals = mesh.face_normals[points.faces]
+    agree = np.where((normals[here] * normals[there]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    plane = normals[here] + agree * normals[there]
+    ways = join(mesh, chosen(points, here), chosen(points, there), plane, detour=3.0)
+    assert ways.reached.all()
+    owner = np.concatenate([np.arange(len(points)), ways.pair])
+    order = np.argsort(owner, kind="stable")
+    faces = np.concatenate([points.faces, ways.crossings.faces])[order]
+    barycentric = np.concatenate([points.barycentric, ways.crossings.barycentric])[order]
+    at_controls = np.searchsorted(owner[order], controls)
+    return curve_on_mesh(mesh, closed, faces, barycentric, at_controls)
+
+
+def flipped(mesh, seed):
+    """The same surface with about half of its faces turned over."""
+    turned = np.random.default_rng(seed).random(len(mesh.faces)) < 0.5
+    return nicmm.Mesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+
+def renumbered(mesh, seed):
+    """The same surface with other numbers of vertices and faces and other first corners."""
+    generator = np.random.default_rng(seed)
+    vertex = generator.permutation(len(mesh.vertices))
+    number = np.argsort(vertex)
+    turn = (np.arange(3) + generator.integers(0, 3, (len(mesh.faces), 1))) % 3
+    faces = np.take_along_axis(number[mesh.faces], turn, axis=1)
+    return nicmm.Mesh(mesh.vertices[vertex], faces[generator.permutation(len(faces))])
+
+
+def scaled(mesh, factor):
+    """The same shape in another size."""
+    return nicmm.Mesh(factor * mesh.vertices, mesh.faces)
+
+
+def grid(count):
+    """The unit square in squares with sides of a power of a half, cut along their diagonals."""
+    x, y = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")
+    index = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    return nicmm.Mesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces.reshape(-1, 3))

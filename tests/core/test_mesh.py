@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from tests.core.checks import joined
+from nicmm_core import shapes
+from nicmm_core.mesh import unoriented_vertices
+from tests.core.checks import flipped, joined
 
 CORNERS = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 1, 2], [0, 3, 1]]
@@ -106,3 +108,59 @@ def test_unreferenced_vertices_are_allowed_and_do_not_count():
     mesh = nicmm.Mesh([*CORNERS, [1e6, 0.0, 0.0]], FACES)
     np.testing.assert_array_equal(mesh.referenced, [True, True, True, True, False])
     assert mesh.diagonal == nicmm.Mesh(CORNERS, FACES).diagonal
+
+
+def sides(mesh):
+    """Faces by the vertices of a side, in a plain dictionary."""
+    found = {}
+    for face, corners in enumerate(mesh.faces.tolist()):
+        for corner in range(3):
+            side = frozenset(corners[:corner] + corners[corner + 1 :])
+            found.setdefault(side, []).append((face, corner))
+    return found
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_neighbours_have_the_side_in_common(surface, seed):
+    """Also where faces run against each other; -1 on the boundary and nowhere else."""
+    mesh = flipped(surface, seed)
+    expected = np.full(mesh.faces.shape, -1)
+    for sharing in sides(mesh).values():
+        if len(sharing) == 2:
+            (one, corner), (other, other_corner) = sharing
+            expected[one, corner], expected[other, other_corner] = other, one
+    np.testing.assert_array_equal(mesh.face_neighbours, expected)
+
+
+def test_no_neighbour_lies_beyond_an_edge_of_three_faces():
+    mesh = nicmm.Mesh(np.eye(5, 3), [[0, 1, 2], [1, 0, 3], [0, 1, 4], [2, 1, 3]])
+    expected = [[3, -1, -1], [-1, 3, -1], [-1, -1, -1], [1, -1, 0]]
+    np.testing.assert_array_equal(mesh.face_neighbours, expected)
+
+
+def test_normals_are_unit_vectors_across_their_faces_by_the_right_hand(body):
+    corner = body.vertices[body.faces]
+    normal = body.face_normals
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
+    edges = np.roll(corner, -1, axis=1) - corner
+    np.testing.assert_allclose(np.einsum("fed,fd->fe", edges, normal), 0.0, atol=1e-12)
+    volume = np.linalg.det(np.stack([edges[:, 0], edges[:, 1], normal], axis=1))
+    np.testing.assert_allclose(volume, 2.0 * body.face_areas)
+
+
+def test_a_face_without_area_has_no_normal():
+    mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 0, 5]], [[0, 1, 2], [0, 1, 3]])
+    np.testing.assert_array_equal(mesh.face_normals, [[0, 0, 0], [0, -1, 0]])
+
+
+def test_only_vertices_of_a_face_turned_over_are_unoriented(ball):
+    assert len(unoriented_vertices(ball.faces)) == 0
+    faces = ball.faces.copy()
+    faces[37] = faces[37, ::-1]
+    np.testing.assert_array_equal(unoriented_vertices(faces), np.sort(faces[37]))
+
+
+def test_a_moebius_strip_is_unoriented_across_its_seam_and_nowhere_else():
+    strip = shapes.moebius_strip(12, 3)
+    # The first ring, where the last one is joined to it turned over.
+    np.testing.assert_array_equal(unoriented_vertices(strip.faces), np.arange(4))
