@@ -119,7 +119,7 @@ def ensure_environment() -> None:
         return
     if VENV.is_symlink():
         raise BuildError(
-            f"{VENV.name}/ is a link and does not hold what {REQUIREMENTS.name} asks for; it is not "
+            f"{VENV.name}/ is a link and lacks what {REQUIREMENTS.name} asks for. It is not "
             "emptied for another project: remove the link, or bring its target up to date there"
         )
     say(f"Making {VENV.name}/ and installing {REQUIREMENTS.name} (some minutes, once)")

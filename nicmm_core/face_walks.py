@@ -61,49 +61,42 @@ def join(
     """
     origin, goal = start.positions(mesh), end.positions(mesh)
     forward = goal - origin
-    walk = _Walk(mesh, start.faces, start.barycentric, origin, normals, forward)
     longest = detour * np.linalg.norm(forward, axis=1)
-    support = np.where(end.barycentric > 0.0, mesh.faces[end.faces], -1)
+    reached = _holds(mesh, end, start.faces)
+    walkers = _Walkers(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
     travelled = np.zeros(len(origin))
-    reached = np.zeros(len(origin), dtype=bool)
-    active = np.arange(len(origin))
-    pairs: list[IntArray] = []
-    faces: list[IntArray] = []
-    barycentrics: list[FloatArray] = []
+    pairs, crossings = [], []
     for _ in range(MOST_FACES):
-        corners = mesh.faces[walk.faces[active]]
-        inside = (support[active][:, :, None] == corners[:, None, :]).any(axis=2)
-        arrived = (inside | (support[active] < 0)).all(axis=1)
-        reached[active[arrived]] = True
-        active = active[~arrived]
-        if not len(active):
+        if not len(walkers.index):
             break
-        advance = walk.cross(active)
-        travelled[active] += np.where(np.isfinite(advance), advance, 0.0)
-        active = active[np.isfinite(advance) & (travelled[active] <= longest[active])]
-        pairs.append(active)
-        faces.append(walk.faces[active])
-        barycentrics.append(walk.barycentric[active])
-    pair = np.concatenate([*pairs, np.zeros(0, np.int64)])
+        step = walkers.step_lengths()
+        walkers.enter_next_faces(step <= longest[walkers.index] - travelled[walkers.index])
+        travelled[walkers.index] += walkers.last_step
+        pairs.append(walkers.index)
+        crossings.append(walkers.entry())
+        arrived = _holds(mesh, _select(end, walkers.index), walkers.faces)
+        reached[walkers.index[arrived]] = True
+        walkers.leave_edges(~arrived)
+    if not pairs:
+        return Joins(reached, np.zeros(0, np.int64), _select(start, np.zeros(0, np.int64)))
+    pair = np.concatenate(pairs)
     kept = np.flatnonzero(reached[pair])
     kept = kept[np.argsort(pair[kept], kind="stable")]
-    crossings = SurfacePoints(
-        np.concatenate([*faces, np.zeros(0, np.int64)])[kept],
-        np.concatenate([*barycentrics, np.zeros((0, 3))])[kept],
-    )
-    once = _last_of_each_vertex(mesh, pair[kept], crossings)
-    crossings = SurfacePoints(crossings.faces[once], crossings.barycentric[once])
-    return Joins(reached, pair[kept][once], crossings)
+    parts = zip(*crossings, strict=True)
+    faces, low, high, fraction = (np.concatenate(part)[kept] for part in parts)
+    points = SurfacePoints(faces, _on_edges(mesh, faces, low, high, fraction))
+    once = _last_of_each_vertex(mesh, pair[kept], points)
+    return Joins(reached, pair[kept][once], _select(points, once))
 
 
-def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> BoolArray:
-    """False where a way that turns about a vertex, from face to face, crosses there once more."""
+def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
+    """Crossings without those of a way that turns about a vertex and crosses there once more."""
     here = crossings.barycentric > 0.0
     vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
     vertex[here.sum(axis=1) > 1] = -1
     last = np.ones(len(pair), dtype=bool)
     last[:-1] = (vertex[:-1] < 0) | (vertex[:-1] != vertex[1:]) | (pair[:-1] != pair[1:])
-    return last
+    return np.flatnonzero(last)
 
 
 def moved(
@@ -130,24 +123,29 @@ def moved(
     """
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
-    walk = _Walk(mesh, start.faces, start.barycentric, origin, normals, direction)
+    walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(length > 0.0))
     left = length.copy()
     faces, barycentric = start.faces.copy(), start.barycentric.copy()
     blocked = np.zeros(len(origin), dtype=bool)
-    active = np.flatnonzero(left > 0.0)
+    lost = np.setdiff1d(np.flatnonzero(length > 0.0), walkers.index)
+    blocked[lost] = True
     for _ in range(MOST_FACES):
-        if not len(active):
+        if not len(walkers.index):
             break
-        before_faces, before = walk.faces[active].copy(), walk.barycentric[active].copy()
-        advance = walk.cross(active)
-        stuck = ~np.isfinite(advance)
-        share = np.where(stuck, 1.0, np.clip(left[active] / np.maximum(advance, _TINY), 0.0, 1.0))
-        stops = stuck | (left[active] <= advance)
-        faces[active] = before_faces
-        barycentric[active] = before + share[:, None] * (walk.exit[active] - before)
-        blocked[active[stuck]] = True
-        left[active] -= np.where(stuck, 0.0, advance)
-        active = active[~stops]
+        step = walkers.step_lengths()
+        index = walkers.index
+        beyond = walkers.beyond()
+        stops = (left[index] <= step) | (beyond < 0)
+        ends = index[stops]
+        share = np.clip(left[ends] / np.maximum(step[stops], _TINY), 0.0, 1.0)[:, None]
+        leaving = walkers.exit_barycentric()[stops]
+        barycentric[ends] += share * (leaving - barycentric[ends])
+        blocked[ends] = left[ends] > step[stops]
+        left[index] -= step
+        walkers.enter_next_faces(~stops)
+        faces[walkers.index] = walkers.faces
+        barycentric[walkers.index] = _on_edges(mesh, *walkers.entry())
+        walkers.leave_edges(np.ones(len(walkers.index), dtype=bool))
     return SurfacePoints(faces, strictly_inside(barycentric)), blocked
 
 
@@ -160,72 +158,134 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class _Walk:
-    """Positions of m walkers, each in its plane; arrays change with every crossing."""
+class _Walkers:
+    """Walkers on their way, each in its plane, about to cross an edge of the face that it is in.
+
+    Of that edge one end lies above the plane or in it, the other below. In the next face only the
+    third corner is new: its height says which of the two other sides comes next.
+    """
 
     def __init__(
         self,
         mesh: Mesh,
         faces: IntArray,
-        barycentric: FloatArray,
         origin: FloatArray,
         normals: FloatArray,
         forward: FloatArray,
+        index: IntArray,
     ) -> None:
         self.mesh = mesh
-        self.faces = faces.copy()
-        self.barycentric = barycentric.copy()
-        self.exit = barycentric.copy()  # (m, 3) where each left the face before
-        self._position = origin.copy()
-        self._entry = np.full(len(faces), -1)
-        self._origin = origin
-        self._forward = forward
-        self._across = np.cross(normals, forward)
-
-    def cross(self, walkers: IntArray) -> FloatArray:
-        """Take walkers over the next edge; the length of the step.
-
-        It is inf, and the walker stays, where no face or more than one lies beyond, or the plane
-        leaves the face nowhere.
-        """
-        faces = self.faces[walkers]
-        corners = self.mesh.faces[faces]  # (w, 3)
-        positions = self.mesh.vertices[corners]  # (w, 3, 3)
-        offset = positions - self._origin[walkers][:, None]
-        height = (offset * self._across[walkers][:, None]).sum(axis=2)  # (w, 3)
-        # Side j lies opposite corner j.
-        first, second = [1, 2, 0], [2, 0, 1]
+        self.index = index  # (w,) which of the caller's walkers
+        self.faces = faces[index]
+        self.last_step = np.zeros(len(index))
+        self._origin = origin[index]
+        self._across = np.cross(normals[index], forward[index])
+        self._position = self._crossing = self._origin
+        self._fraction = np.zeros(len(index))
+        corners = mesh.faces[self.faces]  # (w, 3)
+        positions = mesh.vertices[corners]
+        offset = positions - self._origin[:, None]
+        height = (offset * self._across[:, None]).sum(axis=2)
+        # Side j lies opposite corner j. Two of them are crossed, one of them ahead.
         above = height >= 0.0
+        first, second = [1, 2, 0], [2, 0, 1]
         crossed = above[:, first] != above[:, second]
-        crossed[np.arange(len(walkers)), self._entry[walkers]] &= self._entry[walkers] < 0
-        step = height[:, second] - height[:, first]
-        fraction = np.where(crossed, -height[:, first] / np.where(crossed, step, 1.0), 0.0)
-        points = positions[:, first] + fraction[..., None] * (
-            positions[:, second] - positions[:, first]
-        )
-        ahead = ((points - self._origin[walkers][:, None]) * self._forward[walkers][:, None]).sum(2)
-        # After the start one side is left; at the start two are, one behind and one ahead.
+        rise = height[:, second] - height[:, first]
+        share = -height[:, first] / np.where(crossed, rise, 1.0)
+        points = offset[:, first] + share[..., None] * (offset[:, second] - offset[:, first])
+        ahead = (points * forward[index][:, None]).sum(axis=2)
         side = np.where(crossed, ahead, -np.inf).argmax(axis=1)
-        rows = np.arange(len(walkers))
-        leaves = crossed[rows, side]
-        fraction, point = fraction[rows, side], points[rows, side]
+        rows = np.arange(len(index))
+        one, other = (side + 1) % 3, (side + 2) % 3
+        up = above[rows, one]
+        high, low = np.where(up, one, other), np.where(up, other, one)
+        self._side = side
+        self._high, self._low = corners[rows, high], corners[rows, low]
+        self._high_height, self._low_height = height[rows, high], height[rows, low]
+        self._high_position, self._low_position = positions[rows, high], positions[rows, low]
+        # A plane that leaves its face nowhere belongs to no walker.
+        self._keep(crossed[rows, side])
+        self._find_crossing()
 
-        exit_point = np.zeros((len(walkers), 3))
-        exit_point[rows, (side + 1) % 3] = 1.0 - fraction
-        exit_point[rows, (side + 2) % 3] = fraction
-        self.exit[walkers[leaves]] = exit_point[leaves]
-        beyond = self.mesh.face_neighbours[faces, side]
-        goes = leaves & (beyond >= 0)
-        length = np.linalg.norm(point - self._position[walkers], axis=1)
+    def step_lengths(self) -> FloatArray:
+        """Distance to the edge ahead, shape (w,)."""
+        self.last_step = np.linalg.norm(self._crossing - self._position, axis=1)
+        return self.last_step
 
-        to = walkers[goes]
-        entered = beyond[goes]
-        here = corners[rows, (side + 1) % 3][goes]
-        self.faces[to] = entered
-        at_first = self.mesh.faces[entered] == here[:, None]
-        at_second = self.mesh.faces[entered] == corners[rows, (side + 2) % 3][goes][:, None]
-        weight = fraction[goes][:, None]
-        self.barycentric[to] = at_first * (1.0 - weight) + at_second * weight
-        self._entry[to] = (~(at_first | at_second)).argmax(axis=1)
-        self._position[to] = point[goes]
-        return np.where(goes, length, np.inf)
+    def beyond(self) -> IntArray:
+        """The face beyond that edge, -1 where there is none or more than one, shape (w,)."""
+        return self.mesh.face_neighbours[self.faces, self._side]
+
+    def exit_barycentric(self) -> FloatArray:
+        """Where the walkers leave their faces, in coordinates of these, shape (w, 3)."""
+        return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
+
+    def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+        """Where the walkers have entered their faces: face, ends of the edge and share of one."""
+        return self.faces, self._low, self._high, self._fraction
+
+    def enter_next_faces(self, goes: BoolArray) -> None:
+        """Take walkers over their edges; those that may not or cannot go drop out."""
+        beyond = self.beyond()
+        goes = goes & (beyond >= 0)
+        if not goes.all():
+            self._keep(goes)
+            beyond = beyond[goes]
+        self.faces = beyond
+        self._position = self._crossing
+
+    def leave_edges(self, goes: BoolArray) -> None:
+        """Find the next edge of walkers that have just entered a face; others drop out."""
+        if not goes.all():
+            self._keep(goes)
+        corners = self.mesh.faces[self.faces]
+        third = corners.sum(axis=1) - self._low - self._high
+        position = self.mesh.vertices[third]
+        height = ((position - self._origin) * self._across).sum(axis=1)
+        up = height >= 0.0
+        left = np.where(up, self._high, self._low)
+        self._side = (corners == left[:, None]).argmax(axis=1)
+        self._high = np.where(up, third, self._high)
+        self._low = np.where(up, self._low, third)
+        self._high_height = np.where(up, height, self._high_height)
+        self._low_height = np.where(up, self._low_height, height)
+        self._high_position = np.where(up[:, None], position, self._high_position)
+        self._low_position = np.where(up[:, None], self._low_position, position)
+        self._find_crossing()
+
+    def _find_crossing(self) -> None:
+        self._fraction = self._high_height / (self._high_height - self._low_height)
+        step = self._low_position - self._high_position
+        self._crossing = self._high_position + self._fraction[:, None] * step
+
+    def _keep(self, mask: BoolArray) -> None:
+        for name in (
+            "index", "faces", "last_step", "_origin", "_across", "_position", "_side", "_high",
+            "_low", "_high_height", "_low_height", "_high_position", "_low_position", "_fraction",
+            "_crossing",
+        ):  # fmt: skip
+            setattr(self, name, getattr(self, name)[mask])
+
+
+def _on_edges(
+    mesh: Mesh, faces: IntArray, low: IntArray, high: IntArray, fraction: FloatArray
+) -> FloatArray:
+    """Barycentric coordinates of points on edges, a share of the way from high to low, (p, 3)."""
+    corners = mesh.faces[faces]
+    share = fraction[:, None]
+    return (corners == high[:, None]) * (1.0 - share) + (corners == low[:, None]) * share
+
+
+def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
+    """Whether each point lies in its face: a vertex lies in every face round it."""
+    holds = points.faces == faces
+    on_side = np.flatnonzero(~holds & (points.barycentric == 0.0).any(axis=1))
+    if len(on_side):
+        support = mesh.faces[points.faces[on_side]]
+        found = (support[:, :, None] == mesh.faces[faces[on_side]][:, None, :]).any(axis=2)
+        holds[on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=1)
+    return holds
+
+
+def _select(points: SurfacePoints, index: IntArray) -> SurfacePoints:
+    return SurfacePoints(points.faces[index], points.barycentric[index])
