@@ -68,6 +68,20 @@ def test_a_parallel_of_the_sphere_bends_by_the_tangent_of_its_latitude(latitude)
     assert feature_energy(nodes) == pytest.approx(2 * np.pi * np.cos(latitude), rel=5e-3)
 
 
+def test_few_nodes_turn_in_the_tangent_plane():
+    """Three on a parallel: the angle there is that of the chords seen along the normal."""
+    mesh = shapes.sphere(4)
+    latitude = 0.5
+    height = [0.0, 0.0, np.sin(latitude)]
+    nodes = nodes_on(mesh, circle(angles(3), np.cos(latitude)) + height)
+    place = circle(angles(3), np.cos(latitude)) + height
+    before, after = place[0] - place[2], place[1] - place[0]
+    before, after = (v - (v @ place[0]) * place[0] for v in (before, after))
+    cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
+    side = np.sqrt(3.0) * np.cos(latitude)
+    assert bending_energy(nodes) == pytest.approx(3 * np.arccos(cosine) ** 2 / side, rel=0.02)
+
+
 def test_the_core_of_a_moebius_strip_bends_across_its_seam_as_elsewhere():
     """κ_g = cos(u / 2), as rulings make that angle with the radius: π for one turn."""
     core = nodes_on(shapes.moebius_strip(96, 7), circle(angles(96)))

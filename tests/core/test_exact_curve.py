@@ -83,6 +83,14 @@ def test_the_first_control_point_is_the_first_node(ball):
     )
 
 
+def test_control_points_at_vertices_are_there_once(ball):
+    curve = nicmm.design_curve(ball, [12, 80, 41], method="variational").curves[0]
+    exact = exact_curve(surface_of(ball), curve, 64)
+    assert_valid_curve(ball, exact.surface_curve(ball), ball.vertices[[12, 80, 41]])
+    again = respaced(surface_of(ball), exact, 100)
+    assert_valid_curve(ball, again.surface_curve(ball), ball.vertices[[12, 80, 41]])
+
+
 def test_nodes_exactly_at_points_of_edges_keep_the_order():
     """Sides of a square in a grid, whose edges they cross just where nodes are to be."""
     mesh = grid(8)
@@ -191,6 +199,7 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
         assert_valid_curve(flat_disc, result, controls)
         expected = np.where(stays[:, None], exact.nodes.positions, nodes.positions)
         np.testing.assert_allclose(new.nodes.positions, expected, atol=1e-15)
+        np.testing.assert_allclose(result.points[new.node_place], expected, atol=1e-15)
         exact = new
 
 
