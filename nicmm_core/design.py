@@ -26,7 +26,6 @@ from .curve import SurfaceCurve
 from .curve_field import curve_field
 from .curve_nodes import CurveSurface, unsigned_normals
 from .errors import ArgumentError
-from .exact_curve import ExactCurve
 from .losses import LossWeights, balanced
 from .mesh import Mesh
 from .network import NetworkWeights
@@ -58,6 +57,10 @@ class Status(enum.Enum):
     DIVERGED = (
         "the energy left the range of numbers and the best curve before is returned; look for "
         "faces without area, or merge vertices by distance"
+    )
+    UNRELAXED = (
+        "strands of the curve are so close to one another that it is returned as the level set "
+        "gives it; use a finer mesh, fewer points or another order"
     )
     CANCELLED = "cancelled by the progress function; the curve is the best one so far"
     NOT_ONE_CURVE = (
@@ -210,7 +213,7 @@ class Designer:
     def _relaxed(
         self, problem: Problem, curve: SurfaceCurve, smoothness: float, progress: Progress | None
     ) -> Relaxed:
-        watch = None if progress is None else self._curve_watcher(progress)
+        watch = None if progress is None else _seldom(progress, lambda points: points)
         importance, weight = None, 0.0
         if problem.feature_map is not None:
             importance = np.ones(len(self.mesh.vertices))
@@ -254,9 +257,6 @@ class Designer:
             return curves[0].points if curves else np.zeros((0, 3))
 
         return _seldom(progress, points)
-
-    def _curve_watcher(self, progress: Progress) -> Callable[[float, ExactCurve], bool]:
-        return _seldom(progress, lambda curve: curve.polyline.positions(self.mesh))
 
 
 def _seldom(
@@ -359,6 +359,7 @@ _STATUS = {
     "cap": Status.ITERATION_LIMIT,
     "cancelled": Status.CANCELLED,
     "diverged": Status.DIVERGED,
+    "unrelaxed": Status.UNRELAXED,
 }
 
 

@@ -203,7 +203,10 @@ def _with_nodes(
 
     # Old points remain between the nodes, but no point of a face where a node is now.
     inside = (polyline.barycentric > 0.0).all(axis=1)
-    nearest = np.abs(arc[:n, None] - at).min(axis=1)
+    nodes_along = np.append(at, arc[-1])
+    ahead = np.searchsorted(nodes_along, arc[:n]).clip(max=len(at))
+    nearest = np.minimum(nodes_along[ahead] - arc[:n], arc[:n] - nodes_along[ahead - 1])
+    nearest = np.where(ahead > 0, nearest, 0.0)
     dropped = inside & (nearest < SAME_PLACE * arc[-1])
     dropped[control_place] = True
     old = np.flatnonzero(~dropped)

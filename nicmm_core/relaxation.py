@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .array_types import BoolArray
+from .array_types import BoolArray, FloatArray, IntArray
 from .curve import SurfaceCurve
 from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
@@ -52,18 +52,18 @@ class RelaxationConfig:
     most_damping : float
         Where the search for a step ends.
     least_decrease : float
-        Relative decrease of the energy that ends the last level,
+        Decrease of the energy, relative to the bending, that ends the last level,
     least_decrease_before : float
         and those before.
     stretch : float
-        Ratio of the longest to the shortest step at which nodes are spaced anew.
+        Ratio of the longest to the shortest step of a leg at which nodes are spaced anew.
     iterations : int
         The cap, over all levels of one attempt.
     """
 
     levels: tuple[int, ...] = (64, 128, 256, 512)
     longest_move: float = 4.0
-    damping: float = 1e-8
+    damping: float = 1e-6
     most_damping: float = 1e2
     least_decrease: float = 1e-4
     least_decrease_before: float = 1e-2
@@ -76,6 +76,9 @@ DAMPING_FACTOR = 10.0
 
 HELD_TRIES = 3
 """Steps that are tried without the nodes that could not follow the one before."""
+
+STRAIGHT = 1e-2
+"""Share of bending in the energy below which a curve is straight enough not to go on for it."""
 
 SMALL_MOVE = 0.1
 """Moves that do not disturb the spacing, in mean steps."""
@@ -94,9 +97,10 @@ class Relaxed:
     feature : float
         ∮ φ_fea² ds, in units of length.
     iterations : int
-        Of all attempts.
+        Of all attempts, each of which has its own cap.
     stopped : str
-        "converged", "cap" or "cancelled".
+        "converged", "cap" or "cancelled"; "unrelaxed" where strands of the start are so close to
+        one another that nodes on it would touch.
     """
 
     curve: SurfaceCurve
@@ -106,7 +110,7 @@ class Relaxed:
     stopped: str
 
 
-Watch = Callable[[float, ExactCurve], bool]
+Watch = Callable[[float, FloatArray], bool]
 
 
 def relax(
@@ -127,30 +131,38 @@ def relax(
         Divides the tension.
     config : RelaxationConfig
     watch : callable, optional
-        Called with the fraction of the cap that is done and the curve after every iteration;
-        relaxation stops when it returns False.
+        Called with the fraction of an attempt's cap that is done and the nodes' positions, (n, 3),
+        after every iteration; relaxation stops when it returns False.
     """
     relaxation = _Relaxation(surface, smoothness, config, watch)
     first = exact_curve(surface, start, config.levels[0])
     curve = None
     for place in range(len(config.levels)):
         levels = config.levels[place:]
-        curve = relaxation.run(first, levels, _Drawing.HOLD if len(levels) == 1 else _Drawing.END)
+        drawing = _Drawing.HOLD if len(levels) == 1 else _Drawing.END
+        curve = relaxation.run(first, levels, drawing)
         if curve is not None:
             break
-    assert curve is not None  # the last attempt does not end early
-    if not is_simple(surface, curve) and relaxation.stopped != "cancelled":
+    if relaxation.stopped != "cancelled" and not (curve and is_simple(surface, curve)):
         # Strands that cross here would do so with more nodes too.
         curve = relaxation.run(first, config.levels[1:] or config.levels, _Drawing.SIMPLE)
-    if curve is None or not is_simple(surface, curve):
-        curve = first  # cancelled on the way
+    if curve and is_simple(surface, curve):
+        result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
+    else:
+        curve, result = first, start
+        stopped = "cancelled" if relaxation.stopped == "cancelled" else "unrelaxed"
+    nodes = curve.nodes
     return Relaxed(
-        curve.surface_curve(surface.mesh),
-        bending_energy(curve.nodes),
-        feature_energy(curve.nodes),
-        relaxation.iterations,
-        relaxation.stopped,
+        result, bending_energy(nodes), feature_energy(nodes), relaxation.iterations, stopped
     )
+
+
+def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
+    """Greatest ratio of the longest to the shortest step of one leg."""
+    lengths = nodes.lengths
+    first = control_nodes[control_nodes < len(lengths)]
+    longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
+    return float((longest / np.maximum(shortest, np.finfo(np.float64).tiny)).max())
 
 
 class _Drawing(enum.Enum):
@@ -165,7 +177,8 @@ class _Drawing(enum.Enum):
 class _Step:
     """A step that lowered the energy."""
 
-    curve: ExactCurve
+    curve: ExactCurve  # as it was last drawn
+    nodes: Nodes
     held: BoolArray  # (n,) nodes that could not follow
     damping: float  # for the next step
     farthest: float  # move, in mean steps
@@ -216,49 +229,51 @@ class _Relaxation:
     ) -> ExactCurve:
         """Steps with one number of nodes until the energy falls by less than the least share."""
         config, damping = self.config, self.config.damping
-        curve = respaced(self.surface, curve, level)
-        held = np.zeros(len(curve.nodes.positions), dtype=bool)
+        curve = self._respaced(curve, level, drawing)
+        nodes = curve.nodes
+        held = np.zeros(len(nodes.positions), dtype=bool)
         released = False
         while self.iterations < last_iteration:
             self.iterations += 1
-            weights = balance(
-                self.surface, curve.nodes, self.smoothness, drawing is _Drawing.SIMPLE
-            )
-            before = elastic_energy(curve.nodes, weights)
-            step = self._step(curve, held, weights, damping, drawing)
+            apart = drawing is _Drawing.SIMPLE
+            weights = balance(self.surface, nodes, self.smoothness, apart)
+            before = elastic_energy(nodes, weights)
+            step = self._step(curve, nodes, held, weights, damping, drawing)
             if step is not None:
-                curve, damping, held = step.curve, step.damping, held | step.held
-                if self.watch is not None:
-                    done = self.iterations / max(last_iteration, self.iterations)
-                    if not self.watch(done, curve):
-                        self.stopped = "cancelled"
-                        return curve
-            if step is not None and elastic_energy(curve.nodes, weights) < (1.0 - least) * before:
+                curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
+                done = 1.0 - (last_iteration - self.iterations) / config.iterations
+                if self.watch is not None and not self.watch(done, nodes.positions):
+                    self.stopped = "cancelled"
+                    break
+            scale = max(bending_energy(nodes), STRAIGHT * before)
+            if step is not None and before - elastic_energy(nodes, weights) > least * scale:
                 released = False
             elif released or not held.any():
-                return curve
+                break
             else:
                 # At rest with nodes that once could not follow: perhaps they can now.
                 released, damping = True, config.damping
                 held = np.zeros(len(held), dtype=bool)
-            lengths = curve.nodes.lengths
             moved = step is not None and step.farthest > SMALL_MOVE
-            if moved and lengths.max() > config.stretch * lengths.min():
-                curve = respaced(self.surface, curve, level)
-                held = np.zeros(len(curve.nodes.positions), dtype=bool)
-        self.stopped = "cap"
-        return curve
+            if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
+                curve = self._respaced(self._drawn(curve, nodes), level, drawing)
+                nodes = curve.nodes
+                held = np.zeros(len(nodes.positions), dtype=bool)
+        else:
+            self.stopped = "cap"
+        return self._drawn(curve, nodes)
 
     def _step(
         self,
         curve: ExactCurve,
+        nodes: Nodes,
         held: BoolArray,
         weights: Balance,
         damping: float,
         drawing: _Drawing,
     ) -> _Step | None:
         """The least damped step that lowers the energy; None when there is none."""
-        config, surface, nodes = self.config, self.surface, curve.nodes
+        config, surface = self.config, self.surface
         energy = elastic_energy(nodes, weights)
         system = elastic_system(surface, nodes, weights)
         spacing = float(nodes.lengths.mean())
@@ -274,26 +289,32 @@ class _Relaxation:
                 move *= config.longest_move / farthest
             moved, stayed = sideways(surface, nodes, move)
             lowered = elastic_energy(moved, weights) < energy
-            if lowered:
-                changed, kept = self._drawn(curve, moved, drawing)
+            if lowered and drawing is not _Drawing.END:
+                drawn_curve, kept = redrawn(surface, curve, moved, drawing is _Drawing.SIMPLE)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
                     tries += 1
                     continue
-                stayed |= kept
-                lowered = not kept.any() or elastic_energy(changed.nodes, weights) < energy
+                moved, stayed = drawn_curve.nodes, stayed | kept
+                lowered = not kept.any() or elastic_energy(moved, weights) < energy
+                if lowered:
+                    curve = drawn_curve
             if lowered:
                 damping = max(damping / DAMPING_FACTOR, config.damping)
-                return _Step(changed, stayed, damping, min(farthest, config.longest_move))
+                return _Step(curve, moved, stayed, damping, min(farthest, config.longest_move))
             damping *= DAMPING_FACTOR
         return None
 
-    def _drawn(
-        self, curve: ExactCurve, nodes: Nodes, drawing: _Drawing
-    ) -> tuple[ExactCurve, BoolArray]:
-        if drawing is not _Drawing.END:
-            return redrawn(self.surface, curve, nodes, drawing is _Drawing.SIMPLE)
-        changed = drawn(self.surface, curve, nodes)
+    def _drawn(self, curve: ExactCurve, nodes: Nodes) -> ExactCurve:
+        """The curve through its nodes, which may have moved since it was last drawn."""
+        changed = curve if nodes is curve.nodes else drawn(self.surface, curve, nodes)
         if changed is None:
             raise _LostError
-        return changed, np.zeros(len(nodes.positions), dtype=bool)
+        return changed
+
+    def _respaced(self, curve: ExactCurve, level: int, drawing: _Drawing) -> ExactCurve:
+        """Nodes at equal distances; where they would make strands touch, the ones it has."""
+        changed = respaced(self.surface, curve, level)
+        if drawing is _Drawing.SIMPLE and not is_simple(self.surface, changed):
+            return curve
+        return changed
