@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nicmm_core.design import is_one_curve
+from nicmm_core.design_result import is_one_curve
 from nicmm_core.losses import LossWeights
 from nicmm_core.mesh import Mesh
 from nicmm_core.network import NetworkConfig

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.design import is_one_curve
+from nicmm_core.design_result import is_one_curve
 from nicmm_core.features import BASE_CHANNELS
 from nicmm_core.mesh import Mesh
 from nicmm_core.network import DISTANCE_CHANNEL

@@ -8,7 +8,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.design import is_one_curve
+from nicmm_core.design_result import is_one_curve
 from nicmm_core.mesh import Mesh
 
 from . import collections, plots, report

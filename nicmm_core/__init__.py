@@ -4,7 +4,8 @@ The main path is `design.design_curve`; `design.py` names the stages in order.
 """
 
 from .curve import SurfaceCurve
-from .design import Design, Designer, Status, design_curve
+from .design import Designer, design_curve
+from .design_result import Design, Status
 from .errors import (
     ArgumentError,
     ControlPointError,

@@ -6,11 +6,9 @@ control points → initial loop → signed distance → features (`problem`) →
 
 from __future__ import annotations
 
-import enum
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from dataclasses import field as dataclass_field
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -19,13 +17,15 @@ from numpy.typing import ArrayLike
 
 from . import variational
 from .arguments import check_choices, check_torch, checked_map, checked_smoothness
-from .array_types import FloatArray
+from .array_types import FloatArray, IntArray
 from .contour import extract_curves
 from .crossings import crossing_segments
 from .curve import SurfaceCurve
 from .curve_field import curve_field
 from .curve_nodes import CurveSurface, unsigned_normals
+from .design_result import STATUS, Design, Status, is_one_curve
 from .errors import ArgumentError
+from .features import feature_map
 from .losses import LossWeights, balanced
 from .mesh import Mesh
 from .network import NetworkWeights
@@ -36,6 +36,7 @@ from .solution import Solution
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
 from .via_points import ViaPoints
+from .warm_start import WARM, moved_along
 from .weights_file import load_weights
 
 PROGRESS_INTERVAL = 0.25
@@ -45,77 +46,42 @@ Progress = Callable[[float, FloatArray], object]
 
 State = TypeVar("State")
 
-
-class Status(enum.Enum):
-    """How a design ended; ``str()`` says what to change."""
-
-    CONVERGED = "converged: one curve through all control points"
-    ITERATION_LIMIT = (
-        "stopped at the iteration limit before the energy came to rest; the curve is usable, a "
-        "finer mesh or other control points may make it fairer"
-    )
-    DIVERGED = (
-        "the energy left the range of numbers and the best curve before is returned; look for "
-        "faces without area, or merge vertices by distance"
-    )
-    UNRELAXED = (
-        "strands of the curve are so close to one another that it is returned as the level set "
-        "gives it; use a finer mesh, fewer points or another order"
-    )
-    CANCELLED = "cancelled by the progress function; the curve is the best one so far"
-    NOT_ONE_CURVE = (
-        "the level set is not one simple curve through all control points; the mesh may branch "
-        "there (edges of three faces): repair it, or move the control points"
-    )
-
-    def __str__(self) -> str:
-        """What happened and what to change."""
-        return self.value
+Maps = tuple[FloatArray | None, FloatArray | None]
+"""Obstacles and alignment."""
 
 
 @dataclass(frozen=True)
-class Design:
-    """The result of a design.
+class _Request:
+    """What a relaxed curve was asked for, as far as it can be compared."""
 
-    Attributes
-    ----------
-    status : Status
-    curves : list of SurfaceCurve
-        One entry when all is well.
-    iterations : int
-        Of the network's training, of the solver, or of the relaxation.
-    seconds : float
-    energy : dict of str to float
-        The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
-        square roots of the surface's area.
-    breaking_vertices : int
-        Vertices whose predicted sign would have split the curve or missed a point, so that the
-        initial level set replaces the predicted one around them; 0 when it was one loop by itself.
-    find_field : callable
-        Finds `field` when it is first asked for.
-    """
+    points: SurfacePoints
+    closed: bool
+    order: str
+    via_points: ViaPoints | None
+    maps: tuple[bytes | None, bytes | None]
+    smoothness: float
 
-    status: Status
-    curves: list[SurfaceCurve]
-    iterations: int
-    seconds: float
-    energy: dict[str, float]
-    breaking_vertices: int
-    find_field: Callable[[], FloatArray] = dataclass_field(repr=False, compare=False)
 
-    @cached_property
-    def field(self) -> FloatArray:
-        """Level-set values in mesh units at the input mesh's vertices, shape (V,).
+@dataclass(frozen=True)
+class _Remembered:
+    """The last relaxed curve."""
 
-        Negative inside, or the distance without sign where the curve is open or bounds no region.
-        Vertices that are not connected to the control points get the largest value: they are
-        outside.
-        """
-        return self.find_field()
+    request: _Request
+    visited: IntArray  # (k,) order of the control points
+    surface: CurveSurface
+    unit: float
+    design: Design
 
 
 class Designer:
     """A surface that will be asked for many curves.
+
+    What depends on the mesh alone is found once. ``method="nicmm"`` also starts from the curve
+    before, if the request differs from the last one only in small moves of control points, in
+    weight maps or in smoothness: then the cost follows the curve and not the mesh, which is what
+    dragging a point needs. Such a curve keeps the course and the order of points that it has, so
+    it may differ from what `design_curve` finds from nothing; `forget` makes the next design
+    start anew. A Designer serves one thread at a time.
 
     Parameters
     ----------
@@ -129,6 +95,11 @@ class Designer:
             )
         self.mesh = mesh
         self._weights: dict[int, NetworkWeights] = {}
+        self._last: _Remembered | None = None
+
+    def forget(self) -> None:
+        """Start the next design anew."""
+        self._last = None
 
     def design(
         self,
@@ -151,47 +122,75 @@ class Designer:
         if method == "nicmm-paper":
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
-        problem = build_problem(
-            self.mesh,
-            points,
-            order,
+        maps = (
             checked_map("obstacles", obstacles, self.mesh),
             checked_map("alignment", alignment, self.mesh),
-            checked_smoothness(smoothness),
-            closed,
-            via_points,
         )
-        return self._solve(problem, method, float(smoothness), progress, started)
+        smoothness = checked_smoothness(smoothness)
+        request = _Request(points, closed, order, via_points, _as_bytes(maps), smoothness)
+        if method == "nicmm":
+            again = self._designed_again(request, maps, progress, started)
+            if again is not None:
+                return again
+        problem = build_problem(self.mesh, points, order, *maps, smoothness, closed, via_points)
+        return self._solve(problem, method, request, maps, progress, started)
+
+    def _designed_again(
+        self,
+        request: _Request,
+        maps: Maps,
+        progress: Progress | None,
+        started: float,
+    ) -> Design | None:
+        """A design from the last curve; None where that is too different."""
+        last = self._last
+        if last is None or not _is_alike(request, last.request):
+            return None
+        if _is_same(request, last.request):
+            return replace(last.design, seconds=time.perf_counter() - started)
+        points = SurfacePoints(
+            request.points.faces[last.visited], request.points.barycentric[last.visited]
+        )
+        surface = last.surface
+        if request.maps != last.request.maps:
+            surface = self._curve_surface(maps, last.unit)
+        start = moved_along(surface, last.design.curves[0], points)
+        if start is None:
+            return None
+        relaxed = self._relaxed(surface, start, request.smoothness, WARM, progress)
+        design = self._relaxed_design(relaxed, surface, last.unit, 0, started)
+        self._remember(request, last.visited, surface, last.unit, design)
+        return design
 
     def _solve(
         self,
         problem: Problem,
         method: str,
-        smoothness: float,
+        request: _Request,
+        maps: Maps,
         progress: Progress | None,
         started: float,
     ) -> Design:
-        weights = balanced(LossWeights(smooth=smoothness * LossWeights.smooth), problem)
+        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         solution = self._solution(problem, method, weights, progress)
         field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        stopped, iterations, energy = solution.stopped, solution.iterations, solution.terms
-        find_field = partial(_at_input_vertices, self.mesh, problem, field)
-        if method == "nicmm" and is_one_curve(curves, problem.loop.closed):
-            relaxed = self._relaxed(problem, curves[0], smoothness, progress)
-            curves, stopped, iterations = [relaxed.curve], relaxed.stopped, relaxed.iterations
-            energy = _sharp_energy(relaxed, problem)
-            find_field = partial(curve_field, self.mesh, relaxed.curve)
-        status = _STATUS[stopped]
-        if not is_one_curve(curves, problem.loop.closed) or _crosses(self.mesh, curves[0]):
-            status = Status.NOT_ONE_CURVE
+        one = is_one_curve(curves, problem.loop.closed) and not _crosses(self.mesh, curves[0])
+        if method == "nicmm" and one:
+            surface = self._curve_surface(maps, problem.unit)
+            relaxed = self._relaxed(
+                surface, curves[0], request.smoothness, RelaxationConfig(), progress
+            )
+            design = self._relaxed_design(relaxed, surface, problem.unit, breaking, started)
+            self._remember(request, problem.loop.order, surface, problem.unit, design)
+            return design
         return Design(
-            status=status,
+            status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
             curves=curves,
-            iterations=iterations,
+            iterations=solution.iterations,
             seconds=time.perf_counter() - started,
-            energy=energy,
+            energy=solution.terms,
             breaking_vertices=breaking,
-            find_field=find_field,
+            find_field=partial(_at_input_vertices, self.mesh, problem, field),
         )
 
     def _solution(
@@ -211,17 +210,51 @@ class Designer:
         return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 
     def _relaxed(
-        self, problem: Problem, curve: SurfaceCurve, smoothness: float, progress: Progress | None
+        self,
+        surface: CurveSurface,
+        start: SurfaceCurve,
+        smoothness: float,
+        config: RelaxationConfig,
+        progress: Progress | None,
     ) -> Relaxed:
         watch = None if progress is None else _seldom(progress, lambda points: points)
-        importance, weight = None, 0.0
-        if problem.feature_map is not None:
-            importance = np.ones(len(self.mesh.vertices))
-            inputs = problem.working.input_vertex
-            importance[inputs[inputs >= 0]] = problem.feature_map[inputs >= 0]
-            weight = LossWeights.feature / LossWeights.smooth / problem.unit**2
-        surface = CurveSurface(self.mesh, self._normals, importance, weight)
-        return relax(surface, curve, smoothness, RelaxationConfig(), watch)
+        return relax(surface, start, smoothness, config, watch)
+
+    def _relaxed_design(
+        self, relaxed: Relaxed, surface: CurveSurface, unit: float, breaking: int, started: float
+    ) -> Design:
+        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
+        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
+        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
+        return Design(
+            status=STATUS[relaxed.stopped],
+            curves=[relaxed.curve],
+            iterations=relaxed.iterations,
+            seconds=time.perf_counter() - started,
+            energy=energy,
+            breaking_vertices=breaking,
+            find_field=partial(curve_field, self.mesh, relaxed.curve),
+        )
+
+    def _remember(
+        self,
+        request: _Request,
+        visited: IntArray,
+        surface: CurveSurface,
+        unit: float,
+        design: Design,
+    ) -> None:
+        """Keep a curve that came to rest for the next request."""
+        if design.status is not Status.CANCELLED:
+            self._last = _Remembered(request, visited, surface, unit, design)
+
+    def _curve_surface(self, maps: Maps, unit: float) -> CurveSurface:
+        """The surface that curves move on; the unit is the square root of its area."""
+        if all(one is None for one in maps):
+            return CurveSurface(self.mesh, self._normals)
+        importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
+        weight = LossWeights.feature / LossWeights.smooth / unit**2
+        return CurveSurface(self.mesh, self._normals, importance, weight)
 
     @cached_property
     def _normals(self) -> FloatArray:
@@ -354,33 +387,36 @@ def design_curve(
     )
 
 
-_STATUS = {
-    "converged": Status.CONVERGED,
-    "cap": Status.ITERATION_LIMIT,
-    "cancelled": Status.CANCELLED,
-    "diverged": Status.DIVERGED,
-    "unrelaxed": Status.UNRELAXED,
-}
+def _is_alike(one: _Request, other: _Request) -> bool:
+    """Whether two requests are for the same course of a curve."""
+    return (
+        len(one.points) == len(other.points)
+        and one.closed == other.closed
+        and one.order == other.order
+        and one.via_points is other.via_points
+    )
 
 
-def _sharp_energy(relaxed: Relaxed, problem: Problem) -> dict[str, float]:
-    """The terms of Eq. 2 where φ is exactly the distance to the curve."""
-    feature = 0.0 if problem.feature_map is None else 0.5 * relaxed.feature / problem.unit
-    smooth = 0.5 * relaxed.bending * problem.unit
-    return {"sdf": 0.0, "int": 0.0, "smooth": smooth, "fea": feature}
+def _is_same(one: _Request, other: _Request) -> bool:
+    """Whether two requests that are alike do not differ at all."""
+    return (
+        np.array_equal(one.points.faces, other.points.faces)
+        and np.array_equal(one.points.barycentric, other.points.barycentric)
+        and one.maps == other.maps
+        and one.smoothness == other.smoothness
+    )
+
+
+def _as_bytes(maps: Maps) -> tuple[bytes | None, bytes | None]:
+    """Maps in a form that can be compared, and that the caller cannot change."""
+    obstacles, alignment = (None if one is None else one.tobytes() for one in maps)
+    return obstacles, alignment
 
 
 def _crosses(mesh: Mesh, curve: SurfaceCurve) -> bool:
     """Whether a curve crosses or touches itself."""
     polyline = SurfacePoints(curve.faces, curve.barycentric)
     return len(crossing_segments(mesh, polyline, curve.closed)) > 0
-
-
-def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
-    """Whether curves are a single one, closed or open, through all control points."""
-    if len(curves) != 1 or curves[0].closed != closed:
-        return False
-    return bool((curves[0].control_index >= 0).all())
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:

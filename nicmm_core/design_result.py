@@ -1,0 +1,97 @@
+"""What a design gives back: how it ended, the curve, and what belongs to it."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from functools import cached_property
+
+from .array_types import FloatArray
+from .curve import SurfaceCurve
+
+
+class Status(enum.Enum):
+    """How a design ended; ``str()`` says what to change."""
+
+    CONVERGED = "converged: one curve through all control points"
+    ITERATION_LIMIT = (
+        "stopped at the iteration limit before the energy came to rest; the curve is usable, a "
+        "finer mesh or other control points may make it fairer"
+    )
+    DIVERGED = (
+        "the energy left the range of numbers and the best curve before is returned; look for "
+        "faces without area, or merge vertices by distance"
+    )
+    UNRELAXED = (
+        "strands of the curve are so close to one another that it is returned as the level set "
+        "gives it; use a finer mesh, fewer points or another order"
+    )
+    CANCELLED = "cancelled by the progress function; the curve is the best one so far"
+    NOT_ONE_CURVE = (
+        "the level set is not one simple curve through all control points; the mesh may branch "
+        "there (edges of three faces): repair it, or move the control points"
+    )
+
+    def __str__(self) -> str:
+        """What happened and what to change."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Design:
+    """The result of a design.
+
+    Attributes
+    ----------
+    status : Status
+    curves : list of SurfaceCurve
+        One entry when all is well.
+    iterations : int
+        Of the network's training, of the solver, or of the relaxation.
+    seconds : float
+    energy : dict of str to float
+        The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
+        square roots of the surface's area.
+    breaking_vertices : int
+        Vertices whose predicted sign would have split the curve or missed a point, so that the
+        initial level set replaces the predicted one around them; 0 when it was one loop by itself.
+    find_field : callable
+        Finds `field` when it is first asked for.
+    """
+
+    status: Status
+    curves: list[SurfaceCurve]
+    iterations: int
+    seconds: float
+    energy: dict[str, float]
+    breaking_vertices: int
+    find_field: Callable[[], FloatArray] = dataclass_field(repr=False, compare=False)
+
+    @cached_property
+    def field(self) -> FloatArray:
+        """Level-set values in mesh units at the input mesh's vertices, shape (V,).
+
+        Negative inside, or the distance without sign where the curve is open or bounds no region.
+        Vertices that are not connected to the control points get the largest value: they are
+        outside.
+        """
+        return self.find_field()
+
+
+STATUS = {
+    "converged": Status.CONVERGED,
+    "cap": Status.ITERATION_LIMIT,
+    "cancelled": Status.CANCELLED,
+    "diverged": Status.DIVERGED,
+    "unrelaxed": Status.UNRELAXED,
+}
+"""What the reason of a solver's stop means for the design."""
+
+
+def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
+    """Whether curves are a single one, closed or open, through all control points."""
+    if len(curves) != 1 or curves[0].closed != closed:
+        return False
+    return bool((curves[0].control_index >= 0).all())

@@ -1,0 +1,131 @@
+"""A Designer goes on from its last curve: cheaply, validly, and only where that is right."""
+
+import igl
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import design as design_module
+from tests.core.checks import apart, assert_valid_design, circle, nearest_vertices
+
+CHOSEN = [12, 80, 41, 150]
+
+
+@pytest.fixture
+def problems(monkeypatch):
+    """How often a design has started anew."""
+    built = []
+    build = design_module.build_problem
+
+    def spy(*arguments, **named):
+        built.append(arguments)
+        return build(*arguments, **named)
+
+    monkeypatch.setattr(design_module, "build_problem", spy)
+    return built
+
+
+def beside(mesh, vertex, taken):
+    """A neighbour of a vertex that is not taken."""
+    return next(v for v in igl.adjacency_list(mesh.faces)[vertex] if v not in taken)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_dragged_point_starts_from_the_last_curve(surface, problems, closed):
+    designer = nicmm.Designer(surface)
+    rim = np.zeros(len(surface.vertices), dtype=bool)
+    for loop in igl.boundary_loop_all(surface.faces):
+        rim[loop] = True
+    inner = np.flatnonzero(surface.referenced & ~rim)
+    chosen = np.random.default_rng(3).choice(inner, size=4, replace=False).tolist()
+    first = designer.design(chosen, closed=closed, order="shortest")
+    assert_valid_design(surface, first, closed=closed)
+    for place in range(4):
+        chosen[place] = beside(surface, chosen[place], {*chosen, *np.flatnonzero(rim)})
+        dragged = designer.design(chosen, closed=closed, order="shortest")
+        assert_valid_design(surface, dragged, closed=closed)
+        found = dragged.curves[0].points[dragged.curves[0].control_index]
+        expected = surface.vertices[chosen]
+        gap = np.linalg.norm(found[:, None] - expected, axis=2)
+        assert gap.min(axis=0).max() <= 1e-12 * surface.diagonal
+    assert len(problems) == 1
+
+
+def test_dragging_there_and_back_returns_to_the_curve(ball, problems):
+    designer = nicmm.Designer(ball)
+    first = designer.design(CHOSEN, order="shortest")
+    away = [beside(ball, CHOSEN[0], CHOSEN), *CHOSEN[1:]]
+    moved = designer.design(away, order="shortest")
+    back = designer.design(CHOSEN, order="shortest")
+    assert len(problems) == 1
+    gap = apart(first.curves[0].points, back.curves[0].points)
+    assert gap < 0.2 * apart(first.curves[0].points, moved.curves[0].points)
+    assert back.energy["smooth"] == pytest.approx(first.energy["smooth"], rel=0.02)
+
+
+def test_a_warm_great_circle_is_one(ball):
+    """Three points on the equator, from three beside it."""
+    equator = circle(np.radians([0.0, 130.0, 230.0]))
+    designer = nicmm.Designer(ball)
+    designer.design(nearest_vertices(ball, equator + [0.0, 0.0, 0.1]))
+    on_surface = igl.point_mesh_squared_distance(equator, ball.vertices, ball.faces)[2]
+    warm = designer.design(on_surface)
+    assert np.abs(warm.curves[0].points[:, 2]).max() < 5e-3
+
+
+def test_the_same_request_has_the_same_answer(body):
+    designer = nicmm.Designer(body)
+    first, second = (designer.design(CHOSEN, order="shortest") for _ in range(2))
+    np.testing.assert_array_equal(first.curves[0].points, second.curves[0].points)
+
+
+def test_smoothness_and_maps_start_from_the_last_curve(body, problems):
+    designer = nicmm.Designer(body)
+    first = designer.design(CHOSEN, order="shortest")
+    tight = designer.design(CHOSEN, order="shortest", smoothness=0.02)
+    assert tight.curves[0].length < first.curves[0].length
+    weights = np.zeros(len(body.vertices))
+    middle = first.curves[0].points[len(first.curves[0].points) // 2]
+    weights[np.linalg.norm(body.vertices - middle, axis=1) < 0.05 * body.diagonal] = 1.0
+    avoiding = designer.design(CHOSEN, order="shortest", obstacles=weights)
+    assert_valid_design(body, avoiding)
+    assert len(problems) == 1
+    assert avoiding.energy["fea"] > 0.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"control_points": [12, 80, 41, 300]},
+        {"control_points": [12, 80, 41]},
+        {"closed": False},
+        {"order": "given"},
+        {"method": "variational"},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_other_requests_start_anew(body, problems, change):
+    designer = nicmm.Designer(body)
+    request = {"control_points": CHOSEN, "order": "shortest"}
+    designer.design(**request)
+    anew = designer.design(**{**request, **change})
+    assert len(problems) == 2
+    plain = nicmm.design_curve(body, **{**request, **change})
+    np.testing.assert_array_equal(anew.curves[0].points, plain.curves[0].points)
+
+
+def test_forgetting_starts_anew(body, problems):
+    designer = nicmm.Designer(body)
+    designer.design(CHOSEN, order="shortest")
+    designer.forget()
+    designer.design([beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]], order="shortest")
+    assert len(problems) == 2
+
+
+def test_a_bad_request_leaves_the_last_curve(body, problems):
+    designer = nicmm.Designer(body)
+    designer.design(CHOSEN, order="shortest")
+    with pytest.raises(nicmm.ControlPointError):
+        designer.design([12, 80, 80, 150], order="shortest")
+    designer.design([beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]], order="shortest")
+    assert len(problems) == 1
