@@ -86,7 +86,10 @@ class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
         alignment = mesh_data.group_weights(mesh_object, self.alignment_group)
         surface = mesh_data.triangles(mesh_object)
         with _progress(context) as progress:
-            design = designers.designer_for(surface.solved, surface.faces).design(
+            designer = designers.designer_for(surface.solved, surface.faces)
+            # The same settings give the same curve, whatever was designed before.
+            designer.forget()
+            design = designer.design(
                 vertices,
                 closed=self.closed,
                 order=order,

@@ -27,7 +27,6 @@ addon_utils.extensions_refresh()
 assert addon_utils.enable("bl_ext.user_default.nicmm_curves", default_set=True) is not None
 """
 DESIGN = """
-bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
 bpy.context.object.data.vertices.foreach_set("select", [i in (3, 60, 100) for i in range(162)])
 assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
