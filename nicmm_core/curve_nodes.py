@@ -7,12 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from . import tolerances
 from .array_types import FloatArray, IntArray
 from .features import vertex_normals
 from .mesh import Mesh, unoriented_vertices
 from .surface_points import SurfacePoints
-
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True)
@@ -103,13 +102,13 @@ class Nodes:
         # Barycentric coordinates of the move: least squares in the plane of the face.
         p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
         f, g = (one * self.sideways).sum(axis=1), (other * self.sideways).sum(axis=1)
-        determinant = np.maximum(p * r - q * q, _TINY)
+        determinant = np.maximum(p * r - q * q, tolerances.TINY)
         u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
         change = np.stack([-u - v, u, v], axis=1)
         corner_normals = _corner_normals(surface, faces)
         length = np.einsum("nc,ncd,nd->n", self.places.barycentric, corner_normals, self.normals)
         turn = np.einsum("nc,ncd->nd", change, corner_normals)
-        turn /= np.maximum(length, _TINY)[:, None]
+        turn /= np.maximum(length, tolerances.TINY)[:, None]
         turn -= (turn * self.normals).sum(axis=1, keepdims=True) * self.normals
         drift = np.zeros(len(faces))
         if surface.feature_map is not None:
@@ -143,4 +142,4 @@ def _steps(positions: FloatArray, closed: bool) -> FloatArray:
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), _TINY)
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), tolerances.TINY)

@@ -6,6 +6,7 @@ control points → initial loop → signed distance → features (`problem`) →
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -35,7 +36,7 @@ from .single_pass import predict_once
 from .solution import Solution
 from .surface_points import SurfacePoints, locate_control_points
 from .topology import keep_topology
-from .via_points import ViaPoints
+from .via_points import ViaPoints, same_via_points
 from .warm_start import WARM, moved_along
 from .weights_file import load_weights
 
@@ -148,9 +149,7 @@ class Designer:
             return None
         if _is_same(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        points = SurfacePoints(
-            request.points.faces[last.visited], request.points.barycentric[last.visited]
-        )
+        points = request.points[last.visited]
         surface = last.surface
         if request.maps != last.request.maps:
             surface = self._curve_surface(maps, last.unit)
@@ -246,6 +245,8 @@ class Designer:
     ) -> None:
         """Keep a curve that came to rest for the next request."""
         if design.status is not Status.CANCELLED:
+            # The caller may change what was passed.
+            request = replace(request, via_points=copy.deepcopy(request.via_points))
             self._last = _Remembered(request, visited, surface, unit, design)
 
     def _curve_surface(self, maps: Maps, unit: float) -> CurveSurface:
@@ -393,7 +394,7 @@ def _is_alike(one: _Request, other: _Request) -> bool:
         len(one.points) == len(other.points)
         and one.closed == other.closed
         and one.order == other.order
-        and one.via_points is other.via_points
+        and same_via_points(one.via_points, other.via_points)
     )
 
 

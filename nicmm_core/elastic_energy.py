@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .curve_nodes import CurveSurface, Nodes
 from .strand_contact import contact_residuals
@@ -30,8 +31,6 @@ DIFFERENCE = 1e-4
 
 CONTACT = 10.0
 """Energy of a curve whose strands all touch, relative to that of the same curve without contact."""
-
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
         slope += weight * _transposed(jacobian, residual)
     # Residuals do not have all of the length's second derivative: this is a string's stiffness.
     stiffness = np.zeros(n)
-    stiffness[: len(nodes.lengths)] = weights.tension / np.maximum(nodes.lengths, _TINY)
+    stiffness[: len(nodes.lengths)] = weights.tension / np.maximum(nodes.lengths, tolerances.TINY)
     stiffness *= nodes.importance**2
     bands[0] += stiffness + np.roll(stiffness, 1)
     # Without an orientation of the surface, neighbours may have opposite moves to one side.
@@ -174,7 +173,7 @@ def _residuals(nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     after = nodes.steps
     before = np.roll(after, 1, axis=0)
     lengths = np.sqrt((after**2).sum(axis=1))
-    root = np.sqrt(np.maximum(0.5 * (lengths + np.roll(lengths, 1)), _TINY))
+    root = np.sqrt(np.maximum(0.5 * (lengths + np.roll(lengths, 1)), tolerances.TINY))
     sine = (np.cross(before, after) * nodes.normals).sum(axis=1)
     cosine = (before * after).sum(axis=1)
     cosine -= (before * nodes.normals).sum(axis=1) * (after * nodes.normals).sum(axis=1)

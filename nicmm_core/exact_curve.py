@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .crossings import crossing_segments
 from .curve import SurfaceCurve, curve_on_mesh
@@ -88,14 +89,7 @@ def respaced(surface: CurveSurface, curve: ExactCurve, count: int) -> ExactCurve
 
 
 def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
-    """Nodes moved on the surface, with nothing drawn between them.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-    step : (n,) float array
-        Lengths along `Nodes.sideways`; zero at control points.
+    """Nodes moved across the curve by lengths along `Nodes.sideways`, (n,).
 
     Returns
     -------
@@ -103,13 +97,34 @@ def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nod
     (n,) bool array
         Which came to a boundary and stayed beside it.
     """
-    going = np.flatnonzero(step)
-    direction = nodes.sideways[going] * np.sign(step[going])[:, None]
-    start = _select(nodes.places, going)
-    targets, stuck = moved(surface.mesh, start, direction, np.abs(step[going]))
+    return shifted(surface, nodes, nodes.sideways * np.sign(step)[:, None], np.abs(step))
+
+
+def shifted(
+    surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
+) -> tuple[Nodes, BoolArray]:
+    """Nodes moved on the surface, with nothing drawn between them.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+    direction : (n, 3) float array
+        Unit vectors about tangent to the surface, anything where the length is zero.
+    length : (n,) float array
+        Zero at control points.
+
+    Returns
+    -------
+    Nodes
+    (n,) bool array
+        Which came to a boundary and stayed beside it.
+    """
+    going = np.flatnonzero(length)
+    targets, stuck = moved(surface.mesh, nodes.places[going], direction[going], length[going])
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
     faces[going], barycentric[going] = targets.faces, targets.barycentric
-    blocked = np.zeros(len(step), dtype=bool)
+    blocked = np.zeros(len(length), dtype=bool)
     blocked[going] = stuck
     return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked
 
@@ -193,9 +208,10 @@ def _with_nodes(
     if not closed:
         at, control_nodes = np.append(at, bounds[-1]), np.append(control_nodes, len(at))
     segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
-    along = np.clip((at - arc[segment]) / np.maximum(lengths[segment], _TINY), 0.0, 1.0)[:, None]
+    along = (at - arc[segment]) / np.maximum(lengths[segment], tolerances.TINY)
+    along = np.clip(along, 0.0, 1.0)[:, None]
     faces = polyline.faces[segment]
-    end = in_faces(mesh, _select(polyline, (segment + 1) % n), faces).barycentric
+    end = in_faces(mesh, polyline[(segment + 1) % n], faces).barycentric
     barycentric = strictly_inside((1.0 - along) * polyline.barycentric[segment] + along * end)
     faces[control_nodes] = polyline.faces[control_place]
     barycentric[control_nodes] = polyline.barycentric[control_place]
@@ -262,7 +278,7 @@ def _drawn(
         lost[here[~reached]] = True
         parts.append(part)
     if not curve.closed:
-        parts.append((np.array([n - 1]), _select(places, np.array([n - 1]))))
+        parts.append((np.array([n - 1]), places[np.array([n - 1])]))
     owner = np.concatenate([part[0] for part in parts])
     order = np.argsort(owner, kind="stable")
     polyline = SurfacePoints(
@@ -281,7 +297,7 @@ def _kept_stretches(curve: ExactCurve, nodes: IntArray) -> Stretches:
     count = bounds[nodes + 1] - bounds[nodes]
     owner = np.repeat(nodes, count)
     offset = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    return owner, _select(curve.polyline, bounds[owner] + offset)
+    return owner, curve.polyline[bounds[owner] + offset]
 
 
 def _drawn_stretches(
@@ -297,13 +313,13 @@ def _drawn_stretches(
     # A mesh need not be oriented: both normals count as pointing to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
-    ways = join(mesh, _select(places, start), _select(places, end), plane, DETOUR)
-    first, crossings = _select(places, start), ways.crossings
+    ways = join(mesh, places[start], places[end], plane, DETOUR)
+    first, crossings = places[start], ways.crossings
     if not backwards:
         owner = np.concatenate([nodes, nodes[ways.pair]])
         order = np.argsort(owner, kind="stable")
         points = _joined(first, crossings)
-        return (owner[order], _select(points, order)), ways.reached
+        return (owner[order], points[order]), ways.reached
     # In reverse, a crossing belongs to the face that the way came from, and the node before all
     # of them to the face where it ended.
     begins = np.searchsorted(ways.pair, np.arange(len(nodes)))
@@ -314,25 +330,18 @@ def _drawn_stretches(
     last_face = first.faces.copy()
     last_face[passes] = crossings.faces[ends_at[passes] - 1]
     reverse = np.arange(len(crossings))[::-1]
-    crossings = _select(in_faces(mesh, crossings, came_from), reverse)
+    crossings = in_faces(mesh, crossings, came_from)[reverse]
     # A way that got lost did not end beside its node, whose coordinates are then of no account.
-    node_points = in_faces(mesh, _select(places, end), last_face)
+    node_points = in_faces(mesh, places[end], last_face)
     owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
     order = np.argsort(owner, kind="stable")
-    return (owner[order], _select(_joined(node_points, crossings), order)), ways.reached
+    return (owner[order], _joined(node_points, crossings)[order]), ways.reached
 
 
 def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
     """The same points seen from other faces that hold them."""
     same = mesh.faces[points.faces][:, :, None] == mesh.faces[faces][:, None, :]
     return SurfacePoints(faces, (points.barycentric[:, :, None] * same).sum(axis=1))
-
-
-_TINY = float(np.finfo(np.float64).tiny)
-
-
-def _select(points: SurfacePoints, index: IntArray) -> SurfacePoints:
-    return SurfacePoints(points.faces[index], points.barycentric[index])
 
 
 def _joined(first: SurfacePoints, second: SurfacePoints) -> SurfacePoints:

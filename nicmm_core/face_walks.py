@@ -74,11 +74,11 @@ def join(
         travelled[walkers.index] += walkers.last_step
         pairs.append(walkers.index)
         crossings.append(walkers.entry())
-        arrived = _holds(mesh, _select(end, walkers.index), walkers.faces)
+        arrived = _holds(mesh, end[walkers.index], walkers.faces)
         reached[walkers.index[arrived]] = True
         walkers.leave_edges(~arrived)
     if not pairs:
-        return Joins(reached, np.zeros(0, np.int64), _select(start, np.zeros(0, np.int64)))
+        return Joins(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
     pair = np.concatenate(pairs)
     kept = np.flatnonzero(reached[pair])
     kept = kept[np.argsort(pair[kept], kind="stable")]
@@ -86,7 +86,7 @@ def join(
     faces, low, high, fraction = (np.concatenate(part)[kept] for part in parts)
     points = SurfacePoints(faces, _on_edges(mesh, faces, low, high, fraction))
     once = _last_of_each_vertex(mesh, pair[kept], points)
-    return Joins(reached, pair[kept][once], _select(points, once))
+    return Joins(reached, pair[kept][once], points[once])
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
@@ -137,7 +137,7 @@ def moved(
         beyond = walkers.beyond()
         stops = (left[index] <= step) | (beyond < 0)
         ends = index[stops]
-        share = np.clip(left[ends] / np.maximum(step[stops], _TINY), 0.0, 1.0)[:, None]
+        share = np.clip(left[ends] / np.maximum(step[stops], tolerances.TINY), 0.0, 1.0)[:, None]
         leaving = walkers.exit_barycentric()[stops]
         barycentric[ends] += share * (leaving - barycentric[ends])
         blocked[ends] = left[ends] > step[stops]
@@ -153,9 +153,6 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
     """Coordinates drawn off the sides and corners of their faces by `tolerances.INSIDE`."""
     drawn = np.maximum(barycentric, tolerances.INSIDE)
     return drawn / drawn.sum(axis=1, keepdims=True)
-
-
-_TINY = float(np.finfo(np.float64).tiny)
 
 
 class _Walkers:
@@ -285,7 +282,3 @@ def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
         found = (support[:, :, None] == mesh.faces[faces[on_side]][:, None, :]).any(axis=2)
         holds[on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=1)
     return holds
-
-
-def _select(points: SurfacePoints, index: IntArray) -> SurfacePoints:
-    return SurfacePoints(points.faces[index], points.barycentric[index])

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .curve import SurfaceCurve
 from .curve_nodes import CurveSurface, Nodes
@@ -162,7 +163,7 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
     lengths = nodes.lengths
     first = control_nodes[control_nodes < len(lengths)]
     longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
-    return float((longest / np.maximum(shortest, np.finfo(np.float64).tiny)).max())
+    return float((longest / np.maximum(shortest, tolerances.TINY)).max())
 
 
 class _Drawing(enum.Enum):

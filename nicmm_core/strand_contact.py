@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from . import tolerances
 from .array_types import FloatArray, IntArray
 from .curve_nodes import Nodes
 
@@ -52,6 +53,6 @@ def contact_residuals(nodes: Nodes) -> Contacts:
     first, second = first[kept], second[kept]
     node, other = np.concatenate([first, second]), np.concatenate([second, first])
     offset = nodes.positions[node] - nodes.positions[other]
-    distance = np.maximum(np.linalg.norm(offset, axis=1), np.finfo(np.float64).tiny)
+    distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
     approach = (offset * nodes.sideways[node]).sum(axis=1) / distance
     return Contacts(node, 1.0 - distance / clearance, -approach / clearance)

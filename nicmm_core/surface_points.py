@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import tolerances
-from .array_types import FloatArray, IntArray
+from .array_types import BoolArray, FloatArray, IntArray
 from .errors import ControlPointError, UnreachableError
 from .mesh import Mesh, real_array
 
@@ -39,6 +39,10 @@ class SurfacePoints:
 
     def __len__(self) -> int:
         return len(self.faces)
+
+    def __getitem__(self, index: IntArray | BoolArray) -> SurfacePoints:
+        """Some of the points, by an array of indices or a mask."""
+        return SurfacePoints(self.faces[index], self.barycentric[index])
 
 
 def locate_control_points(

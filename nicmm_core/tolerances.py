@@ -3,6 +3,8 @@
 Lengths are never absolute: a mesh in micrometres and one in kilometres get the same curve.
 """
 
+import numpy as np
+
 ON_SURFACE = 1e-4
 """Farthest that a control point may lie from the surface, in bounding-box diagonals."""
 
@@ -17,3 +19,6 @@ BARYCENTRIC_SUM = 1e-6
 
 INSIDE = 1e-6
 """Least barycentric coordinate of a point that has to lie strictly inside its face."""
+
+TINY = float(np.finfo(np.float64).tiny)
+"""Least divisor; what is divided by it is zero too."""

@@ -104,6 +104,24 @@ def with_via_points(
     return Waypoints(together, np.array(is_control), names)
 
 
+def same_via_points(one: ViaPoints | None, other: ViaPoints | None) -> bool:
+    """Whether both steer a path in the same way; False where one of them is no mapping."""
+    if one is None or other is None:
+        return one is other
+    if not (isinstance(one, Mapping) and isinstance(other, Mapping)) or set(one) != set(other):
+        return False
+    return all(_same_points(one[key], other[key]) for key in one)
+
+
+def _same_points(one: ArrayLike | SurfacePoints, other: ArrayLike | SurfacePoints) -> bool:
+    if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
+        faces = np.array_equal(one.faces, other.faces)
+        return faces and np.array_equal(one.barycentric, other.barycentric)
+    if isinstance(one, SurfacePoints) or isinstance(other, SurfacePoints):
+        return False
+    return np.array_equal(one, other)
+
+
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
     """Via points as the command line has them, ``"1:57,80"`` for each leg.
 

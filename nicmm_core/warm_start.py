@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import tolerances
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .exact_curve import drawn, exact_curve, is_simple
-from .face_walks import moved
+from .exact_curve import drawn, exact_curve, is_simple, shifted
 from .relaxation import RelaxationConfig
 from .surface_points import SurfacePoints
 
@@ -57,11 +57,9 @@ def moved_along(
     shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(shift, axis=1)
     length[at_controls] = 0.0
-    going = np.flatnonzero(length)
-    start = SurfacePoints(nodes.places.faces[going], nodes.places.barycentric[going])
-    targets, _ = moved(mesh, start, shift[going] / length[going, None], length[going])
-    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
-    faces[going], barycentric[going] = targets.faces, targets.barycentric
+    direction = shift / np.maximum(length, tolerances.TINY)[:, None]
+    places = shifted(surface, nodes, direction, length)[0].places
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[at_controls], barycentric[at_controls] = controls.faces, controls.barycentric
     places = SurfacePoints(faces, barycentric)
     changed = drawn(surface, exact, nodes_at(surface, places, curve.closed))

@@ -122,6 +122,21 @@ def test_forgetting_starts_anew(body, problems):
     assert len(problems) == 2
 
 
+def test_other_via_points_start_anew(ring, problems):
+    """Also where the caller changes the mapping that was passed before."""
+    designer = nicmm.Designer(ring)
+    controls = nearest_vertices(ring, 1.4 * circle(np.radians([250.0, 270.0, 290.0])))
+    via = {2: nearest_vertices(ring, 1.4 * circle(np.radians([0.0, 90.0, 180.0]))).tolist()}
+    designer.design(controls, via_points=via)
+    designer.design(controls, via_points={2: np.array(via[2])}, smoothness=0.5)
+    assert len(problems) == 1
+    via[2] = via[2][:1]
+    designer.design(controls, via_points=via)
+    assert len(problems) == 2
+    with pytest.raises(nicmm.ArgumentError, match="via_points"):
+        designer.design(controls, via_points=[57])
+
+
 def test_a_bad_request_leaves_the_last_curve(body, problems):
     designer = nicmm.Designer(body)
     designer.design(CHOSEN, order="shortest")
