@@ -139,7 +139,7 @@ def _findings(bends: Sequence[Bends]) -> str:
     for method in METHODS:
         medians = [float(np.median(_ratios(bends, method, s))) for s in range(len(SAMPLINGS))]
         both = " and ".join(
-            f"{median:.1f} times ({samples} samples)"
+            f"{median:.2f} times ({samples} samples)"
             for median, samples in zip(medians, SAMPLINGS, strict=True)
         )
         text += f"`{method}` bends {both} as much as it, by the median. "
@@ -197,6 +197,6 @@ def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
     renders.render_sheet(pictures, path, scale)
     return report.figure(
         path,
-        "The curves of nicmm-paper (orange), variational (green) and the elastic "
+        "The curves of nicmm (blue), nicmm-paper (orange), variational (green) and the elastic "
         "curve (white) through the same points (Fig. 7)",
     )

@@ -243,6 +243,6 @@ def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
     renders.render_sheet(shown, path, scale, columns=5, views=[view] * len(shown))
     return report.figure(
         path,
-        "nicmm-paper (orange) and variational (green) on the first mesh, more and "
+        "nicmm (blue), nicmm-paper (orange) and variational (green) on the first mesh, more and "
         "more degraded (Fig. 11, top of Fig. 12)",
     )

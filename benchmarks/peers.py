@@ -237,6 +237,6 @@ def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
     renders.render_sheet(shown, path, scale)
     return report.figure(
         path,
-        "nicmm-paper (orange), variational (green), MeshLib's projected spline "
+        "nicmm (blue), nicmm-paper (orange), variational (green), MeshLib's projected spline "
         "(yellow), edge-flip loop (black) and signed heat (red) through the same points (Fig. 9)",
     )
