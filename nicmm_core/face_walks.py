@@ -173,7 +173,7 @@ class _Walkers:
     ) -> None:
         self.mesh = mesh
         self.index = index  # (w,) which of the caller's walkers
-        self.faces = faces[index]
+        self.faces = self._start = faces[index]
         self.last_step = np.zeros(len(index))
         self._origin = origin[index]
         self._across = np.cross(normals[index], forward[index])
@@ -222,9 +222,12 @@ class _Walkers:
         return self.faces, self._low, self._high, self._fraction
 
     def enter_next_faces(self, goes: BoolArray) -> None:
-        """Take walkers over their edges; those that may not or cannot go drop out."""
+        """Take walkers over their edges; those that may not or cannot go drop out.
+
+        So do those that come back to the face where they started: their section is closed.
+        """
         beyond = self.beyond()
-        goes = goes & (beyond >= 0)
+        goes = goes & (beyond >= 0) & (beyond != self._start)
         if not goes.all():
             self._keep(goes)
             beyond = beyond[goes]
@@ -257,7 +260,7 @@ class _Walkers:
 
     def _keep(self, mask: BoolArray) -> None:
         for name in (
-            "index", "faces", "last_step", "_origin", "_across", "_position", "_side", "_high",
+            "index", "faces", "_start", "last_step", "_origin", "_across", "_position", "_side", "_high",
             "_low", "_high_height", "_low_height", "_high_position", "_low_position", "_fraction",
             "_crossing",
         ):  # fmt: skip
