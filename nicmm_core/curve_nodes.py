@@ -26,7 +26,7 @@ class CurveSurface:
     feature_map : (V,) float array or None
         φ_fea.
     feature_weight : float
-        λ_fea / λ_smooth of Eq. 2, in 1/length², where there is a feature map.
+        λ_fea / λ_smooth, in 1/length², where there is a feature map.
     """
 
     mesh: Mesh

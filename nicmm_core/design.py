@@ -25,6 +25,7 @@ from .curve import SurfaceCurve
 from .curve_field import curve_field
 from .curve_nodes import CurveSurface, unsigned_normals
 from .design_result import STATUS, Design, Status, is_one_curve
+from .elastic_energy import FEATURE_TENSION
 from .errors import ArgumentError
 from .features import feature_map
 from .losses import LossWeights, balanced
@@ -78,8 +79,8 @@ class Designer:
     """A surface that will be asked for many curves.
 
     What depends on the mesh alone is found once. ``method="nicmm"`` also starts from the curve
-    before, if the request differs from the last one only in small moves of control points, in
-    weight maps or in smoothness: then the cost follows the curve and not the mesh, which is what
+    before, if the request differs from the last one only in small moves of control points or in
+    smoothness: then the cost follows the curve and not the mesh, which is what
     dragging a point needs. Such a curve keeps the course and the order of points that it has, so
     it may differ from what `design_curve` finds from nothing; `forget` makes the next design
     start anew. A Designer serves one thread at a time.
@@ -130,7 +131,7 @@ class Designer:
         smoothness = checked_smoothness(smoothness)
         request = _Request(points, closed, order, via_points, _as_bytes(maps), smoothness)
         if method == "nicmm":
-            again = self._designed_again(request, maps, progress, started)
+            again = self._designed_again(request, progress, started)
             if again is not None:
                 return again
         problem = build_problem(self.mesh, points, order, *maps, smoothness, closed, via_points)
@@ -139,7 +140,6 @@ class Designer:
     def _designed_again(
         self,
         request: _Request,
-        maps: Maps,
         progress: Progress | None,
         started: float,
     ) -> Design | None:
@@ -151,8 +151,6 @@ class Designer:
             return replace(last.design, seconds=time.perf_counter() - started)
         points = request.points[last.visited]
         surface = last.surface
-        if request.maps != last.request.maps:
-            surface = self._curve_surface(maps, last.unit)
         start = moved_along(surface, last.design.curves[0], points)
         if start is None:
             return None
@@ -254,8 +252,7 @@ class Designer:
         if all(one is None for one in maps):
             return CurveSurface(self.mesh, self._normals)
         importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        weight = LossWeights.feature / LossWeights.smooth / unit**2
-        return CurveSurface(self.mesh, self._normals, importance, weight)
+        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / unit**2)
 
     @cached_property
     def _normals(self) -> FloatArray:
@@ -395,6 +392,7 @@ def _is_alike(one: _Request, other: _Request) -> bool:
         and one.closed == other.closed
         and one.order == other.order
         and same_via_points(one.via_points, other.via_points)
+        and one.maps == other.maps  # the path goes round obstacles from the start
     )
 
 
@@ -403,7 +401,6 @@ def _is_same(one: _Request, other: _Request) -> bool:
     return (
         np.array_equal(one.points.faces, other.points.faces)
         and np.array_equal(one.points.barycentric, other.points.barycentric)
-        and one.maps == other.maps
         and one.smoothness == other.smoothness
     )
 

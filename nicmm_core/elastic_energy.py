@@ -4,10 +4,10 @@ There |∇φ| = 1, the level-set term vanishes and the integrals over the surfac
 
     E = ∮ κ_g² ds + τ ∮ φ_fea² ds.
 
-With maps τ is λ_fea / λ_smooth of Eq. 2. Without, φ_fea is 1 and the second term is the length; it
-keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a circle in
-the plane neither grows nor shrinks, so that the balance has no length of its own. Where strands of
-the curve may not cross, a third term keeps them apart (`strand_contact`).
+With maps τ is λ_fea / λ_smooth, which is `FEATURE_TENSION` here. Without, φ_fea is 1 and the second
+term is the length; it keeps far points from being joined by ever larger bows. There τ = (2π / L)²,
+with which a circle in the plane neither grows nor shrinks, so that the balance has no length of its
+own. Where strands of the curve may not cross, a third term keeps them apart (`strand_contact`).
 
 The unknowns are sideways moves of nodes in their tangent planes. A node's residuals know only its
 two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
@@ -28,6 +28,13 @@ from .strand_contact import contact_residuals
 
 DIFFERENCE = 1e-4
 """Move of a node for differences, in mean steps."""
+
+FEATURE_TENSION = 600.0
+"""λ_fea / λ_smooth for lengths in square roots of the surface's area.
+
+It sets how tightly the curve may bend to follow a map: about 1/√600, 4 % of that length. The ratio
+of the level set's energy, 30, leaves the curve too stiff for what people paint.
+"""
 
 CONTACT = 10.0
 """Energy of a curve whose strands all touch, relative to that of the same curve without contact."""

@@ -155,6 +155,14 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
     return drawn / drawn.sum(axis=1, keepdims=True)
 
 
+_OF_EACH_WALKER = (
+    *("index", "faces", "last_step", "_start", "_origin", "_across", "_position", "_side"),
+    *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
+    *("_fraction", "_crossing"),
+)
+"""Arrays of `_Walkers`."""
+
+
 class _Walkers:
     """Walkers on their way, each in its plane, about to cross an edge of the face that it is in.
 
@@ -259,11 +267,7 @@ class _Walkers:
         self._crossing = self._high_position + self._fraction[:, None] * step
 
     def _keep(self, mask: BoolArray) -> None:
-        for name in (
-            "index", "faces", "_start", "last_step", "_origin", "_across", "_position", "_side", "_high",
-            "_low", "_high_height", "_low_height", "_high_position", "_low_position", "_fraction",
-            "_crossing",
-        ):  # fmt: skip
+        for name in _OF_EACH_WALKER:
             setattr(self, name, getattr(self, name)[mask])
 
 

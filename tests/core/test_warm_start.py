@@ -79,18 +79,28 @@ def test_the_same_request_has_the_same_answer(body):
     np.testing.assert_array_equal(first.curves[0].points, second.curves[0].points)
 
 
-def test_smoothness_and_maps_start_from_the_last_curve(body, problems):
+def test_smoothness_starts_from_the_last_curve(body, problems):
     designer = nicmm.Designer(body)
     first = designer.design(CHOSEN, order="shortest")
     tight = designer.design(CHOSEN, order="shortest", smoothness=0.02)
     assert tight.curves[0].length < first.curves[0].length
+    assert len(problems) == 1
+
+
+def test_new_maps_start_anew_and_stay_for_dragging(body, problems):
+    """The initial path has to go round a new obstacle."""
+    designer = nicmm.Designer(body)
+    first = designer.design(CHOSEN, order="shortest")
     weights = np.zeros(len(body.vertices))
     middle = first.curves[0].points[len(first.curves[0].points) // 2]
     weights[np.linalg.norm(body.vertices - middle, axis=1) < 0.05 * body.diagonal] = 1.0
     avoiding = designer.design(CHOSEN, order="shortest", obstacles=weights)
     assert_valid_design(body, avoiding)
-    assert len(problems) == 1
-    assert avoiding.energy["fea"] > 0.0
+    assert len(problems) == 2
+    away = [beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]]
+    dragged = designer.design(away, order="shortest", obstacles=weights.copy())
+    assert len(problems) == 2
+    assert dragged.energy["fea"] > 0.0
 
 
 @pytest.mark.parametrize(
