@@ -22,6 +22,7 @@ MEASUREMENTS = (
     "initial",
     "curvature",
     "runtime",
+    "dragging",
     "peers",
     "degraded",
     "resolution",
