@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from nicmm_core.design_result import is_one_curve
-from nicmm_core.losses import LossWeights
+from nicmm_core.level_set.losses import LossWeights
 from nicmm_core.mesh import Mesh
-from nicmm_core.network import NetworkConfig
-from nicmm_core.prediction import PredictionConfig, predict
-from nicmm_core.trainable_network import CurveNetwork
+from nicmm_core.network.forward_pass import NetworkConfig
+from nicmm_core.network.prediction import PredictionConfig, predict
+from nicmm_core.network.trainable_network import CurveNetwork
 
 from . import collections, report
 from .scale import Scale

@@ -10,8 +10,8 @@ import numpy as np
 
 from nicmm_core.array_types import FloatArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.prediction import PredictionConfig, predict
-from nicmm_core.trainable_network import CurveNetwork, load_network
+from nicmm_core.network.prediction import PredictionConfig, predict
+from nicmm_core.network.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
 from .scale import Scale

@@ -13,8 +13,8 @@ import nicmm_core as nicmm
 from nicmm_core.array_types import FloatArray, IntArray
 from nicmm_core.curve import SurfaceCurve
 from nicmm_core.design_result import is_one_curve
+from nicmm_core.level_set.problem import build_problem
 from nicmm_core.mesh import Mesh
-from nicmm_core.problem import build_problem
 from nicmm_core.surface_points import locate_control_points
 
 from . import collections, plots, renders, report

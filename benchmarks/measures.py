@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from nicmm_core.array_types import FloatArray
 from nicmm_core.curve import SurfaceCurve, geodesic_curvature, resample
-from nicmm_core.features import vertex_normals
+from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.mesh import Mesh
 
 SAMPLES = 128

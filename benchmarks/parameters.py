@@ -9,9 +9,9 @@ import numpy as np
 
 from nicmm_core.array_types import FloatArray
 from nicmm_core.curve import SurfaceCurve
-from nicmm_core.losses import LossWeights
-from nicmm_core.prediction import BAND_WIDTH, predict
-from nicmm_core.trainable_network import CurveNetwork, load_network
+from nicmm_core.level_set.losses import LossWeights
+from nicmm_core.network.prediction import BAND_WIDTH, predict
+from nicmm_core.network.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
 from .measures import bending

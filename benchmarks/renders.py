@@ -18,7 +18,7 @@ from mathutils.bvhtree import BVHTree
 
 from nicmm_core.array_types import FloatArray
 from nicmm_core.curve import SurfaceCurve, resample
-from nicmm_core.features import vertex_normals
+from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.mesh import Mesh
 
 from . import plots

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from nicmm_core.losses import LossWeights
-from nicmm_core.trainable_network import load_network
+from nicmm_core.level_set.losses import LossWeights
+from nicmm_core.network.trainable_network import load_network
 
 from . import collections, report
 from .scale import Scale

@@ -10,8 +10,8 @@ from . import Status, design_curve
 from .arguments import METHODS
 from .errors import ArgumentError, NicmmError
 from .files import check_curve_path, read_mesh, write_curve, write_mesh
-from .initial_loop import ORDERS
-from .via_points import parse_via_points
+from .path.initial_loop import ORDERS
+from .path.via_points import parse_via_points
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -91,8 +91,8 @@ def _design(options: argparse.Namespace) -> None:
 def _pretrain(options: argparse.Namespace) -> None:
     from tqdm import tqdm
 
-    from .network import NetworkConfig
-    from .pretraining import PretrainingConfig, pretrain
+    from .network.forward_pass import NetworkConfig
+    from .network.pretraining import PretrainingConfig, pretrain
 
     bars: dict[str, tqdm] = {}
 

@@ -6,8 +6,8 @@ from numpy.typing import ArrayLike
 
 from .array_types import FloatArray
 from .errors import ArgumentError, MissingPackageError
-from .initial_loop import ORDERS
 from .mesh import Mesh, real_array
+from .path.initial_loop import ORDERS
 
 METHODS = ("nicmm", "nicmm-paper", "variational")
 

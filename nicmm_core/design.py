@@ -16,30 +16,30 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import variational
 from .arguments import check_choices, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray, IntArray
-from .contour import extract_curves
 from .crossings import crossing_segments
 from .curve import SurfaceCurve
-from .curve_field import curve_field
-from .curve_nodes import CurveSurface, unsigned_normals
 from .design_result import STATUS, Design, Status, is_one_curve
-from .elastic_energy import FEATURE_TENSION
 from .errors import ArgumentError
-from .features import feature_map
-from .losses import LossWeights, balanced
+from .level_set import variational
+from .level_set.contour import extract_curves
+from .level_set.features import feature_map
+from .level_set.losses import LossWeights, balanced
+from .level_set.problem import Problem, build_problem
+from .level_set.solution import Solution
+from .level_set.topology import keep_topology
 from .mesh import Mesh
-from .network import NetworkWeights
-from .problem import Problem, build_problem
-from .relaxation import RelaxationConfig, Relaxed, relax
-from .single_pass import predict_once
-from .solution import Solution
+from .network.forward_pass import NetworkWeights
+from .network.single_pass import predict_once
+from .network.weights_file import load_weights
+from .path.via_points import ViaPoints, same_via_points
+from .relaxation.curve_field import curve_field
+from .relaxation.curve_nodes import CurveSurface, unsigned_normals
+from .relaxation.elastic_energy import FEATURE_TENSION
+from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
+from .relaxation.warm_start import WARM, moved_along
 from .surface_points import SurfacePoints, locate_control_points
-from .topology import keep_topology
-from .via_points import ViaPoints, same_via_points
-from .warm_start import WARM, moved_along
-from .weights_file import load_weights
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -201,8 +201,8 @@ class Designer:
         if method == "nicmm":
             return predict_once(pretrained, problem)
         # These import PyTorch, which nothing else needs.
-        from .prediction import PredictionConfig, predict
-        from .trainable_network import build_network
+        from .network.prediction import PredictionConfig, predict
+        from .network.trainable_network import build_network
 
         return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import report
 from benchmarks.__main__ import MEASUREMENTS
 from benchmarks.scale import Scale
-from nicmm_core.prediction import PredictionConfig
+from nicmm_core.network.prediction import PredictionConfig
 
 FEW_ITERATIONS = 40
 

@@ -1,0 +1,275 @@
+"""The zero level set of φ as curves on the input mesh.
+
+φ is linear in every working face, so its zero set crosses each face in one straight segment and
+the polyline lies on the surface by construction. Control points are vertices where φ is exactly
+zero. A vertex that the contour passes closely counts as zero too, where that only draws a few tiny
+segments together into one point. At any other vertex a value of 0 is read as just positive, or the
+contour would shatter there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..curve import SurfaceCurve, curve_on_mesh
+from ..mesh import Mesh
+from ..path.virtual_splits import WorkingMesh
+from .sign_bundle import SignBundle, local_signs
+from .vertex_links import VertexLinks
+
+PASSING_MARGIN = 0.03
+"""The contour goes through a vertex if it crosses every edge there within this share of it."""
+
+CROSSING_MARGIN = 1e-6
+"""Closest that a crossing comes to the end of its edge, as a fraction of the edge.
+
+Keeps neighbouring points of the polyline apart where φ is almost zero at a vertex.
+"""
+
+
+def signs_with_zeros(field: FloatArray, zero_vertices: IntArray) -> IntArray:
+    """Sign of φ at every vertex: 0 at the vertices given, +1 or -1 elsewhere, shape (n,)."""
+    sign = np.where(field >= 0.0, 1, -1)
+    sign[zero_vertices] = 0
+    return sign
+
+
+def extract_curves(
+    mesh: Mesh,
+    working: WorkingMesh,
+    field: FloatArray,
+    control_vertices: IntArray,
+    bundle: SignBundle | None = None,
+) -> list[SurfaceCurve]:
+    """Zero level set of a field that is linear in each face.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The input mesh.
+    working : WorkingMesh
+    field : (n,) float array
+        φ at the working vertices; its values at the control vertices count as zero.
+    control_vertices : (k,) int array
+        Working vertices of the control points, in the order visited, no two of them neighbours.
+    bundle : SignBundle, optional
+        How the faces read the values of their corners.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        Those with most control points first, then the longest. A curve that ends at the mesh's
+        boundary, or at an end of the bundle, is open.
+    """
+    passed = _passed_vertices(working, field, control_vertices, bundle)
+    through = np.concatenate([control_vertices, passed])
+    nodes, segments, segment_face = _segments(working, field, through, bundle)
+    chains = _chains(segments, len(nodes))
+    curves = []
+    for chain, along, closed in chains:
+        if closed:
+            chain, along = _from_first_control(chain, along, nodes, control_vertices)
+        elif _runs_backwards(nodes[chain], control_vertices):
+            chain, along = chain[::-1], along[::-1]
+        parent = working.parent_face[segment_face[along]]
+        # The last point of an open chain has no segment after it and lies on the one before.
+        parent = parent if closed else np.append(parent, parent[-1])
+        barycentric = _barycentric(mesh, working, field, nodes[chain], parent)
+        visited = _positions_in(nodes[chain], control_vertices)
+        curves.append(curve_on_mesh(mesh, closed, parent, barycentric, visited))
+    curves.sort(key=lambda curve: (-(curve.control_index >= 0).sum(), -curve.length))
+    return curves
+
+
+def _passed_vertices(
+    working: WorkingMesh,
+    field: FloatArray,
+    control_vertices: IntArray,
+    bundle: SignBundle | None,
+) -> IntArray:
+    """Vertices that the contour passes so closely that it may go through them.
+
+    They are simple, and no two of them or of them and the control vertices are neighbours.
+    """
+    sign = signs_with_zeros(field, control_vertices)
+    _, ends = _crossings(working.faces, sign, bundle)
+    start, end = np.unique(ends[ends[:, :, 0] != ends[:, :, 1]], axis=0).T
+    fraction = _crossing_fraction(field, start, end)
+    farthest = np.zeros(len(field))
+    np.maximum.at(farthest, start, fraction)
+    np.maximum.at(farthest, end, 1.0 - fraction)
+    crossed = np.unique(np.concatenate([start, end]))
+    near = crossed[farthest[crossed] < PASSING_MARGIN]
+    links = VertexLinks(working, bundle)
+    taken = set(control_vertices.tolist())
+    passed = []
+    for vertex in near[np.argsort(farthest[near], kind="stable")].tolist():
+        if taken.isdisjoint(links.neighbours(vertex)) and links.is_simple(vertex, sign):
+            taken.add(vertex)
+            passed.append(vertex)
+    return np.array(passed, dtype=np.int64)
+
+
+def segment_ends(
+    vertices: FloatArray,
+    faces: IntArray,
+    field: FloatArray,
+    sign: IntArray,
+    bundle: SignBundle | None = None,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Faces that the zero set crosses, and where its segment in each of them starts and ends.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+    faces : (m, 3) int array
+    field : (n,) float array
+    sign : (n,) int array
+        As from `signs_with_zeros`.
+    bundle : SignBundle, optional
+
+    Returns
+    -------
+    crossed : (s,) int array
+    start, end : (s, 3) float array
+    """
+    crossed, ends = _crossings(faces, sign, bundle)
+    first, second = ends.transpose(2, 0, 1)
+    fraction = _crossing_fraction(field, first, second)[..., None]
+    points = (1.0 - fraction) * vertices[first] + fraction * vertices[second]
+    return crossed, points[:, 0], points[:, 1]
+
+
+def _segments(
+    working: WorkingMesh, field: FloatArray, through: IntArray, bundle: SignBundle | None
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Contour nodes, the segments between them and the face of each segment.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    field : (n,) float array
+    through : (q,) int array
+        Vertices that count as zero.
+    bundle : SignBundle or None
+
+    Returns
+    -------
+    nodes : (p, 2) int array
+        The working edge that φ changes sign on, smaller index first, or a zero vertex twice.
+    segments : (s, 2) int array
+        Node indices.
+    segment_face : (s,) int array
+        Working face of each segment.
+    """
+    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
+    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    return nodes, index.reshape(-1, 2), segment_face
+
+
+def _crossings(
+    faces: IntArray, sign: IntArray, bundle: SignBundle | None
+) -> tuple[IntArray, IntArray]:
+    """Faces that the zero set crosses, (s,), and the two ends of each segment, (s, 2, 2).
+
+    An end is the edge on which the sign changes, smaller index first, or a zero vertex twice.
+    """
+    corner_sign = local_signs(sign, faces, bundle)
+    crossed = np.flatnonzero((corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1))
+    faces, corner_sign = faces[crossed], corner_sign[crossed]
+    ends = []
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        changes = corner_sign[:, first] * corner_sign[:, second] < 0
+        edge = np.sort(faces[:, [first, second]], axis=1)
+        ends.append(np.where(changes[:, None], edge, -1))
+    for corner in range(3):
+        at_zero = corner_sign[:, [corner]] == 0
+        ends.append(np.where(at_zero, faces[:, [corner, corner]], -1))
+    candidates = np.stack(ends, axis=1)  # (s, 6, 2), exactly two of the six are ends
+    return crossed, candidates[candidates[:, :, 0] >= 0].reshape(-1, 2, 2)
+
+
+def _crossing_fraction(field: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
+    """How far from the first end of an edge φ is zero, as a share of the edge; 0 at a vertex."""
+    here, there = np.abs(field[first]), np.abs(field[second])
+    fraction = here / np.maximum(here + there, np.finfo(np.float64).tiny)
+    return np.where(first == second, 0.0, fraction)
+
+
+def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
+    """Join segments into paths: (nodes, segments in between, closed), each node used once.
+
+    Where more than two segments meet, a path ends; on a manifold that happens only at
+    vertices that two strands pass.
+    """
+    at_node: list[list[int]] = [[] for _ in range(n_nodes)]
+    for segment, (a, b) in enumerate(segments.tolist()):
+        at_node[a].append(segment)
+        at_node[b].append(segment)
+    unused = np.ones(len(segments), dtype=bool)
+    chains = []
+
+    def walk(start: int, segment: int) -> tuple[list[int], list[int]]:
+        chain, along = [start], []
+        while True:
+            unused[segment] = False
+            along.append(segment)
+            a, b = segments[segment]
+            chain.append(int(b if a == chain[-1] else a))
+            onward = [s for s in at_node[chain[-1]] if unused[s]]
+            if chain[-1] == start or len(at_node[chain[-1]]) != 2 or not onward:
+                return chain, along
+            segment = onward[0]
+
+    irregular = [node for node in range(n_nodes) if len(at_node[node]) != 2]
+    for start in [*irregular, *range(n_nodes)]:
+        for segment in at_node[start]:
+            if unused[segment]:
+                chain, along = walk(start, segment)
+                closed = chain[0] == chain[-1]
+                nodes = chain[:-1] if closed else chain
+                chains.append((np.array(nodes), np.array(along), closed))
+    return chains
+
+
+def _from_first_control(
+    chain: IntArray, along: IntArray, nodes: IntArray, control_vertices: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Start a closed chain at its first control point and walk towards the second."""
+    where = _positions_in(nodes[chain], control_vertices)
+    where = where[where >= 0]
+    if not len(where):
+        return chain, along
+    chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
+    if len(where) > 2 and (where[1] - where[0]) % len(chain) > (where[2] - where[0]) % len(chain):
+        chain, along = np.roll(chain[::-1], 1), along[::-1]
+    return chain, along
+
+
+def _runs_backwards(nodes: IntArray, control_vertices: IntArray) -> bool:
+    """Whether an open chain meets its last control point first."""
+    where = _positions_in(nodes, control_vertices)
+    where = where[where >= 0]
+    return len(where) > 1 and bool(where[0] > where[-1])
+
+
+def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
+    """Index among the nodes of each control vertex, -1 when it is none of them, shape (k,)."""
+    at_vertex = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
+    found = {int(nodes[i, 0]): int(i) for i in at_vertex}
+    return np.array([found.get(int(vertex), -1) for vertex in control_vertices], dtype=np.int64)
+
+
+def _barycentric(
+    mesh: Mesh, working: WorkingMesh, field: FloatArray, nodes: IntArray, parent: IntArray
+) -> FloatArray:
+    """Coordinates of contour nodes in the input faces given, shape (p, 3)."""
+    first, second = nodes.T
+    fraction = _crossing_fraction(field, first, second)
+    fraction = np.clip(fraction, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]
+    corners = mesh.faces[parent]
+    weights = working.interpolation
+    start = np.asarray(weights[first[:, None], corners].todense()).reshape(-1, 3)
+    end = np.asarray(weights[second[:, None], corners].todense()).reshape(-1, 3)
+    return np.where((first == second)[:, None], start, (1.0 - fraction) * start + fraction * end)

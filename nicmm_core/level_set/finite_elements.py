@@ -1,0 +1,92 @@
+"""Linear finite elements on the working mesh: gradient, Laplacian and centroid values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from scipy import sparse
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..mesh import triangle_areas
+from .sign_bundle import SignBundle, corner_matrix
+
+
+@dataclass(frozen=True)
+class FiniteElements:
+    """Operators for n vertices and m faces; lengths are in the unit of the vertices given.
+
+    Attributes
+    ----------
+    face_areas : (m,) float array
+    vertex_areas : (n,) float array
+        Barycentric (a third of the faces around), positive.
+    gradient : (3 m, n) sparse array
+        Gradient of a linear function in each face; all x components, then y, then z.
+    stiffness : (n, n) sparse array
+        Cotangent stiffness: positive semidefinite, zero on constants.
+    laplacian : (n, n) sparse array
+        Pointwise Laplacian, ``-stiffness / vertex_areas``; zero rows where asked, as on the
+        boundary, where the stiffness holds the flux through it and not a second derivative.
+    centroid : (m, n) sparse array
+        Value of a linear function at the centroid of each face.
+    plain_centroid : (m, n) sparse array
+        The same for ordinary functions, where φ is read with signs.
+    """
+
+    face_areas: FloatArray
+    vertex_areas: FloatArray
+    gradient: sparse.csr_array
+    stiffness: sparse.csr_array
+    laplacian: sparse.csr_array
+    centroid: sparse.csr_array
+    plain_centroid: sparse.csr_array
+
+
+def build_finite_elements(
+    vertices: FloatArray,
+    faces: IntArray,
+    without_laplacian: BoolArray,
+    bundle: SignBundle | None = None,
+) -> FiniteElements:
+    """Assemble the operators of a mesh (in double precision).
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+    faces : (m, 3) int array
+    without_laplacian : (n,) bool array
+        Vertices whose row of the Laplacian is left zero, as on the boundary.
+    bundle : SignBundle, optional
+        How the faces read the values of their corners.
+    """
+    n_vertices, n_faces = len(vertices), len(faces)
+    face_areas = triangle_areas(vertices, faces)
+    corners = (np.repeat(np.arange(n_faces), 3), faces.ravel())
+    thirds = np.full(3 * n_faces, 1.0 / 3.0)
+    plain_centroid = sparse.csr_array((thirds, corners), shape=(n_faces, n_vertices))
+    vertex_areas = plain_centroid.T @ face_areas
+    if bundle is None:
+        centroid = plain_centroid
+        stiffness = sparse.csr_array(-igl.cotmatrix(vertices, faces))
+        gradient = sparse.csr_array(igl.grad(vertices, faces))
+    else:
+        reading = corner_matrix(faces, n_vertices, bundle)
+        centroid = sparse.csr_array(
+            (thirds * bundle.corner_sign.ravel(), corners), shape=(n_faces, n_vertices)
+        )
+        apart = np.arange(3 * n_faces).reshape(-1, 3)
+        at_corners = vertices[faces].reshape(-1, 3)
+        stiffness = sparse.csr_array(reading.T @ (-igl.cotmatrix(at_corners, apart)) @ reading)
+        gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
+    inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)
+    return FiniteElements(
+        face_areas=face_areas,
+        vertex_areas=vertex_areas,
+        gradient=gradient,
+        stiffness=stiffness,
+        laplacian=sparse.csr_array(sparse.diags_array(-inside) @ stiffness),
+        centroid=centroid,
+        plain_centroid=plain_centroid,
+    )

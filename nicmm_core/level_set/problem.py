@@ -1,0 +1,190 @@
+"""One design problem, ready for the network: everything up to the features, in one place.
+
+This is the paper's pipeline as far as section 3.1: control points, initial loop, signed distance
+and input features. Pretraining and prediction both start from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csgraph
+
+from ..array_types import BoolArray, FloatArray
+from ..errors import MeshError
+from ..mesh import Mesh
+from ..path.initial_loop import InitialLoop, build_initial_loop
+from ..path.via_points import ViaPoints
+from ..path.virtual_splits import WorkingMesh
+from ..surface_points import SurfacePoints
+from .features import (
+    control_indicator,
+    feature_map,
+    in_principal_frame,
+    input_features,
+    vertex_normals,
+)
+from .finite_elements import FiniteElements, build_finite_elements
+from .sign_bundle import SignBundle, build_sign_bundle
+from .signed_distance import bounding_side, signed_distance
+from .smoothing import Smoother, build_smoother
+from .sparse_solver import DEGENERATE
+from .topology import keep_topology
+
+SMOOTHING_LENGTH = 1.5
+"""ℓ of the smoothing of φ₀ at smoothness 1, in steps of the initial loop.
+
+Less leaves the zigzag of the edge path in the curve; more makes thin regions vanish, where the
+topology then falls back on the jagged distance.
+"""
+
+
+END_RADIUS = 3.0
+"""Distance from an end of an open curve, in edge lengths, within which bending does not count.
+
+φ is a cone about the end, whose Laplacian grows without bound and says nothing of the curve.
+"""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A curve to be designed, in lengths relative to the square root of the surface's area.
+
+    Attributes
+    ----------
+    working : WorkingMesh
+        In the input mesh's units.
+    unit : float
+        Square root of the area of the working mesh, the unit of all that follows.
+    vertices : (n, 3) float array
+        Positions about the surface's centroid, along its principal axes.
+    bundle : SignBundle or None
+        How the faces read φ, where the curve is open or bounds no region.
+    elements : FiniteElements
+    loop : InitialLoop
+    distance : (n,) float array
+        Signed distance to the initial loop.
+    smoother : Smoother
+    initial_distance : (n,) float array
+        φ₀: the distance smoothed. Its zero set is one simple loop through the control points.
+    feature_map : (n,) float array or None
+        φ_fea.
+    features : (n, 8) or (n, 9) float array
+        The network's input.
+    """
+
+    working: WorkingMesh
+    unit: float
+    vertices: FloatArray
+    bundle: SignBundle | None
+    elements: FiniteElements
+    loop: InitialLoop
+    distance: FloatArray
+    smoother: Smoother
+    initial_distance: FloatArray
+    feature_map: FloatArray | None
+    features: FloatArray
+
+    @property
+    def edge_length(self) -> float:
+        """Mean length h of the edges at the initial loop, relative to the unit."""
+        return self.loop.edge_length / self.unit
+
+
+def build_problem(
+    mesh: Mesh,
+    points: SurfacePoints,
+    order: str = "given",
+    obstacles: FloatArray | None = None,
+    alignment: FloatArray | None = None,
+    smoothness: float = 1.0,
+    closed: bool = True,
+    via_points: ViaPoints | None = None,
+) -> Problem:
+    """Everything that comes before the network.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        As `locate_control_points` gives them.
+    order : {"given", "shortest"}
+    obstacles, alignment : (V,) float array or None
+        Weights in [0, 1] at the input mesh's vertices.
+    smoothness : float
+        Multiplies the weight of bending in the smoothing of φ₀, the fourth power of its length.
+    closed : bool
+        Whether the curve returns from the last point to the first.
+    via_points : mapping, optional
+        From the index of a control point to points that steer the initial path from there.
+
+    Raises
+    ------
+    MeshError
+        If faces have no area.
+    UnreachableError
+        If no simple path passes the points in this order.
+    """
+    component = mesh.face_component == mesh.face_component[points.faces[0]]
+    if not (mesh.face_areas[component] > 0.0).all():
+        raise MeshError(DEGENERATE)
+    importance = None
+    if obstacles is not None or alignment is not None:
+        importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
+    working, loop = build_initial_loop(mesh, points, order, importance, closed, via_points)
+    unit = float(np.sqrt(working.face_areas.sum()))
+    vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
+    edge_length = loop.edge_length / unit
+    elements = build_finite_elements(vertices, working.faces, working.on_boundary)
+    plain, bundle = elements, None
+    side = bounding_side(working, elements, loop) if closed else None
+    if side is None:
+        bundle = build_sign_bundle(working, loop)
+        side = bundle.side
+        without_laplacian = working.on_boundary | _near_ends(working, loop)
+        elements = build_finite_elements(vertices, working.faces, without_laplacian, bundle)
+    distance = signed_distance(plain, loop, edge_length, side)
+    length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
+    smoother = build_smoother(
+        elements, loop.control_vertices, length, None if bundle is None else plain
+    )
+    initial_distance, _ = keep_topology(
+        working, loop, distance, smoother.smoothed(distance), bundle
+    )
+    if importance is not None:
+        importance = working.interpolation @ importance
+    features = input_features(
+        vertices,
+        vertex_normals(vertices, working.faces),
+        control_indicator(smoother.response),
+        initial_distance,
+        importance,
+    )
+    return Problem(
+        working=working,
+        unit=unit,
+        vertices=vertices,
+        bundle=bundle,
+        elements=elements,
+        loop=loop,
+        distance=distance,
+        smoother=smoother,
+        initial_distance=initial_distance,
+        feature_map=importance,
+        features=features,
+    )
+
+
+def _near_ends(working: WorkingMesh, loop: InitialLoop) -> BoolArray:
+    """Vertices near an end of an open path, shape (n,)."""
+    if loop.closed:
+        return np.zeros(len(working.vertices), dtype=bool)
+    distance = csgraph.dijkstra(
+        working.edge_graph(),
+        directed=False,
+        indices=loop.vertices[[0, -1]],
+        min_only=True,
+        limit=END_RADIUS * loop.edge_length,
+    )
+    return np.isfinite(distance)

@@ -1,0 +1,133 @@
+"""Signs that let a level set be an open curve, or a loop that does not bound.
+
+The zero set of a function always separates the surface. A section of a sign bundle need not: in
+every face each corner reads its vertex's value with a sign, and neighbouring faces agree up to a
+common sign on the edge between them. Walking round an end of an open curve, or once along a torus
+across its meridian, the value comes back with the opposite sign.
+
+The bundle used here is trivial away from the initial path. Its faces on one side of the path read
+the path's own vertices as they are and those on the other side with a minus, so that |φ₀|, positive
+on both sides, is a function that changes its sign across the path. Then every vertex takes the sign
+of the side that it is nearest to, which makes φ a smooth signed function about the path, and moves
+the places where signs differ far from it. Nothing but the signs of corners enters the operators,
+the topology and the contour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import IntArray
+from ..path.initial_loop import InitialLoop
+from ..path.virtual_splits import WorkingMesh
+
+
+@dataclass(frozen=True)
+class SignBundle:
+    """How the faces read the values of their corners.
+
+    Attributes
+    ----------
+    corner_sign : (m, 3) int array
+        ±1 by face and corner.
+    side : (n,) int array
+        The sign that the distance to the path gets at each vertex.
+    ends : (e,) int array
+        Vertices where an open path ends: two of them, or none.
+    """
+
+    corner_sign: IntArray
+    side: IntArray
+    ends: IntArray
+
+
+def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
+    """The bundle in which the distance to a path changes its sign across the path."""
+    faces = working.faces
+    at_corners = sparse.csr_array(corner_matrix(faces, len(working.vertices), None).T)
+    corner_sign = np.ones(faces.shape, dtype=np.int64)
+    inner = range(len(loop.vertices)) if loop.closed else range(1, len(loop.vertices) - 1)
+    before: dict[int, int] = {}
+    for place in inner:
+        vertex = int(loop.vertices[place])
+        around = at_corners[[vertex]].indices // 3
+        side_of = _sides(faces, around, vertex, loop.neighbours(place))
+        # Sides at one vertex of the path go on as those at the next one.
+        shared = [face for face in side_of if face in before]
+        turn = side_of[shared[0]] * before[shared[0]] if shared else 1
+        before = {face: turn * face_side for face, face_side in side_of.items()}
+        for face, face_side in before.items():
+            corner_sign[face, faces[face] == vertex] = face_side
+    side = _nearest_side(working, loop, corner_sign)
+    ends = np.zeros(0, dtype=np.int64) if loop.closed else loop.vertices[[0, -1]]
+    return SignBundle(corner_sign * side[faces], side, ends)
+
+
+def _sides(
+    faces: IntArray, around: IntArray, vertex: int, path_neighbours: list[int]
+) -> dict[int, int]:
+    """±1 for each face at a vertex of the path, changing across the path's edges there."""
+    at_spoke: dict[int, list[int]] = {}
+    for face in around.tolist():
+        for other in faces[face].tolist():
+            if other != vertex:
+                at_spoke.setdefault(other, []).append(face)
+    side = {int(around[0]): 1}
+    stack = [int(around[0])]
+    while stack:
+        face = stack.pop()
+        for spoke in faces[face].tolist():
+            if spoke == vertex:
+                continue
+            across = -1 if spoke in path_neighbours else 1
+            for other in at_spoke[spoke]:
+                if other not in side:
+                    side[other] = across * side[face]
+                    stack.append(other)
+    return side
+
+
+def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray) -> IntArray:
+    """The side of the path that each vertex is nearest to, +1 on the path, shape (n,)."""
+    n_vertices = len(working.vertices)
+    on_path = np.zeros(n_vertices, dtype=bool)
+    on_path[loop.vertices] = True
+    side = np.zeros(n_vertices, dtype=np.int64)
+    side[on_path] = 1
+    inner = on_path.copy()
+    if not loop.closed:
+        inner[loop.vertices[[0, -1]]] = False
+    # A face lies on one side only, and so do its corners off the path.
+    sign = np.where(inner[working.faces], corner_sign, 0).sum(axis=1)
+    for corner in range(3):
+        vertex = working.faces[:, corner]
+        beside = ~on_path[vertex] & (sign != 0)
+        side[vertex[beside]] = np.sign(sign[beside])
+    graph = sparse.csr_array(working.edge_graph())
+    distance, previous, _ = csgraph.dijkstra(
+        graph,
+        directed=False,
+        indices=np.flatnonzero(side != 0),
+        min_only=True,
+        return_predecessors=True,
+    )
+    for vertex in np.argsort(distance, kind="stable").tolist():
+        if side[vertex] == 0:
+            side[vertex] = side[previous[vertex]] if previous[vertex] >= 0 else 1
+    return side
+
+
+def local_signs(sign: IntArray, faces: IntArray, bundle: SignBundle | None) -> IntArray:
+    """Signs of values at vertices as the faces read them, shape (m, 3)."""
+    return sign[faces] if bundle is None else bundle.corner_sign * sign[faces]
+
+
+def corner_matrix(faces: IntArray, n_vertices: int, bundle: SignBundle | None) -> sparse.csr_array:
+    """What the corners of the faces read of the vertices, shape (3 m, n)."""
+    values = np.ones(faces.size) if bundle is None else bundle.corner_sign.ravel().astype(float)
+    entries = (values, (np.arange(faces.size), faces.ravel()))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(faces.size, n_vertices)))

@@ -1,0 +1,36 @@
+"""What a solver found, whichever it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..array_types import FloatArray
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Level-set values and how they were reached.
+
+    Attributes
+    ----------
+    field : (n,) float array
+        φ of the iteration with the least loss, in units of the problem.
+    terms : dict of str to float
+        The unweighted terms of the loss there.
+    losses : list of float
+        Total loss of every iteration.
+    stopped : {"converged", "cap", "cancelled", "diverged"}
+    keeps_topology : bool
+        Whether the zero set is known to be isotopic to that of φ₀.
+    """
+
+    field: FloatArray
+    terms: dict[str, float]
+    losses: list[float]
+    stopped: str
+    keeps_topology: bool = False
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations done."""
+        return len(self.losses)

@@ -1,0 +1,69 @@
+"""Factorisation of symmetric positive definite systems."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph, linalg
+
+from ..array_types import FloatArray, IntArray
+from ..errors import MeshError
+
+DEGENERATE = (
+    "faces: the part of the mesh with the control points has faces without area, on which no "
+    "distance can be computed; merge vertices by distance or dissolve degenerate faces"
+)
+
+PREORDERED_FROM = 4000
+"""Unknowns from which a bandwidth-reducing order pays before the fill-reducing one."""
+
+
+@dataclass(frozen=True)
+class Factors:
+    """LU factors of a matrix whose rows and columns stand in another order."""
+
+    factors: linalg.SuperLU
+    order: IntArray | None
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve for one right side, (n,), or several, (n, k)."""
+        if self.order is None:
+            return self.factors.solve(right)
+        solution = np.empty_like(right)
+        solution[self.order] = self.factors.solve(right[self.order])
+        return solution
+
+
+def factorise(matrix: sparse.sparray) -> Factors:
+    """LU factors of a symmetric positive definite matrix, without pivoting off the diagonal.
+
+    SciPy has no sparse Cholesky; with an ordering for symmetric patterns its LU is about five
+    times faster than with the default one. Unlike Cholesky it also survives the rounding that
+    makes a system of very thin triangles barely indefinite. SuperLU takes long over large matrices
+    whose order is that of a subdivided mesh: 42 s for the Laplacian of 64,000 vertices, and 0.35 s
+    after a reverse Cuthill–McKee ordering, with the same fill.
+
+    Raises
+    ------
+    MeshError
+        If the matrix is singular or not finite, as faces without area make it.
+    """
+    if not np.isfinite(matrix.data).all():
+        raise MeshError(DEGENERATE)
+    order = None
+    if matrix.shape[0] >= PREORDERED_FROM:
+        rows = sparse.csr_array(matrix)
+        order = csgraph.reverse_cuthill_mckee(rows, symmetric_mode=True).astype(np.int64)
+        matrix = rows[order][:, order]
+    try:
+        factors = linalg.splu(
+            sparse.csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:  # "Factor is exactly singular"
+        raise MeshError(DEGENERATE) from error
+    return Factors(factors, order)

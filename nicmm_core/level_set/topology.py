@@ -1,0 +1,132 @@
+"""Keep the zero set one loop.
+
+A level set is free to split, merge and miss points (the paper's Fig. 16), and on thin limbs it
+often does. Flipping the sign of one vertex keeps the zero set's topology exactly when the signs
+round its link form one positive and one negative run: a simple vertex. Starting from the signs of
+a field whose zero set is one simple loop through the control points, every vertex that the
+solution wants on the other side is flipped as soon as it is simple. When all can be, the solution
+is isotopic to the start: one simple loop through the control points in the same order. Where some
+cannot, the solution falls back on the start, blended over a few edges.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from scipy.sparse import csgraph
+
+from ..array_types import FloatArray, IntArray
+from ..path.initial_loop import InitialLoop
+from ..path.virtual_splits import WorkingMesh
+from .contour import signs_with_zeros
+from .sign_bundle import SignBundle
+from .vertex_links import VertexLinks
+
+FALLBACK_RADIUS = 4.0
+"""Distance from a vertex that breaks the topology within which the start replaces the solution,
+in edge lengths at the loop; the blend reaches as far as twice that again."""
+
+FALLBACK_GROWTH = 1.3
+"""Growth of that radius from one attempt to the next."""
+
+FALLBACK_ATTEMPTS = 12
+"""Attempts before the start replaces the solution everywhere."""
+
+
+def keep_topology(
+    working: WorkingMesh,
+    loop: InitialLoop,
+    start: FloatArray,
+    wanted: FloatArray,
+    bundle: SignBundle | None = None,
+) -> tuple[FloatArray, int]:
+    """Follow a field as far as its zero set stays isotopic to that of the start.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    loop : InitialLoop
+    start : (n,) float array
+        A field whose zero set is one simple loop through the control vertices.
+    wanted : (n,) float array
+        The field to follow, in the same unit.
+    bundle : SignBundle, optional
+        How the faces read the values of their corners.
+
+    Returns
+    -------
+    (n,) float array
+        ``wanted`` wherever nothing forbids it, else a blend of both.
+    int
+        Number of vertices of ``wanted`` whose sign breaks the topology; 0 means that the field
+        is returned as it came.
+    """
+    links = VertexLinks(working, bundle)
+    control_vertices = loop.control_vertices
+    breaking = breaking_vertices(links, start, wanted, control_vertices)
+    n_breaking = len(breaking)
+    field, all_breaking = wanted, breaking
+    for attempt in range(FALLBACK_ATTEMPTS):
+        if not len(breaking):
+            return field, n_breaking
+        radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
+        share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
+        field = start + share * (wanted - start)
+        breaking = breaking_vertices(links, start, field, control_vertices)
+        all_breaking = np.union1d(all_breaking, breaking)
+    return start, n_breaking
+
+
+def breaking_vertices(
+    links: VertexLinks, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
+) -> IntArray:
+    """Vertices that no sequence of simple flips brings to the side where they are wanted.
+
+    Parameters
+    ----------
+    links : VertexLinks
+    start : (n,) float array
+        A field whose zero set is one simple loop through the control vertices.
+    wanted : (n,) float array
+    control_vertices : (k,) int array
+
+    Returns
+    -------
+    (q,) int array
+        None when the zero set of ``wanted`` is isotopic to that of ``start``.
+    """
+    sign = signs_with_zeros(start, control_vertices)
+    goal = signs_with_zeros(wanted, control_vertices)
+    changes_at_control = {v: links.sign_changes(v, sign) for v in control_vertices.tolist()}
+    queue = deque(np.flatnonzero(sign != goal).tolist())
+    queued = sign != goal
+    while queue:
+        vertex = queue.popleft()
+        queued[vertex] = False
+        if not links.is_simple(vertex, sign):
+            continue
+        sign[vertex] = goal[vertex]
+        around = links.neighbours(vertex)
+        controls_around = [v for v in around if v in changes_at_control]
+        if any(links.sign_changes(v, sign) != changes_at_control[v] for v in controls_around):
+            sign[vertex] = -goal[vertex]
+            continue
+        # A flip can free its neighbours and, beside a control point, those of the point.
+        freed = set(around).union(*(links.neighbours(v) for v in controls_around))
+        for other in sorted(freed):
+            if sign[other] != goal[other] and not queued[other]:
+                queue.append(other)
+                queued[other] = True
+    return np.flatnonzero(sign != goal)
+
+
+def _distance_from(working: WorkingMesh, sources: IntArray) -> FloatArray:
+    """Length along edges to the nearest source, shape (n,)."""
+    return csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources, min_only=True)
+
+
+def _smooth_step(fraction: FloatArray) -> FloatArray:
+    """0 up to 0, 1 from 2 on, and a smooth rise between."""
+    t = np.clip(0.5 * fraction, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)

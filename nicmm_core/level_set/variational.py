@@ -1,0 +1,199 @@
+"""The variational method: the same energy with φ at every vertex of a narrow band as unknowns.
+
+The paper measures itself against Zhang et al. ("Versatile curve design by level set with quadratic
+convergence", 2024), whose code is not public; this is as strong a method of that kind as we know.
+Every iteration is a damped Gauss–Newton step in the band about the present curve, after which φ
+becomes the signed distance to the new curve. That frees the curve from the ridges of the former
+distance, which would hold it where it was. A vertex whose change of side would split the curve, or
+lead it off a control point, is held for one step, so that the curve stays one loop throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from ..array_types import BoolArray, FloatArray
+from .losses import LossWeights, energy_surface, loss_terms
+from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
+from .problem import Problem
+from .redistancing import build_distance_surface, redistanced
+from .solution import Solution
+from .sparse_solver import factorise
+from .topology import breaking_vertices
+from .vertex_links import VertexLinks
+
+
+@dataclass(frozen=True)
+class VariationalConfig:
+    """How the solver runs; lengths are in mean edge lengths at the curve.
+
+    Attributes
+    ----------
+    half_width : float
+        Of the band. The bending term reaches 3, where its Gaussian ends; wider bands reach over
+        the ridge between two strands of the curve more often.
+    longest_move : float
+        Farthest that φ beside the curve changes in a step; the band must hold the new curve.
+    beside : float
+        Distance within which that counts.
+    damping : float
+        Weight of the step's norm at the start, relative to λ_sdf.
+    least_damping : float
+    patience : int
+        Iterations over which the least loss so far must stay still,
+    tolerance : float
+        and how still. Both are the paper's (section 4.5).
+    iterations : int
+        The cap.
+    trials : int
+        Damped or held steps that may be tried in one iteration.
+    """
+
+    half_width: float = 4.0
+    longest_move: float = 1.5
+    beside: float = 2.0
+    damping: float = 1e-2
+    least_damping: float = 1e-6
+    patience: int = 10
+    tolerance: float = 1e-5
+    iterations: int = 100
+    trials: int = 25
+
+
+LEAST_GAIN = 1e-3
+"""Least share of the predicted decrease that a step must reach; else it is damped more."""
+
+GOOD_GAIN, POOR_GAIN = 0.75, 0.25
+"""Shares above and below which the damping falls or rises."""
+
+
+def solve(
+    problem: Problem,
+    weights: LossWeights,
+    config: VariationalConfig,
+    watch: Callable[[float, FloatArray], bool] | None = None,
+) -> Solution:
+    """Minimise the energy by Gauss–Newton steps on signed distances.
+
+    Parameters
+    ----------
+    problem : Problem
+    weights : LossWeights
+    config : VariationalConfig
+    watch : callable, optional
+        Called with the fraction of the cap that is done and φ after every iteration; the solver
+        stops when it returns False.
+
+    Returns
+    -------
+    Solution
+        Its zero set is isotopic to that of φ₀.
+    """
+    h = problem.edge_length
+    controls = problem.loop.control_vertices
+    surface = build_distance_surface(problem.vertices, problem.working.faces, h, problem.bundle)
+    links = VertexLinks(problem.working, problem.bundle)
+    reach = (config.half_width + 1.0) * h
+    field = redistanced(surface, problem.initial_distance, controls, reach)
+    best_field, losses, least = field, [], []
+    damping = config.damping
+    stopped = "cap"
+    for iteration in range(1, config.iterations + 1):
+        band = build_narrow_band(problem, field, config.half_width * h)
+        losses.append(evaluate(band, weights, field[band.unknowns]).energy)
+        if not np.isfinite(losses[-1]):
+            stopped = "diverged"
+            break
+        if losses[-1] <= min(losses):
+            best_field = field
+        least.append(min(losses))
+        if watch is not None and not watch(iteration / config.iterations, best_field):
+            stopped = "cancelled"
+            break
+        if _rests(least, config):
+            stopped = "converged"
+            break
+        moved, damping = gauss_newton_step(problem, band, links, field, weights, damping, config)
+        if moved is None:
+            stopped = "converged"
+            break
+        field = redistanced(surface, moved, controls, reach)
+    field = redistanced(surface, best_field, controls)
+    terms = loss_terms(energy_surface(problem), field)
+    terms = {name: float(value) for name, value in terms.items()}
+    return Solution(field, terms, losses, stopped, keeps_topology=True)
+
+
+def _rests(least: list[float], config: VariationalConfig) -> bool:
+    """Whether the least loss so far has not changed for some iterations."""
+    if len(least) <= config.patience:
+        return False
+    return least[-1 - config.patience] - least[-1] < config.tolerance
+
+
+def gauss_newton_step(
+    problem: Problem,
+    band: NarrowBand,
+    links: VertexLinks,
+    field: FloatArray,
+    weights: LossWeights,
+    damping: float,
+    config: VariationalConfig,
+) -> tuple[FloatArray | None, float]:
+    """One damped Gauss–Newton step (Levenberg–Marquardt).
+
+    Returns
+    -------
+    (n,) float array or None
+        The new φ; None when no step lowers the energy.
+    float
+        Damping for the next step.
+    """
+    h = problem.edge_length
+    values = field[band.unknowns]
+    residuals = evaluate(band, weights, values)
+    hessian, gradient = gauss_newton_system(band, weights, residuals)
+    beside = np.abs(values) < config.beside * h
+    free = np.ones(len(values), dtype=bool)
+    for _ in range(config.trials):
+        step = _damped_step(band, hessian, gradient, weights.sdf * damping, free)
+        farthest = np.abs(step[beside]).max(initial=0.0)
+        if farthest > config.longest_move * h:
+            step *= config.longest_move * h / farthest
+        moved = field.copy()
+        moved[band.unknowns] += step
+        breaking = breaking_vertices(links, field, moved, problem.loop.control_vertices)
+        if len(breaking):
+            free &= ~np.isin(band.unknowns, breaking)
+            continue
+        predicted = -(gradient @ step + 0.5 * (step @ (hessian @ step)))
+        if not predicted > 0.0:
+            return None, damping
+        gain = (residuals.energy - evaluate(band, weights, values + step).energy) / predicted
+        if not gain > LEAST_GAIN:  # also when it is no number
+            damping *= 4.0
+            continue
+        if gain > GOOD_GAIN:
+            damping = max(damping / 4.0, config.least_damping)
+        elif gain < POOR_GAIN:
+            damping *= 2.0
+        return moved, damping
+    return None, damping
+
+
+def _damped_step(
+    band: NarrowBand,
+    hessian: sparse.csr_array,
+    gradient: FloatArray,
+    damping: float,
+    free: BoolArray,
+) -> FloatArray:
+    """Solve the damped system for the unknowns that may move, shape (u,)."""
+    system = hessian + damping * band.damping
+    step = np.zeros(len(gradient))
+    step[free] = factorise(system[free][:, free]).solve(-gradient[free])
+    return step

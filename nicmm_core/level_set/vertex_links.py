@@ -1,0 +1,101 @@
+"""The link of a vertex, and whether the vertex is simple for a field's signs.
+
+A vertex is simple when the signs round it form one positive and one negative run. Then the zero set
+passes its star in one strand, whatever the sign of the vertex itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..array_types import IntArray
+from ..path.virtual_splits import WorkingMesh
+from .sign_bundle import SignBundle
+
+
+class VertexLinks:
+    """Vertices round each vertex in order, found when first asked for."""
+
+    def __init__(self, working: WorkingMesh, bundle: SignBundle | None = None) -> None:
+        corners = working.faces.ravel()
+        self._by_vertex = np.argsort(corners, kind="stable") // 3
+        self._start = np.searchsorted(np.sort(corners), np.arange(len(working.vertices) + 1))
+        self._faces = working.faces
+        self._corner_sign = None if bundle is None else bundle.corner_sign
+        self._ends = frozenset() if bundle is None else frozenset(bundle.ends.tolist())
+        self._link: dict[int, tuple[list[int], bool] | None] = {}
+
+    def neighbours(self, vertex: int) -> list[int]:
+        """Vertices joined to a vertex by an edge."""
+        faces = self._faces[self._faces_at(vertex)]
+        return [v for v in np.unique(faces).tolist() if v != vertex]
+
+    def is_simple(self, vertex: int, sign: IntArray) -> bool:
+        """Whether one positive and one negative run make up the link."""
+        link = self._ordered(vertex)
+        return link is not None and self.sign_changes(vertex, sign) == (2 if link[1] else 1)
+
+    def sign_changes(self, vertex: int, sign: IntArray) -> int:
+        """Changes of sign round the link, zeros passed over; -1 where the link is no simple path.
+
+        A control vertex in the link is a zero, where the curve passes the link itself.
+        """
+        if vertex in self._ends:
+            return self._sign_changes_round_end(vertex, sign)
+        link = self._ordered(vertex)
+        if link is None:
+            return -1
+        ring, closed = link
+        relative = self._relative_signs(vertex)
+        signs = [int(sign[v]) * relative.get(v, 1) for v in ring if sign[v] != 0]
+        if closed:
+            signs += signs[:1]
+        return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+
+    def _relative_signs(self, vertex: int) -> dict[int, int]:
+        """Signs with which neighbours are read where the vertex itself is read as it is."""
+        if self._corner_sign is None:
+            return {}
+        relative: dict[int, int] = {}
+        for face in self._faces_at(vertex).tolist():
+            corners, signs = self._faces[face].tolist(), self._corner_sign[face].tolist()
+            own = signs[corners.index(vertex)]
+            relative.update((v, own * s) for v, s in zip(corners, signs, strict=True))
+        return relative
+
+    def _sign_changes_round_end(self, vertex: int, sign: IntArray) -> int:
+        """Faces at an end of an open curve whose other corners lie on different sides."""
+        around = self._faces_at(vertex)
+        assert self._corner_sign is not None  # ends are those of a bundle
+        local = self._corner_sign[around] * sign[self._faces[around]]
+        local[self._faces[around] == vertex] = 0
+        return int(((local == 1).any(axis=1) & (local == -1).any(axis=1)).sum())
+
+    def _faces_at(self, vertex: int) -> IntArray:
+        return self._by_vertex[self._start[vertex] : self._start[vertex + 1]]
+
+    def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
+        """The link as a path and whether it closes; None when the surface branches here."""
+        if vertex not in self._link:
+            self._link[vertex] = self._trace(vertex)
+        return self._link[vertex]
+
+    def _trace(self, vertex: int) -> tuple[list[int], bool] | None:
+        joined: dict[int, list[int]] = {}
+        faces = self._faces[self._faces_at(vertex)]
+        for face in faces.tolist():
+            a, b = (v for v in face if v != vertex)
+            joined.setdefault(a, []).append(b)
+            joined.setdefault(b, []).append(a)
+        if max(map(len, joined.values())) > 2:
+            return None
+        ends = [v for v, others in joined.items() if len(others) == 1]
+        ring = [ends[0] if ends else next(iter(joined))]
+        before = -1
+        while True:
+            onward = [v for v in joined[ring[-1]] if v != before and v != ring[0]]
+            if not onward:
+                break
+            before = ring[-1]
+            ring.append(onward[0])
+        return (ring, not ends) if len(ring) == len(joined) else None

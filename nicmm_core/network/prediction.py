@@ -1,0 +1,143 @@
+"""Stage 2 (section 4.1): optimise the pretrained network for one problem, with early stopping."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..array_types import FloatArray
+from ..level_set.losses import (
+    EnergySurface,
+    LossWeights,
+    loss_terms,
+    sdf_density,
+    smoothness_density,
+    total_loss,
+)
+from ..level_set.problem import Problem
+from ..level_set.solution import Solution
+from .tensors import network_input, surface_tensors
+from .torch_threads import single_thread
+from .trainable_network import CurveNetwork
+
+BAND_WIDTH = 3.0
+"""Width of the narrow band about the curve, in mean edge lengths (section 4.1)."""
+
+
+@dataclass(frozen=True)
+class PredictionConfig:
+    """How stage 2 runs.
+
+    Attributes
+    ----------
+    learning_rate : float
+        The paper's.
+    patience : int
+        Iterations over which the narrow-band energy must stay still.
+    fluctuation : float
+        How still: its spread over those iterations, relative to its value. The paper says
+        "minimal fluctuations".
+    threshold : float
+        Energy below which the curve is good at once. On a sphere, where the least energy is zero,
+        a curve at this value is within 6 % of the radius of the great circle.
+    least_iterations : int
+        Iterations before stillness counts; AdamW needs some to find its step sizes, and from a
+        plateau at the start it may look still.
+    iterations : int
+        The cap.
+    """
+
+    learning_rate: float = 0.001
+    patience: int = 10
+    fluctuation: float = 0.02
+    threshold: float = 0.005
+    least_iterations: int = 30
+    iterations: int = 300
+
+
+@single_thread()
+def predict(
+    network: CurveNetwork,
+    problem: Problem,
+    weights: LossWeights,
+    config: PredictionConfig,
+    watch: Callable[[float, FloatArray], bool] | None = None,
+) -> Solution:
+    """Optimise a copy of the network for one problem.
+
+    Parameters
+    ----------
+    network : CurveNetwork
+        As pretrained; not changed.
+    problem : Problem
+    weights : LossWeights
+    config : PredictionConfig
+    watch : callable, optional
+        Called with the fraction of the cap that is done and φ after every iteration; prediction
+        stops when it returns False.
+    """
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    surface = surface_tensors(problem, device)
+    given = network_input(problem, device)
+    network = copy.deepcopy(network).to(device)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+
+    best_loss, best_field = np.inf, problem.initial_distance
+    best_terms = dict.fromkeys(("sdf", "int", "smooth", "fea"), np.inf)
+    energies: list[float] = []
+    losses: list[float] = []
+    stopped = "cap"
+    for iteration in range(1, config.iterations + 1):
+        optimiser.zero_grad()
+        phi = network(given)  # (n,)
+        terms = loss_terms(surface, phi)
+        loss = total_loss(terms, weights)
+        value = loss.item()
+        losses.append(value)
+        if not np.isfinite(value):
+            stopped = "diverged"
+            break
+        if value < best_loss:
+            best_loss, best_terms = value, _as_floats(terms)
+            best_field = phi.detach().cpu().numpy().astype(np.float64)
+        energies.append(narrow_band_energy(surface, phi.detach(), weights, problem.edge_length))
+        if watch is not None and not watch(iteration / config.iterations, best_field):
+            stopped = "cancelled"
+            break
+        if _may_stop(energies, config):
+            stopped = "converged"
+            break
+        loss.backward()
+        optimiser.step()
+    return Solution(best_field, best_terms, losses, stopped)
+
+
+@torch.no_grad()
+def narrow_band_energy(
+    surface: EnergySurface, phi: Tensor, weights: LossWeights, edge_length: float
+) -> float:
+    """Mean density of the level-set and smoothness terms in the band about the zero set."""
+    inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)
+    density = weights.sdf * sdf_density(surface, phi)
+    density = density + weights.smooth * smoothness_density(surface, phi)
+    area = surface.face_areas * inside
+    return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
+
+
+def _may_stop(energies: list[float], config: PredictionConfig) -> bool:
+    """The paper's early stop: the energy is low enough, or rests."""
+    if energies[-1] < config.threshold:
+        return True
+    if len(energies) < max(config.patience, config.least_iterations):
+        return False
+    recent = energies[-config.patience :]
+    return max(recent) - min(recent) <= config.fluctuation * recent[-1]
+
+
+def _as_floats(terms: dict[str, Tensor]) -> dict[str, float]:
+    return {name: float(value.item()) for name, value in terms.items()}

@@ -1,0 +1,219 @@
+"""Stage 1 (section 4.1): train one network on random control points of one or more meshes."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ..errors import ArgumentError, UnreachableError
+from ..level_set.losses import LossWeights, loss_terms, total_loss
+from ..level_set.problem import Problem, build_problem
+from ..mesh import Mesh
+from ..surface_points import locate_control_points
+from .forward_pass import NetworkConfig
+from .tensors import network_input, surface_tensors
+from .torch_threads import single_thread
+from .trainable_network import CurveNetwork, network_weights
+from .weights_file import save_weights
+
+GRADIENT_LIMIT = 1.0
+"""Norm to which a step's gradient is clipped; single sets with a bad loop would throw training."""
+
+
+@dataclass(frozen=True)
+class PretrainingConfig:
+    """How stage 1 runs; sets, points and learning rate are the paper's.
+
+    Attributes
+    ----------
+    sets : int
+        Sets of control points in all, spread evenly over the meshes.
+    fewest_points, most_points : int
+        Points of a set.
+    epochs : int
+        Passes over all sets.
+    learning_rate : float
+        Initial rate of AdamW; it falls to zero along a cosine.
+    seed : int
+    """
+
+    sets: int = 1000
+    fewest_points: int = 3
+    most_points: int = 5
+    epochs: int = 10
+    learning_rate: float = 0.01
+    seed: int = 0
+
+
+@single_thread()
+def pretrain(
+    meshes: Sequence[Mesh],
+    output: str | Path,
+    network_config: NetworkConfig | None = None,
+    config: PretrainingConfig | None = None,
+    weights: LossWeights | None = None,
+    progress: Callable[[str, int, int, float], None] | None = None,
+) -> list[float]:
+    """Train on random control points of the meshes and write the weights (Eq. 9).
+
+    A checkpoint beside the output is written after every epoch; a run that was interrupted goes
+    on from it and ends with the weights that it would have had.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+    output : path
+        Where the weights go, a ``.npz`` archive.
+    network_config, config, weights : optional
+        Defaults are those of the paper and of this package.
+    progress : callable, optional
+        Called with the name of the stage, steps done, steps in all and the mean loss so far.
+
+    Returns
+    -------
+    list of float
+        Mean loss of every epoch.
+
+    Raises
+    ------
+    ArgumentError
+        If there are no meshes, or a checkpoint belongs to another configuration.
+    """
+    config = config or PretrainingConfig()
+    weights = weights or LossWeights()
+    report = progress or (lambda stage, done, total, loss: None)
+    if not meshes:
+        raise ArgumentError("meshes is empty; name at least one mesh to train on")
+    for name in ("sets", "epochs"):
+        if getattr(config, name) < 1:
+            raise ArgumentError(f"{name} is {getattr(config, name)}; at least 1 is needed")
+    if not Path(output).resolve().parent.is_dir():
+        raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    torch.manual_seed(config.seed)
+    network = CurveNetwork(network_config or NetworkConfig()).to(device)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+    checkpoint = Path(output).with_suffix(".checkpoint.pt")
+    configuration = repr((network.config, config, weights, _fingerprint(meshes)))
+    losses = _resume(checkpoint, configuration, network, optimiser)
+
+    # The tensors of a set on 4,000 vertices take about 2 MB, so all of them stay on the device.
+    prepared = [
+        (surface_tensors(problem, device), network_input(problem, device))
+        for problem in _random_problems(meshes, config, report)
+    ]
+    for epoch in range(len(losses), config.epochs):
+        order = np.random.default_rng([config.seed, epoch]).permutation(len(prepared))
+        total = 0.0
+        for group in optimiser.param_groups:
+            group["lr"] = _learning_rate(config, epoch)
+        for step, index in enumerate(order):
+            surface, given = prepared[index]
+            optimiser.zero_grad()
+            loss = total_loss(loss_terms(surface, network(given)), weights)
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), GRADIENT_LIMIT)
+            optimiser.step()
+            total += loss.item()
+            done = epoch * len(order) + step + 1
+            report("training", done, config.epochs * len(order), total / (step + 1))
+        losses.append(total / len(order))
+        state = {
+            "configuration": configuration,
+            "network": network.state_dict(),
+            "optimiser": optimiser.state_dict(),
+            "losses": losses,
+        }
+        # An interruption while writing must not cost the checkpoint before.
+        partial = checkpoint.with_suffix(".partial")
+        torch.save(state, partial)
+        partial.replace(checkpoint)
+    save_weights(output, network_weights(network))
+    checkpoint.unlink(missing_ok=True)
+    return losses
+
+
+def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
+    """Half a cosine from the initial rate to zero."""
+    return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * epoch / config.epochs))
+
+
+def _resume(
+    checkpoint: Path, configuration: str, network: CurveNetwork, optimiser: torch.optim.Optimizer
+) -> list[float]:
+    """Load an interrupted run, if there is one; the losses of its epochs."""
+    if not checkpoint.exists():
+        return []
+    try:
+        state = torch.load(checkpoint, weights_only=True)
+        theirs = state["configuration"]
+    except (OSError, RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError) as error:
+        raise ArgumentError(
+            f"{checkpoint} cannot be read as a checkpoint ({error}); remove it to start anew"
+        ) from error
+    if theirs != configuration:
+        raise ArgumentError(
+            f"{checkpoint} belongs to a run with other meshes or settings; remove it or repeat "
+            "that run"
+        )
+    network.load_state_dict(state["network"])
+    optimiser.load_state_dict(state["optimiser"])
+    return list(state["losses"])
+
+
+def _fingerprint(meshes: Sequence[Mesh]) -> str:
+    digest = hashlib.sha256()
+    for mesh in meshes:
+        digest.update(mesh.vertices.tobytes())
+        digest.update(mesh.faces.tobytes())
+    return digest.hexdigest()
+
+
+def _random_problems(
+    meshes: Sequence[Mesh],
+    config: PretrainingConfig,
+    report: Callable[[str, int, int, float], None],
+) -> Iterator[Problem]:
+    """Random sets of vertices, as many on each mesh; sets without a loop are redrawn."""
+    done = 0
+    per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
+    for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
+        generator = np.random.default_rng([config.seed, number])
+        component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
+        vertices = np.unique(mesh.faces[mesh.face_component == component])
+        if len(vertices) < config.most_points:
+            raise ArgumentError(
+                f"meshes[{number}] has {len(vertices)} connected vertices, fewer than a set's "
+                f"{config.most_points} points; leave it out or use a finer mesh"
+            )
+        found = 0
+        for _ in range(TRIES_PER_SET * wanted):
+            if found == wanted:
+                break
+            count = generator.integers(config.fewest_points, config.most_points + 1)
+            chosen = generator.choice(vertices, size=count, replace=False)
+            points = locate_control_points(mesh, chosen, closed=True)
+            try:
+                problem = build_problem(mesh, points, order="shortest")
+            except UnreachableError:
+                continue
+            found += 1
+            done += 1
+            report("preparing", done, config.sets, 0.0)
+            yield problem
+        if found < wanted:
+            raise ArgumentError(
+                f"meshes[{number}]: only {found} of {wanted} random sets of points have a loop "
+                "through them; leave the mesh out or use a finer one"
+            )
+
+
+TRIES_PER_SET = 10
+"""Draws allowed for each set wanted, before a mesh is refused."""

@@ -1,0 +1,39 @@
+"""Problems as tensors in single precision: what training and prediction work on."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..array_types import FloatArray
+from ..level_set.losses import EnergySurface, energy_surface
+from ..level_set.problem import Problem
+from . import single_pass
+from .forward_pass import NetworkInput
+from .sparse_operator import SparseOperator
+
+
+def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
+    """Move what the energy needs of a problem to a device."""
+    arrays = energy_surface(problem)
+    elements = problem.elements
+    importance = arrays.feature_map
+    return EnergySurface(
+        face_areas=_tensor(arrays.face_areas, device),
+        gradient=SparseOperator(elements.gradient, device),
+        laplacian=SparseOperator(elements.laplacian, device),
+        centroid=SparseOperator(elements.centroid, device),
+        control_vertices=torch.as_tensor(arrays.control_vertices, device=device),
+        delta_width=arrays.delta_width,
+        feature_map=None if importance is None else _tensor(importance, device),
+    )
+
+
+def network_input(problem: Problem, device: torch.device) -> NetworkInput:
+    """Move what the network sees of a problem to a device."""
+    arrays = single_pass.network_input(problem)
+    return NetworkInput(*(torch.as_tensor(array, device=device) for array in arrays))
+
+
+def _tensor(array: FloatArray, device: torch.device) -> Tensor:
+    return torch.as_tensor(array, dtype=torch.float32, device=device)

@@ -1,0 +1,95 @@
+"""The network as a torch module, which training changes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from ..level_set.features import BASE_CHANNELS
+from .forward_pass import (
+    NetworkConfig,
+    NetworkInput,
+    NetworkWeights,
+    Operations,
+    level_set,
+    parameter_shapes,
+)
+from .weights_file import SHIPPED, load_weights
+
+
+class CurveNetwork(nn.Module):
+    """The parameters of a network and its forward pass `network.level_set`.
+
+    Before training, layers are as torch's own begin: uniform within the inverse root of their
+    number of inputs. But positions count more in the first layer, and the last one is zero.
+    """
+
+    def __init__(self, config: NetworkConfig, channels: int = BASE_CHANNELS) -> None:
+        super().__init__()
+        self.config = config
+        shapes = dict(parameter_shapes(config, channels))
+        # A list, since torch allows no dots in the name of a parameter.
+        self.names = tuple(shapes)
+        self.arrays = nn.ParameterList(torch.empty(shape) for shape in shapes.values())
+        parameters = self.weights.parameters
+        with torch.no_grad():
+            for name, parameter in parameters.items():
+                # A bias follows its weight and has as many inputs.
+                inputs = math.prod(shapes[name.replace("bias", "weight")][1:])
+                parameter.uniform_(-1.0 / math.sqrt(inputs), 1.0 / math.sqrt(inputs))
+            parameters["stem.weight"][:, :3] *= config.position_gain
+            if config.distance:
+                parameters["head.weight"].zero_()
+                parameters["head.bias"].zero_()
+
+    @property
+    def weights(self) -> NetworkWeights:
+        """Configuration and parameters by name: the tensors themselves."""
+        return NetworkWeights(self.config, dict(zip(self.names, self.arrays, strict=True)))
+
+    def forward(self, given: NetworkInput) -> Tensor:
+        """Level-set values φ, shape (n,)."""
+        return level_set(self.weights, given, TORCH)
+
+
+def build_network(weights: NetworkWeights) -> CurveNetwork:
+    """A network that starts from weights, which stay as they are."""
+    network = CurveNetwork(weights.config, weights.parameters["stem.weight"].shape[1])
+    with torch.no_grad():
+        for name, parameter in network.weights.parameters.items():
+            parameter.copy_(torch.as_tensor(weights.parameters[name]))
+    return network
+
+
+def network_weights(network: CurveNetwork) -> NetworkWeights:
+    """A copy of what a network has learned, as NumPy arrays."""
+    return NetworkWeights(
+        network.config,
+        {
+            name: tensor.detach().cpu().numpy().copy()
+            for name, tensor in network.weights.parameters.items()
+        },
+    )
+
+
+def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> CurveNetwork:
+    """Read a network to be trained on; see `weights_file.load_weights`."""
+    return build_network(load_weights(path, channels))
+
+
+def _correlate(values: Tensor, kernel: Tensor) -> Tensor:
+    reach = len(kernel) // 2
+    return nn.functional.conv1d(values[None, None], kernel[None, None], padding=reach)[0, 0]
+
+
+TORCH = Operations(
+    linear=nn.functional.linear,
+    tanh=torch.tanh,
+    sigmoid=torch.sigmoid,
+    correlate=_correlate,
+    ones_like=torch.ones_like,
+)
+"""The network's operations on tensors."""

@@ -1,0 +1,115 @@
+"""Virtual refinement of the mesh along the initial loop.
+
+φ is linear in every face, so a curve on a coarse mesh would show each face as a straight piece and
+could hardly bend. Edges near the loop that are long for its length are halved virtually, the
+longest first, so that the curve has room and pieces enough on any mesh. The surface stays as it is.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..array_types import BoolArray, FloatArray
+from .virtual_splits import SplitMesh
+
+PIECES = 64
+"""Edges near the loop are at most the loop's length over this number."""
+
+BAND_SHARE = 0.05
+"""Half width of the refined band, relative to the loop's length.
+
+It holds what the curve may move. Farther out, the longest edge grows with twice the distance.
+"""
+
+MOST_SPLITS = 20_000
+"""Edges that are halved at most; needle-shaped faces side by side would ask for many times more.
+
+The longest edges come first, so that stopping leaves the band evenly coarser.
+"""
+
+
+def refine_along(
+    split: SplitMesh, component: int, loop: list[int], closed: bool = True
+) -> tuple[list[int], float]:
+    """Halve long edges near a path of edges.
+
+    Parameters
+    ----------
+    split : SplitMesh
+        Changed.
+    component : int
+        The connected component that the path is on.
+    loop : list of int
+        Vertices of the path, the first not repeated.
+    closed : bool
+        Whether the last vertex is joined to the first.
+
+    Returns
+    -------
+    list of int
+        The same path with the vertices that now lie on it.
+    float
+        Size of the path's zigzag: the mean length of its edges before, but no more than the
+        longest edge after.
+    """
+    points = np.array([split.position(vertex) for vertex in loop])
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(lengths.sum())
+    longest, half_width = length / PIECES, BAND_SHARE * length
+    tree = cKDTree(_samples(points, longest))
+
+    def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Lengths of edges, and which are too long for their distance from the loop."""
+        # Rounded, so that equal edges stay equal however the model is turned.
+        size = np.round(np.linalg.norm(start - end, axis=1) / longest, 6) * longest
+        distance, _ = tree.query(0.5 * (start + end))
+        return size, (size > longest) & (distance < half_width + 0.5 * size)
+
+    working, renumbered = split.assemble(component)
+    original = np.flatnonzero(renumbered >= 0)
+    edges = working.edges[working.edge_lengths > longest]
+    size, wanted = too_long(*working.vertices[edges].transpose(1, 0, 2))
+    queue = [
+        (-edge_length, start, end)
+        for edge_length, (start, end) in zip(
+            size[wanted].tolist(), original[edges[wanted]].tolist(), strict=True
+        )
+    ]
+    heapq.heapify(queue)
+    following = dict(zip(loop, loop[1:] + loop[:1] if closed else loop[1:], strict=False))
+    for _ in range(MOST_SPLITS):
+        if not queue:
+            break
+        _, start, end = heapq.heappop(queue)
+        middle = split.split_edge(start, end)
+        if following.get(end) == start:
+            start, end = end, start
+        if following.get(start) == end:
+            following[start], following[middle] = middle, end
+        around = sorted(split.neighbours(middle))
+        positions = np.array([split.position(vertex) for vertex in around])
+        here = np.broadcast_to(split.position(middle), positions.shape)
+        for size, wanted, vertex in zip(*too_long(here, positions), around, strict=True):
+            if wanted:
+                heapq.heappush(queue, (-float(size), min(vertex, middle), max(vertex, middle)))
+    refined = [loop[0]]
+    while following.get(refined[-1], loop[0]) != loop[0]:
+        refined.append(following[refined[-1]])
+    return refined, min(float(lengths.mean()), longest)
+
+
+def _samples(points: FloatArray, spacing: float) -> FloatArray:
+    """Points along a polyline, no farther apart than the spacing."""
+    points, following = points[:-1], points[1:]
+    count = np.ceil(np.linalg.norm(following - points, axis=1) / spacing).astype(int).clip(min=1)
+    return np.concatenate(
+        [
+            start + (end - start) * np.arange(n)[:, None] / n
+            for start, end, n in zip(points, following, count, strict=True)
+        ]
+    )

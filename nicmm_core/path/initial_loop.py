@@ -1,0 +1,207 @@
+"""The initial path (section 3.1): mesh edges through the control points, closed or open.
+
+Plain shortest paths between consecutive points share edges and cross, and then no signed
+distance belongs to them. Here each path avoids every vertex that an earlier one took, and where
+vertices are too few it runs through the midpoints of edges, which are then split virtually.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csgraph
+
+from ..array_types import FloatArray, IntArray
+from ..errors import ArgumentError, UnreachableError
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints
+from .band_refinement import refine_along
+from .legs import CrossingError
+from .simple_path import lay_path
+from .via_points import ViaPoints, Waypoints, names_of, with_via_points
+from .virtual_splits import SplitMesh, WorkingMesh
+from .visiting_order import shortest_order
+
+ORDERS = ("given", "shortest")
+
+
+@dataclass(frozen=True)
+class InitialLoop:
+    """A simple path of edges of a working mesh, closed or open.
+
+    Attributes
+    ----------
+    vertices : (l,) int array
+        Working vertices in order, the first of a closed path not repeated at the end. No two of
+        them are joined by an edge that is not part of the path.
+    control_vertices : (k,) int array
+        The working vertex of each control point, in the order visited.
+    order : (k,) int array
+        Which of the caller's control points each of them is.
+    edge_length : float
+        Mean length of the edges at the loop: the h that band and delta are measured in.
+    zigzag : float
+        Length of the steps in which the loop follows the mesh, which smoothing has to remove.
+    closed : bool
+    """
+
+    vertices: IntArray
+    control_vertices: IntArray
+    order: IntArray
+    edge_length: float
+    zigzag: float
+    closed: bool = True
+
+    def neighbours(self, place: int) -> list[int]:
+        """Vertices before and after the one at a place of the path."""
+        places = [place - 1, place + 1]
+        if self.closed:
+            return [int(self.vertices[i % len(self.vertices)]) for i in places]
+        return [int(self.vertices[i]) for i in places if 0 <= i < len(self.vertices)]
+
+
+def build_initial_loop(
+    mesh: Mesh,
+    points: SurfacePoints,
+    order: str,
+    importance: FloatArray | None = None,
+    closed: bool = True,
+    via_points: ViaPoints | None = None,
+) -> tuple[WorkingMesh, InitialLoop]:
+    """Insert the control points and join them by edge paths that do not touch one another.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        At least three, or two of an open path, on one component.
+    order : {"given", "shortest"}
+        Visit the points as given, or in the shortest order.
+    importance : (V,) float array, optional
+        φ_fea at the input vertices. Lengths count times its square, as the curve's does in Eq. 7,
+        so the loop goes round obstacles and along alignment from the start.
+    closed : bool
+        Whether the path returns from the last point to the first.
+    via_points : mapping, optional
+        From the index of a control point to points that the path passes on its way to the next.
+
+    Returns
+    -------
+    WorkingMesh
+        The component of the points, split so that the loop runs along edges.
+    InitialLoop
+
+    Raises
+    ------
+    UnreachableError
+        If no simple path visits the points in this order, or only one that winds round itself too
+        often. The message names an order that works, if one is found.
+    ArgumentError
+        If ``order`` is neither of the two, or via points name no leg.
+    ControlPointError
+        If a via point cannot be used.
+    """
+    if order not in ORDERS:
+        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+    visit = np.arange(len(points))
+    if order == "shortest":
+        visit = _shortest_order(mesh, points, closed)
+    way = Waypoints(_chosen(points, visit), np.ones(len(points), dtype=bool), names_of(visit))
+    if via_points is not None:
+        way = with_via_points(mesh, points, via_points, order, closed)
+    try:
+        path = lay_path(mesh, way.points, importance, closed)
+    except UnreachableError as error:
+        what = str(error)
+        if isinstance(error, CrossingError):
+            here, there = way.names[error.leg], way.names[(error.leg + 1) % len(way.names)]
+            what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
+        advice = _advice(mesh, points, visit, importance, closed, not way.is_control.all())
+        raise UnreachableError(f"{what}; {advice}") from error
+    component = int(mesh.face_component[points.faces[0]])
+    split = path.split
+    loop, zigzag = refine_along(split, component, path.vertices, closed)
+    _separate_strands(split, loop, closed)
+    working, renumbered = split.assemble(component)
+    vertices, controls = renumbered[loop], renumbered[path.waypoints[way.is_control]]
+    beside = np.isin(working.edges, vertices).any(axis=1)
+    edge_length = float(working.edge_lengths[beside].mean())
+    return working, InitialLoop(vertices, controls, visit, edge_length, zigzag, closed)
+
+
+def _shortest_order(mesh: Mesh, points: SurfacePoints, closed: bool) -> IntArray:
+    """The shortest order by distances along edges."""
+    split = SplitMesh(mesh)
+    controls = split.insert_points(points)
+    working, renumbered = split.assemble(int(mesh.face_component[points.faces[0]]))
+    sources = renumbered[controls]
+    distance = csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources)[:, sources]
+    return shortest_order(distance, closed)
+
+
+def _advice(
+    mesh: Mesh,
+    points: SurfacePoints,
+    visited: IntArray,
+    importance: FloatArray | None,
+    closed: bool,
+    via: bool,
+) -> str:
+    """What to change, tried before it is said.
+
+    Parameters
+    ----------
+    mesh, points, importance, closed
+        As in `build_initial_loop`.
+    visited : (k,) int array
+        The order that does not work.
+    via : bool
+        Whether it may work without the via points.
+    """
+    shortest = _shortest_order(mesh, points, closed)
+    given = np.arange(len(points))
+    tried = [] if via else [visited.tolist()]
+    for order in (given, shortest):
+        if order.tolist() in tried:
+            continue
+        tried.append(order.tolist())
+        try:
+            lay_path(mesh, _chosen(points, order), importance, closed)
+        except UnreachableError:
+            continue
+        without = "without via points " if via else ""
+        return f"{without}visit the points in the order {order.tolist()}, which works"
+    return (
+        "no order was found that works, the shortest included; use fewer points, or move points "
+        "off the boundary"
+    )
+
+
+def _chosen(points: SurfacePoints, chosen: IntArray) -> SurfacePoints:
+    return SurfacePoints(points.faces[chosen], points.barycentric[chosen])
+
+
+def _separate_strands(split: SplitMesh, loop: list[int], closed: bool) -> None:
+    """Give both sides of the loop vertices of their own wherever two strands are neighbours.
+
+    An edge that joins two loop vertices without being part of the loop is split, and so is a face
+    whose three edges all are. Afterwards the two sides of the loop are components of the
+    remaining vertices, so flood fill can tell them apart.
+    """
+    on_loop = set(loop)
+    onward = loop[1:] + loop[:1] if closed else loop[1:]
+    loop_edges = {frozenset(edge) for edge in zip(loop, onward, strict=False)}
+    for vertex in loop:
+        for face in sorted(split.faces_around(vertex)):
+            if face not in split.faces_around(vertex):
+                continue
+            a, b, c = split.corners(face)
+            sides = {frozenset(side) for side in ((a, b), (b, c), (c, a))}
+            if sides <= loop_edges:
+                split.split_face(face)
+                continue
+            for side in sorted(tuple(sorted(s)) for s in sides - loop_edges):
+                if on_loop.issuperset(side):
+                    split.split_edge(*side)
+                    break

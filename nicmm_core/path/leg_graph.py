@@ -1,0 +1,115 @@
+"""The graph that legs are looked for in: vertices and edge midpoints of a part of a split mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh
+
+Node = int | tuple[int, int]
+"""A vertex of the split mesh, or an edge of it for its midpoint."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Some faces of the split mesh as a graph of n vertices and then E edge midpoints.
+
+    Attributes
+    ----------
+    vertices : (n,) int array
+        Vertices of the split mesh, sorted.
+    edges : (E, 2) int array
+        Sorted.
+    on_rim, branching : (E,) bool array
+        Edges of one face, and of more than two.
+    positions : (n + E, 3) float array
+        Of the nodes.
+    weight : (n + E,) float array
+        Squared importance at the nodes.
+    arcs : (a, 2) int array
+    through_midpoints : (a,) bool array
+    """
+
+    vertices: IntArray
+    edges: IntArray
+    on_rim: BoolArray
+    branching: BoolArray
+    positions: FloatArray
+    weight: FloatArray
+    arcs: IntArray
+    through_midpoints: BoolArray
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return len(self.vertices) + len(self.edges)
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of the arcs, weighted by importance, shape (a,)."""
+        return self.step_lengths(self.arcs)
+
+    def step_lengths(self, steps: IntArray) -> FloatArray:
+        """Weighted lengths of pairs of nodes (s, 2), shape (s,)."""
+        start, end = steps.T
+        apart = np.linalg.norm(self.positions[start] - self.positions[end], axis=1)
+        return apart * (0.5 * (self.weight[start] + self.weight[end]))
+
+    def graph(self, lengths: FloatArray) -> sparse.csr_array:
+        """The arcs as a symmetric matrix; one with an infinite length cannot be passed."""
+        arc, indices, indptr = self._structure
+        return sparse.csr_array((lengths[arc], indices, indptr), shape=(self.size, self.size))
+
+    @cached_property
+    def _structure(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The arc of each matrix entry, then the entries' columns and where rows start."""
+        arc = np.arange(len(self.arcs))
+        rows, columns = np.concatenate([self.arcs, self.arcs[:, ::-1]]).T
+        entries = sparse.coo_array(
+            (np.concatenate([arc, arc]), (rows, columns)), shape=(self.size, self.size)
+        )
+        # Two faces with the same corners give arcs twice, whose numbers must not be added.
+        entries.has_canonical_format = True
+        matrix = entries.tocsr()
+        return matrix.data, matrix.indices, matrix.indptr
+
+    def places(self, vertices: IntArray) -> IntArray:
+        """Nodes of vertices of the split mesh, without those that are not here."""
+        place = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
+        return place[self.vertices[place] == vertices]
+
+    def node(self, place: int) -> Node:
+        """The vertex, or the edge of the midpoint, that a node is."""
+        if place < len(self.vertices):
+            return int(self.vertices[place])
+        start, end = self.vertices[self.edges[place - len(self.vertices)]]
+        return int(start), int(end)
+
+
+def pinched_vertices(mesh: Mesh) -> BoolArray:
+    """Vertices whose faces form more than one fan, shape (V,).
+
+    Faces belong to one fan of a vertex when edges at that vertex lead from one to the other.
+    """
+    faces = mesh.faces
+    n_vertices = len(mesh.vertices)
+    # Corner 3 f + c is a node; two corners at one vertex are joined by a common edge there.
+    corner = np.arange(faces.size).reshape(-1, 3)
+    vertex = np.concatenate([faces.ravel(), faces.ravel()])
+    other = np.concatenate([np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()])
+    node = np.concatenate([corner.ravel(), corner.ravel()])
+    by_edge = np.argsort(vertex * n_vertices + other, kind="stable")
+    vertex, other, node = vertex[by_edge], other[by_edge], node[by_edge]
+    same = (vertex[1:] == vertex[:-1]) & (other[1:] == other[:-1])
+    entries = (np.ones(same.sum(), dtype=np.int8), (node[:-1][same], node[1:][same]))
+    graph = sparse.coo_array(entries, shape=(faces.size, faces.size))
+    n_fans, fan = csgraph.connected_components(graph, directed=False)
+    vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
+    vertex_of_fan[fan] = faces.ravel()
+    return np.bincount(vertex_of_fan, minlength=n_vertices) > 1

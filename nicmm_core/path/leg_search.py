@@ -1,0 +1,321 @@
+"""The shortest way of one leg: Dijkstra over the vertices and edge midpoints that are free.
+
+The midpoints join every face to its neighbours across all edges that are not part of a path or of
+the boundary. So there is a way wherever the surface is still connected, however few its vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh, unique_edges
+from .leg_graph import Node, Patch, pinched_vertices
+from .virtual_splits import SplitMesh
+
+MIDPOINT_DETOUR = 2.0
+"""Length of a way through edge midpoints, relative to the same length along edges.
+
+Above 1 so that the mesh is split only where edges alone would make a long detour.
+"""
+
+STRAND_PENALTY = 4.0
+"""How much longer a way right beside an earlier path counts.
+
+Two strands of a loop then pass a thin limb on opposite sides instead of side by side, which
+leaves the level set room on both sides.
+"""
+
+BRANCH_FACTOR = 20.0
+"""How much longer a way counts through places where the surface is no manifold.
+
+They can be passed once only and belong to several sheets, so they are left to a curve that has no
+other way.
+"""
+
+LEAST_WEIGHT = 0.1
+"""Least factor that alignment gives to a length; at 0 any detour inside a region would be free."""
+
+FIRST_REACH = 3.0
+"""Length up to which a leg is looked for first, relative to the distance of its ends in space."""
+
+REACH_GROWTH = 2.0
+
+WHOLE_SHARE = 0.5
+"""Share of the faces beyond which a part of the surface is no cheaper to search than the whole."""
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """What a leg has to keep off.
+
+    Attributes
+    ----------
+    vertices : (q,) int array
+        Vertices that are not free: on other legs, or to be visited later.
+    edges : (p, 2) int array
+        Edges of the other legs, which may not be crossed.
+    ends : (e,) int array
+        Vertices where a finished stretch of the path ends, so that the next leg goes on from there.
+    """
+
+    vertices: IntArray
+    edges: IntArray
+    ends: IntArray
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A way from one vertex to another.
+
+    Attributes
+    ----------
+    nodes : list of Node
+    length : float
+        Weighted by importance, without what counts longer only in the search.
+    """
+
+    nodes: list[Node]
+    length: float
+
+
+class LegSearch:
+    """Searches for legs on one component of a split mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The input mesh.
+    split : SplitMesh
+        Its splits; they may go on between searches.
+    component : (F,) bool array
+        The input faces of the component.
+    importance : (V,) float array or None
+        φ_fea at the input vertices.
+    clearance : float
+        Distance within which a leg shuns the others.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        split: SplitMesh,
+        component: BoolArray,
+        importance: FloatArray | None,
+        clearance: float,
+    ) -> None:
+        self._mesh = mesh
+        self._split = split
+        self._component = component
+        self._importance = importance
+        self._clearance = clearance
+        self._pinched = pinched_vertices(mesh)
+        corners = mesh.vertices[mesh.faces]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        self._longest_edge = np.zeros(len(mesh.vertices))
+        np.maximum.at(self._longest_edge, mesh.faces, sides[:, None])
+        self._kept: tuple[int, Patch] | None = None
+        self._least_factor = 1.0
+        if importance is not None:
+            self._least_factor = min(1.0, max(float((importance**2).min()), LEAST_WEIGHT))
+
+    def shortest(self, source: int, target: int, obstacles: Obstacles) -> Leg | None:
+        """The shortest free leg; None when there is none.
+
+        Only the part of the surface is searched where a leg up to some length can be, then a
+        larger one until there is a leg: it is the shortest on the whole surface.
+        """
+        start, end = self._split.position(source), self._split.position(target)
+        apart = np.linalg.norm(self._mesh.vertices - start, axis=1)
+        apart += np.linalg.norm(self._mesh.vertices - end, axis=1)
+        reach = FIRST_REACH * float(np.linalg.norm(end - start))
+        while True:
+            near = apart <= reach + 2.0 * (self._clearance + self._longest_edge)
+            inside = self._component & near[self._mesh.faces].any(axis=1)
+            whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
+            limit = np.inf if whole else self._least_factor * reach
+            patch = self._whole() if whole else self._patch(inside)
+            leg = self._search(patch, source, target, obstacles, limit)
+            if leg is not None or whole:
+                return leg
+            reach *= REACH_GROWTH
+
+    def are_joinable(self, pairs: list[tuple[int, int]], obstacles: Obstacles) -> bool:
+        """Whether each pair of vertices has a way, every one for itself."""
+        patch = self._whole()
+        free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
+        free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
+        entries = (np.ones(len(free_arcs)), (free_arcs[:, 0], free_arcs[:, 1]))
+        _, label = csgraph.connected_components(
+            sparse.coo_array(entries, shape=(patch.size, patch.size)), directed=False
+        )
+        whole = patch.graph(patch.lengths)
+
+        def reached(vertex: int) -> set[int]:
+            (place,) = patch.places(np.array([vertex]))
+            around = whole[[int(place)]].indices
+            return set(label[around[free[around]]].tolist())
+
+        return all(reached(first) & reached(second) for first, second in pairs)
+
+    def _search(
+        self, patch: Patch, source: int, target: int, obstacles: Obstacles, limit: float
+    ) -> Leg | None:
+        lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
+        factor = self._branch_factor(patch)
+        if factor is not None:
+            lengths *= factor[patch.arcs].mean(axis=1)
+        avoided = patch.places(np.append(obstacles.vertices, source))
+        ends = patch.places(np.append(obstacles.ends, source))
+        beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
+        lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
+
+        (here,), (there,) = (patch.places(np.array([vertex])) for vertex in (source, target))
+        free = self._free(patch, obstacles, np.array([here, there]))
+        lengths[~free[patch.arcs].all(axis=1)] = np.inf
+        _, previous = csgraph.dijkstra(
+            patch.graph(lengths), indices=here, return_predecessors=True, limit=limit
+        )
+        if previous[there] < 0:
+            return None
+        places = [int(there)]
+        while places[-1] != here:
+            places.append(int(previous[places[-1]]))
+        places = self._without_crossing(patch, places[::-1])
+        steps = np.stack([places[:-1], places[1:]], axis=1)
+        length = float(patch.step_lengths(steps).sum())
+        return Leg([patch.node(place) for place in places], length)
+
+    def _whole(self) -> Patch:
+        """The component, kept until something is split."""
+        if self._kept is None or self._kept[0] != self._split.n_faces:
+            self._kept = self._split.n_faces, self._patch(self._component)
+        return self._kept[1]
+
+    def _patch(self, inside: BoolArray) -> Patch:
+        """Graph of the living faces in some input faces.
+
+        Arcs are edges, halves of edges, and the three lines between midpoints in every face. Lines
+        from a vertex to the midpoint opposite are left out: with them, splitting the edges of a
+        path one after the other would not always leave the path's own lines as edges. The edges of
+        the boundary have no arcs: a path along it would cut off what lies beyond.
+        """
+        vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
+        faces = faces.reshape(-1, 3)
+        edges, count = unique_edges(faces)
+        n_vertices = len(vertices)
+        corner = self._split.positions(vertices)
+        node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
+        sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        keys = edges[:, 0] * n_vertices + edges[:, 1]
+        side_node = n_vertices + np.searchsorted(keys, sides[:, 0] * n_vertices + sides[:, 1])
+        side_node = side_node.reshape(-1, 3)
+        inner = count > 1
+        midpoint = n_vertices + np.flatnonzero(inner)
+        arcs = np.concatenate(
+            [
+                edges[inner],
+                np.stack([edges[inner, 0], midpoint], axis=1),
+                np.stack([edges[inner, 1], midpoint], axis=1),
+                side_node[:, [0, 1]],
+                side_node[:, [1, 2]],
+                side_node[:, [2, 0]],
+            ]
+        )
+        weight = np.ones(len(node_position))
+        if self._importance is not None:
+            importance = self._importance_at(vertices)
+            at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
+            weight = np.maximum(at_nodes**2, LEAST_WEIGHT)
+        return Patch(
+            vertices=vertices,
+            edges=edges,
+            on_rim=~inner,
+            branching=count > 2,
+            positions=node_position,
+            weight=weight,
+            arcs=arcs,
+            through_midpoints=np.arange(len(arcs)) >= len(midpoint),
+        )
+
+    def _free(self, patch: Patch, obstacles: Obstacles, ends: IntArray) -> BoolArray:
+        """Nodes that a leg between two ends may use: off the boundary and the obstacles."""
+        n_vertices = len(patch.vertices)
+        free = np.ones(patch.size, dtype=bool)
+        # Where fans of faces meet in nothing but a vertex of the boundary, it is the only way.
+        free[np.setdiff1d(patch.edges[patch.on_rim], self._pinched_here(patch))] = False
+        free[n_vertices + np.flatnonzero(patch.on_rim)] = False
+        free[patch.places(obstacles.vertices)] = False
+        if len(obstacles.edges):
+            # The midpoint of an edge of a path would cross it.
+            size = self._split.n_vertices
+            keys = patch.vertices[patch.edges] @ [size, 1]
+            on_path = np.isin(keys, np.sort(obstacles.edges, axis=1) @ [size, 1])
+            free[n_vertices + np.flatnonzero(on_path)] = False
+        free[ends] = True
+        return free
+
+    def _branch_factor(self, patch: Patch) -> FloatArray | None:
+        """How much longer each node counts, or None on a manifold."""
+        pinched = self._pinched_here(patch)
+        if not (len(pinched) or patch.branching.any()):
+            return None
+        factor = np.ones(patch.size)
+        factor[pinched] = BRANCH_FACTOR
+        factor[patch.edges[patch.branching]] = BRANCH_FACTOR
+        factor[len(patch.vertices) + np.flatnonzero(patch.branching)] = BRANCH_FACTOR
+        return factor
+
+    def _pinched_here(self, patch: Patch) -> IntArray:
+        n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
+        return np.flatnonzero(self._pinched[patch.vertices[:n_input]])
+
+    def _importance_at(self, vertices: IntArray) -> FloatArray:
+        assert self._importance is not None
+        n_input = len(self._mesh.vertices)
+        result = self._importance[np.minimum(vertices, n_input - 1)]
+        for place in np.flatnonzero(vertices >= n_input).tolist():
+            weights = self._split.weights(int(vertices[place]))
+            result[place] = sum(w * self._importance[vertex] for vertex, w in weights.items())
+        return result
+
+    def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:
+        """Cut short a way that runs along an edge and also passes its midpoint.
+
+        Where way counts as longer beside other legs than a little farther off, such a way may be
+        the shortest.
+        """
+        at = {place: number for number, place in enumerate(places)}
+        for place in places:
+            if place < len(patch.vertices):
+                continue
+            low, high = sorted(
+                at.get(int(end), -2 - side)
+                for side, end in enumerate(patch.edges[place - len(patch.vertices)])
+            )
+            if low >= 0 and high == low + 1:
+                here = at[place]
+                first, last = (here, high) if here < low else (low, here)
+                return self._without_crossing(patch, places[: first + 1] + places[last:])
+        return places
+
+
+def _closeness(
+    graph: sparse.csr_array, taken: IntArray, ends: IntArray, clearance: float
+) -> FloatArray:
+    """How close each node is to those taken: 1 beside them, 0 from the clearance on.
+
+    Around the ends of the path so far only the side that the path lies on is close: there the
+    nearest taken node is not the end itself. So the curve goes on through its control points
+    instead of turning back at them.
+    """
+    to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)
+    to_ends = csgraph.dijkstra(graph, indices=ends, min_only=True)
+    beside = np.zeros(graph.shape[0])
+    near = np.isfinite(to_taken) & (to_taken < to_ends)
+    beside[near] = (1.0 - to_taken[near] / clearance) * (1.0 - to_taken[near] / to_ends[near])
+    return beside

@@ -1,0 +1,252 @@
+"""The legs of the initial path, laid one after the other beside those that are there.
+
+An arc, or several that are apart, never separate a connected surface without boundary. So legs can
+be laid there one after the other in any order of the points, each round those before it. A leg that
+joins two points of the boundary does separate it; such legs come last, and one is kept only if it
+leaves all others possible.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..errors import UnreachableError
+from .leg_graph import Node
+from .leg_search import Leg, LegSearch, Obstacles
+from .virtual_splits import SplitMesh
+
+MOST_PATH_SPLITS = 20_000
+"""Virtual splits after which a path is given up: each winding needs more than the one before."""
+
+
+class CrossingError(UnreachableError):
+    """A leg has no way that does not cross the others.
+
+    Attributes
+    ----------
+    leg : int
+        The place in the path of the point that it starts at.
+    """
+
+    def __init__(self, leg: int) -> None:
+        super().__init__(f"control_points: leg {leg} of the path would cross the others")
+        self.leg = leg
+
+
+class Legs:
+    """The legs of a path through waypoints that have been laid so far.
+
+    Parameters
+    ----------
+    split : SplitMesh
+        Changed: the legs run along its edges.
+    search : LegSearch
+        On the same mesh.
+    waypoints : list of int
+        Vertices in the order of the path, no two of them neighbours.
+    closed : bool
+
+    Attributes
+    ----------
+    count : int
+        Legs in all.
+    """
+
+    def __init__(
+        self, split: SplitMesh, search: LegSearch, waypoints: list[int], closed: bool
+    ) -> None:
+        self._split = split
+        self._search = search
+        self._waypoints = waypoints
+        self.count = len(waypoints) - (not closed)
+        self._laid: dict[int, list[int]] = {}
+        self._length: dict[int, float] = {}
+        self._splits_before = split.n_vertices
+
+    def ends(self, leg: int) -> tuple[int, int]:
+        """The waypoints that a leg joins."""
+        return self._waypoints[leg], self._waypoints[(leg + 1) % len(self._waypoints)]
+
+    @property
+    def length(self) -> float:
+        """Length of what is laid, weighted by importance."""
+        return sum(self._length.values())
+
+    @property
+    def vertices(self) -> list[int]:
+        """The whole path; the first vertex of a closed one is not repeated."""
+        path = [vertex for leg in range(self.count) for vertex in self._laid[leg][:-1]]
+        closed = self.count == len(self._waypoints)
+        return path if closed else [*path, self._waypoints[-1]]
+
+    def unhindered_lengths(self, straight: float) -> FloatArray:
+        """Length that each leg would have if there were no others, shape (count,).
+
+        Parameters
+        ----------
+        straight : float
+            Ratio to the distance of its ends in space up to which nothing has hindered a leg that
+            is laid.
+        """
+        nothing = np.zeros(0, dtype=np.int64)
+        free = Obstacles(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
+        lengths = np.zeros(self.count)
+        for leg in range(self.count):
+            start, end = (self._split.position(vertex) for vertex in self.ends(leg))
+            lengths[leg] = self._length.get(leg, np.inf)
+            if lengths[leg] > straight * np.linalg.norm(end - start):
+                for vertex in self.ends(leg):
+                    self._open_corners(vertex)
+                way = self._search.shortest(*self.ends(leg), free)
+                if way is None:
+                    raise CrossingError(leg)
+                lengths[leg] = way.length
+        return lengths
+
+    def lay_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
+        """Lay every leg; False when the path has become longer than it may be.
+
+        Parameters
+        ----------
+        sequence : (count,) int array, optional
+            All legs in the order in which they are laid, by default that of the path; earlier ones
+            are more direct.
+        most_length : float
+
+        Raises
+        ------
+        CrossingError
+            If a leg has no way beside the others.
+        UnreachableError
+            If the path winds round itself too often.
+        """
+        legs = list(range(self.count)) if sequence is None else sequence.tolist()
+        safe, separating = self._by_separation(legs)
+        for leg in safe:
+            found = self._find(leg)
+            if found is None:
+                raise CrossingError(leg)
+            self._keep(leg, found)
+            if self.length > most_length:
+                return False
+        while separating:
+            leg = self._lay_one_of(separating)
+            separating.remove(leg)
+            if self.length > most_length:
+                return False
+        return True
+
+    def _lay_one_of(self, separating: list[int]) -> int:
+        """Lay the first leg after which all others are still possible, and say which it is."""
+        for leg in separating:
+            found = self._find(leg)
+            if found is None:
+                raise CrossingError(leg)
+            self._keep(leg, found)
+            if self._all_possible([other for other in separating if other != leg]):
+                return leg
+            # What was split for it stays split.
+            del self._laid[leg], self._length[leg]
+        raise CrossingError(separating[0])
+
+    def _by_separation(self, sequence: list[int]) -> tuple[list[int], list[int]]:
+        """Legs that join what was apart, all of the boundary being one, and the others.
+
+        Without boundary only the last leg of a closed path is one of the others.
+        """
+        on_rim = {vertex for vertex in self._waypoints if self._is_on_rim(vertex)}
+        group = {vertex: -1 if vertex in on_rim else vertex for vertex in self._waypoints}
+        safe: list[int] = []
+        separating: list[int] = []
+        for leg in sequence:
+            first, second = (group[vertex] for vertex in self.ends(leg))
+            (separating if first == second else safe).append(leg)
+            group = {v: first if own == second else own for v, own in group.items()}
+        return safe, separating
+
+    def _find(self, leg: int) -> Leg | None:
+        source, target = self.ends(leg)
+        for vertex in (source, target):
+            self._open_corners(vertex)
+        return self._search.shortest(source, target, self._obstacles(source, target))
+
+    def _keep(self, leg: int, found: Leg) -> None:
+        self._laid[leg] = split_along(self._split, found.nodes)
+        self._length[leg] = found.length
+        if self._split.n_vertices - self._splits_before > MOST_PATH_SPLITS:
+            raise UnreachableError(
+                "control_points: in this order the curve winds round itself too often (its path "
+                f"needs more than {MOST_PATH_SPLITS} virtual splits)"
+            )
+
+    def _all_possible(self, legs: list[int]) -> bool:
+        if not legs:
+            return True
+        for leg in legs:
+            for vertex in self.ends(leg):
+                self._open_corners(vertex)
+        return self._search.are_joinable([self.ends(leg) for leg in legs], self._obstacles())
+
+    def _obstacles(self, *free: int) -> Obstacles:
+        """All legs, and all waypoints but those that are free."""
+        laid = [np.array(path, dtype=np.int64) for path in self._laid.values()]
+        edges = [np.stack([path[:-1], path[1:]], axis=1) for path in laid]
+        nothing = np.zeros((0, 2), dtype=np.int64)
+        vertices = np.concatenate([*laid, np.array(self._waypoints, dtype=np.int64)])
+        return Obstacles(
+            vertices=np.setdiff1d(vertices, free),
+            edges=np.concatenate([*edges, nothing]),
+            ends=self._loose(),
+        )
+
+    def _loose(self) -> IntArray:
+        """Waypoints that one leg has reached."""
+        reached = [vertex for leg in self._laid for vertex in self.ends(leg)]
+        vertices, count = np.unique(np.array(reached, dtype=np.int64), return_counts=True)
+        return vertices[count == 1]
+
+    def _is_on_rim(self, vertex: int) -> bool:
+        return any(
+            len(self._split.faces_around(vertex) & self._split.faces_around(other)) == 1
+            for other in self._split.neighbours(vertex)
+        )
+
+    def _open_corners(self, vertex: int) -> None:
+        """Split the faces at a waypoint of the boundary that no leg could leave or enter by.
+
+        A face between two edges of the boundary, or between one and a leg, has no edge at that
+        vertex that a path may take.
+        """
+        if not self._is_on_rim(vertex):
+            return
+        closed = {other for path in self._laid.values() for other in _beside(path, vertex)}
+        for face in sorted(self._split.faces_around(vertex)):
+            others = [corner for corner in self._split.corners(face) if corner != vertex]
+            if all(
+                other in closed
+                or len(self._split.faces_around(vertex) & self._split.faces_around(other)) == 1
+                for other in others
+            ):
+                self._split.split_face(face)
+
+
+def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
+    """Split the edges whose midpoints a path uses; the path as vertices, each joined to the next.
+
+    Where a path passes all three edges of a face, a line from an earlier midpoint may lie across
+    a later step; there the diagonal of the two faces is exchanged.
+    """
+    path = [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
+    for start, end in zip(path[:-1], path[1:], strict=True):
+        if not split.join(start, end):
+            raise UnreachableError(
+                "control_points: the paths between them come too close to one another for this "
+                "mesh; use a finer mesh or fewer points"
+            )
+    return path
+
+
+def _beside(path: list[int], vertex: int) -> list[int]:
+    """Vertices before and after one that is at an end of a path; none if it is not."""
+    return [path[1]] * (path[0] == vertex) + [path[-2]] * (path[-1] == vertex)

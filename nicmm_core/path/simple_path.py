@@ -1,0 +1,131 @@
+"""A simple path through points in their order: several are laid, and the shortest is taken.
+
+Every leg goes round those laid before it, so which ones come first decides how often the path winds
+round itself. With many points in an order that jumps to and fro that is a matter of many times the
+length, and no rule finds the best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..errors import UnreachableError
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints
+from .leg_search import LegSearch
+from .legs import CrossingError, Legs
+from .virtual_splits import SplitMesh
+
+STRAND_CLEARANCE = 0.1
+"""Distance, in square roots of the component's area, within which a path shuns earlier ones."""
+
+ROOMY = 25
+"""Number of points above which that distance shrinks with the distance between the points."""
+
+LONG = 1.3
+"""Length of a path, relative to its legs without obstacles, above which other paths are tried."""
+
+MOST_TRIES = 6
+"""Paths that are laid at most, to find a shorter one."""
+
+MOST_TRIES_WHILE_CROSSING = 14
+"""Paths that are laid at most as long as legs of each would cross."""
+
+SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0
+"""How far a try changes which legs come first: standard deviation of the logarithm of lengths."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A simple path of edges of a split mesh.
+
+    Attributes
+    ----------
+    split : SplitMesh
+    vertices : list of int
+        The first one of a closed path is not repeated.
+    waypoints : (k,) int array
+        Vertices of the path that had to be visited, in order.
+    length : float
+        Weighted by importance.
+    """
+
+    split: SplitMesh
+    vertices: list[int]
+    waypoints: IntArray
+    length: float
+
+
+def lay_path(
+    mesh: Mesh, points: SurfacePoints, importance: FloatArray | None, closed: bool
+) -> Path:
+    """A simple path through points in their order, on a mesh that is split for it virtually.
+
+    The legs are laid as the points follow one another. If that makes a path much longer than its
+    legs have to be, short legs are laid first, then with random changes of what comes first.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        Different ones on one component.
+    importance : (V,) float array or None
+        φ_fea at the input vertices; lengths count times its square.
+    closed : bool
+
+    Raises
+    ------
+    CrossingError
+        If a leg has no way beside the others.
+    UnreachableError
+        If every path winds round itself too often.
+    """
+    component = mesh.face_component == mesh.face_component[points.faces[0]]
+    clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
+    clearance *= min(1.0, (ROOMY / len(points)) ** 0.5)
+    generator = np.random.default_rng(0)
+    best: Path | None = None
+    failure: UnreachableError | None = None
+    sequence: IntArray | None = None
+    for attempt in range(MOST_TRIES_WHILE_CROSSING):
+        split = SplitMesh(mesh)
+        waypoints = split.insert_points(points)
+        separate(split, waypoints)
+        search = LegSearch(mesh, split, component, importance, clearance)
+        legs = Legs(split, search, waypoints.tolist(), closed)
+        done = False
+        try:
+            done = legs.lay_all(sequence, np.inf if best is None else best.length)
+        except UnreachableError as error:
+            # Winding too often says no more than that; crossing, that no path may exist.
+            if failure is None or not isinstance(error, CrossingError):
+                failure = error
+        if done:
+            best = Path(split, legs.vertices, waypoints, legs.length)
+        if attempt == 0:
+            unhindered = legs.unhindered_lengths(LONG)
+        if best is not None and best.length <= LONG * unhindered.sum():
+            break
+        crossing = best is None and isinstance(failure, CrossingError)
+        if attempt + 1 >= MOST_TRIES and not crossing:
+            break
+        scale = SHUFFLE_WHILE_CROSSING if crossing else SHUFFLE
+        shuffle = generator.normal(scale=scale, size=legs.count) if attempt > 0 else 0.0
+        sequence = np.argsort(unhindered * np.exp(shuffle), kind="stable")
+    if best is not None:
+        return best
+    assert failure is not None
+    raise failure
+
+
+def separate(split: SplitMesh, waypoints: IntArray) -> None:
+    """Split the edges that join two waypoints, so that no two of them are neighbours."""
+    wanted = {int(waypoint) for waypoint in waypoints}
+    for waypoint in sorted(wanted):
+        for face in sorted(split.faces_around(waypoint)):
+            for other in sorted(wanted.intersection(split.corners(face)) - {waypoint}):
+                if split.faces_around(waypoint) & split.faces_around(other):
+                    split.split_edge(waypoint, other)

@@ -1,0 +1,148 @@
+"""Via points: they steer the initial path on its way from one control point to the next.
+
+They say on which side of the surface, or which way round a handle, a curve shall run. Only the
+initial path passes them; the curve does not interpolate them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..array_types import BoolArray, IntArray
+from ..errors import ArgumentError
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints, check_distinct, check_one_component, locate_points
+
+ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
+"""From the index of a control point to the points on the way from there to the next one."""
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Control points and via points in the order of the path.
+
+    Attributes
+    ----------
+    points : SurfacePoints
+    is_control : (k,) bool array
+    names : list of str
+        What the caller knows each of them by.
+    """
+
+    points: SurfacePoints
+    is_control: BoolArray
+    names: list[str]
+
+
+def names_of(controls: IntArray) -> list[str]:
+    """What messages call control points."""
+    return [f"control_points[{index}]" for index in controls]
+
+
+def with_via_points(
+    mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
+) -> Waypoints:
+    """Put via points between control points, and check them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : SurfacePoints
+        Control points.
+    via_points : mapping
+        From the index of a control point to points in any form that control points may have.
+    order : str
+        Via points need "given": otherwise the legs are not known beforehand.
+    closed : bool
+        The last control point of an open path has no leg.
+
+    Raises
+    ------
+    ArgumentError
+        If ``via_points`` is no mapping from indices of legs, or the order is not the given one.
+    ControlPointError
+        If a via point is out of range, off the surface, or the same as another point.
+    UnreachableError
+        If a via point lies on another component.
+    """
+    if not isinstance(via_points, Mapping):
+        raise ArgumentError(
+            f"via_points is a {type(via_points).__name__}; pass a mapping from the index of a "
+            "control point to points, such as {1: [57]}"
+        )
+    if via_points and order != "given":
+        raise ArgumentError(
+            f'via_points needs order="given", not {order!r}: which points follow one another is '
+            "not known before"
+        )
+    last = len(points) - 1 if closed else len(points) - 2
+    for key in via_points:
+        if isinstance(key, bool) or not isinstance(key, int | np.integer) or not 0 <= key <= last:
+            raise ArgumentError(
+                f"via_points[{key!r}] belongs to no leg; keys are indices of the control points "
+                f"that a leg starts from, 0 … {last}"
+            )
+    located = {
+        int(key): locate_points(mesh, value, f"via_points[{key}]")
+        for key, value in via_points.items()
+    }
+    controls = names_of(np.arange(len(points)))
+    faces, barycentric, is_control, names = [], [], [], []
+    for index, control in enumerate(controls):
+        via = located.get(index, SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3))))
+        faces += [points.faces[index : index + 1], via.faces]
+        barycentric += [points.barycentric[index : index + 1], via.barycentric]
+        is_control += [True] + [False] * len(via)
+        names += [control, *(f"via_points[{index}][{place}]" for place in range(len(via)))]
+    together = SurfacePoints(np.concatenate(faces), np.concatenate(barycentric))
+    check_distinct(mesh, together, names)
+    check_one_component(mesh, together, names)
+    return Waypoints(together, np.array(is_control), names)
+
+
+def same_via_points(one: ViaPoints | None, other: ViaPoints | None) -> bool:
+    """Whether both steer a path in the same way; False where one of them is no mapping."""
+    if one is None or other is None:
+        return one is other
+    if not (isinstance(one, Mapping) and isinstance(other, Mapping)) or set(one) != set(other):
+        return False
+    return all(_same_points(one[key], other[key]) for key in one)
+
+
+def _same_points(one: ArrayLike | SurfacePoints, other: ArrayLike | SurfacePoints) -> bool:
+    if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
+        faces = np.array_equal(one.faces, other.faces)
+        return faces and np.array_equal(one.barycentric, other.barycentric)
+    if isinstance(one, SurfacePoints) or isinstance(other, SurfacePoints):
+        return False
+    return np.array_equal(one, other)
+
+
+def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
+    """Via points as the command line has them, ``"1:57,80"`` for each leg.
+
+    Raises
+    ------
+    ArgumentError
+        If a text is another one, or names a leg that another one has named.
+    """
+    via_points: dict[int, list[int]] = {}
+    for text in texts:
+        key, colon, vertices = text.partition(":")
+        try:
+            if not colon:
+                raise ValueError("it has no colon")
+            index, along = int(key), [int(vertex) for vertex in vertices.split(",")]
+        except ValueError as error:
+            raise ArgumentError(
+                f"--via is {text!r}; give the number of a control point, from 0, and vertices, "
+                "such as 1:57,80"
+            ) from error
+        if index in via_points:
+            raise ArgumentError(f"--via names leg {index} twice; give all its vertices at once")
+        via_points[index] = along
+    return via_points

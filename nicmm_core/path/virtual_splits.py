@@ -1,0 +1,361 @@
+"""Virtual splits (section 3.1, Fig. 1): the mesh M' that has every control point as a vertex.
+
+The input mesh is never changed. `SplitMesh` lays new vertices and faces over it, and
+`SplitMesh.assemble` turns the part that matters, one connected component, into plain arrays
+whose every vertex and face knows where in the input mesh it lies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from .. import tolerances
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh, triangle_areas, unique_edges
+from ..surface_points import SurfacePoints
+
+Weights = dict[int, float]
+"""A point of the surface as input vertices and their weights; absent vertices weigh exactly 0."""
+
+
+@dataclass(frozen=True)
+class WorkingMesh:
+    """The split mesh as arrays: n vertices and m faces of one component.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+    faces : (m, 3) int array
+    parent_face : (m,) int array
+        The input face that each face lies in.
+    interpolation : (n, V) sparse array
+        Row i holds the weights of the input vertices at vertex i, so that
+        ``vertices == interpolation @ mesh.vertices``.
+    input_vertex : (n,) int array
+        The input vertex that each vertex is, or -1 for an inserted one.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    parent_face: IntArray
+    interpolation: sparse.csr_array
+    input_vertex: IntArray
+
+    @cached_property
+    def _unique_edges(self) -> tuple[IntArray, IntArray]:
+        return unique_edges(self.faces)
+
+    @property
+    def edges(self) -> IntArray:
+        """Undirected edges, shape (E, 2), smaller index first, sorted."""
+        return self._unique_edges[0]
+
+    @cached_property
+    def edge_lengths(self) -> FloatArray:
+        """Length of each edge, shape (E,)."""
+        start, end = self.edges.T
+        return np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """Area of each face, shape (m,)."""
+        return triangle_areas(self.vertices, self.faces)
+
+    @cached_property
+    def on_boundary(self) -> BoolArray:
+        """Which vertices lie on an edge that only one face has, shape (n,)."""
+        edges, count = self._unique_edges
+        result = np.zeros(len(self.vertices), dtype=bool)
+        result[edges[count == 1]] = True
+        return result
+
+    def edge_graph(self) -> sparse.csr_array:
+        """Lengths of the edges as an upper triangular matrix, shape (n, n)."""
+        n_vertices = len(self.vertices)
+        entries = (self.edge_lengths, (self.edges[:, 0], self.edges[:, 1]))
+        return sparse.csr_array(sparse.coo_array(entries, shape=(n_vertices, n_vertices)))
+
+
+class SplitMesh:
+    """The input mesh under virtual splits of faces and edges.
+
+    Vertices keep their input indices and new ones follow; so do faces. Costs follow the number
+    of splits, not the size of the mesh.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._new_weights: list[Weights] = []
+        self._new_faces: list[tuple[int, int, int]] = []
+        self._new_parents: list[int] = []
+        self._new_positions: list[FloatArray] = []
+        self._alive = np.ones(len(mesh.faces), dtype=bool)
+        self._new_alive = bytearray()
+        self._faces_around: dict[int, set[int]] = {}
+        self._children: dict[int, set[int]] = {}
+
+    def corners(self, face: int) -> tuple[int, int, int]:
+        """Vertices of a face."""
+        n_input = len(self._mesh.faces)
+        if face >= n_input:
+            return self._new_faces[face - n_input]
+        a, b, c = self._mesh.faces[face]
+        return int(a), int(b), int(c)
+
+    def weights(self, vertex: int) -> Weights:
+        """A vertex as input vertices and weights."""
+        n_input = len(self._mesh.vertices)
+        return self._new_weights[vertex - n_input] if vertex >= n_input else {vertex: 1.0}
+
+    def faces_around(self, vertex: int) -> set[int]:
+        """Living faces at a vertex."""
+        if vertex not in self._faces_around:
+            incidence = self._mesh.vertex_faces
+            start, end = incidence.indptr[vertex : vertex + 2]
+            self._faces_around[vertex] = {int(face) for face in incidence.indices[start:end]}
+        return self._faces_around[vertex]
+
+    def position(self, vertex: int) -> FloatArray:
+        """Where a vertex is in space, shape (3,)."""
+        n_input = len(self._mesh.vertices)
+        return (
+            self._new_positions[vertex - n_input]
+            if vertex >= n_input
+            else self._mesh.vertices[vertex]
+        )
+
+    def positions(self, vertices: IntArray) -> FloatArray:
+        """Where several vertices are, shape (q, 3)."""
+        n_input = len(self._mesh.vertices)
+        result = self._mesh.vertices[np.minimum(vertices, n_input - 1)]
+        for place in np.flatnonzero(vertices >= n_input).tolist():
+            result[place] = self._new_positions[vertices[place] - n_input]
+        return result
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the input mesh and new ones."""
+        return len(self._mesh.vertices) + len(self._new_weights)
+
+    @property
+    def n_faces(self) -> int:
+        """Faces of the input mesh and new ones, living or not."""
+        return len(self._mesh.faces) + len(self._new_faces)
+
+    def living_faces(self, inside: BoolArray) -> IntArray:
+        """Corners of the faces that lie in some of the input faces, shape (m, 3).
+
+        Parameters
+        ----------
+        inside : (F,) bool array
+            Which of the input faces.
+        """
+        new, parents = self._living_new_faces()
+        return np.concatenate([self._mesh.faces[inside & self._alive], new[inside[parents]]])
+
+    def neighbours(self, vertex: int) -> set[int]:
+        """Vertices joined to a vertex by an edge."""
+        corners = {corner for face in self.faces_around(vertex) for corner in self.corners(face)}
+        return corners - {vertex}
+
+    def insert_points(self, points: SurfacePoints) -> IntArray:
+        """Make every point a vertex by splitting the face or edge it lies on (Fig. 1).
+
+        Returns
+        -------
+        (k,) int array
+            The vertex that each point has become.
+        """
+        return np.array(
+            [
+                self._insert_point(int(face), barycentric)
+                for face, barycentric in zip(points.faces, points.barycentric, strict=True)
+            ],
+            dtype=np.int64,
+        )
+
+    def split_edge(self, start: int, end: int) -> int:
+        """Insert the midpoint of an edge and halve the faces beside it."""
+        return self._split_edge_at(start, end, _mixed(self.weights(start), self.weights(end), 0.5))
+
+    def join(self, first: int, second: int) -> bool:
+        """Make an edge between the two vertices opposite a common edge inside an input face.
+
+        Returns
+        -------
+        bool
+            Whether they are joined now; they may have been before.
+        """
+        if second in self.neighbours(first):
+            return True
+        for face in sorted(self.faces_around(first)):
+            start, end = (corner for corner in self.corners(face) if corner != first)
+            across = self.faces_around(start) & self.faces_around(end) & self.faces_around(second)
+            if across and self._parent(face) == self._parent(other := min(across)):
+                a, b, c = self.corners(face)
+                if (start, end) not in ((a, b), (b, c), (c, a)):
+                    start, end = end, start
+                self._replace_face(face, [(first, start, second)])
+                self._replace_face(other, [(first, second, end)])
+                return True
+        return False
+
+    def split_face(self, face: int) -> int:
+        """Insert the centroid of a face, which becomes three faces."""
+        third = 1.0 / 3.0
+        weights: Weights = {}
+        for corner in self.corners(face):
+            for vertex, weight in self.weights(corner).items():
+                weights[vertex] = weights.get(vertex, 0.0) + third * weight
+        return self._split_face_at(face, weights)
+
+    def assemble(self, component: int) -> tuple[WorkingMesh, IntArray]:
+        """Arrays of one connected component of the input mesh, with its splits.
+
+        Returns
+        -------
+        WorkingMesh
+        (number of vertices,) int array
+            The working vertex of each vertex of this mesh, or -1 when it is on another component.
+        """
+        mesh = self._mesh
+        kept = np.flatnonzero(self._alive & (mesh.face_component == component))
+        new_faces, new_parents = self._living_new_faces()
+
+        faces = np.concatenate([mesh.faces[kept], new_faces])
+        used = np.unique(faces)
+        n_input = len(mesh.vertices)
+        renumbered = np.full(n_input + len(self._new_weights), -1, dtype=np.int64)
+        renumbered[used] = np.arange(len(used))
+        interpolation = self._interpolation(used)
+        working = WorkingMesh(
+            vertices=interpolation @ mesh.vertices,
+            faces=renumbered[faces],
+            parent_face=np.concatenate([kept, new_parents]),
+            interpolation=interpolation,
+            input_vertex=np.where(used < n_input, used, -1),
+        )
+        return working, renumbered
+
+    def _interpolation(self, used: IntArray) -> sparse.csr_array:
+        n_input = len(self._mesh.vertices)
+        n_kept = int(np.searchsorted(used, n_input))
+        rows = [np.arange(n_kept)]
+        columns = [used[:n_kept]]
+        values = [np.ones(n_kept)]
+        for row, vertex in enumerate(used[n_kept:], start=n_kept):
+            weights = self._new_weights[vertex - n_input]
+            rows.append(np.full(len(weights), row))
+            columns.append(np.fromiter(weights.keys(), dtype=np.int64))
+            values.append(np.fromiter(weights.values(), dtype=np.float64))
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sparse.csr_array(sparse.coo_array(entries, shape=(len(used), n_input)))
+
+    def _insert_point(self, input_face: int, barycentric: FloatArray) -> int:
+        corners = self.corners(input_face)
+        weights = {
+            corner: float(weight)
+            for corner, weight in zip(corners, barycentric, strict=True)
+            if weight > 0.0
+        }
+        if len(weights) == 1:
+            return next(iter(weights))
+        face, local = self._locate(input_face, corners, barycentric)
+        inside = self.corners(face)
+        support = [c for c, w in zip(inside, local, strict=True) if w > tolerances.SNAP]
+        if len(support) == 1:
+            return support[0]
+        if len(support) == 2:
+            return self._split_edge_at(support[0], support[1], weights)
+        return self._split_face_at(face, weights)
+
+    def _locate(
+        self, input_face: int, input_corners: tuple[int, int, int], barycentric: FloatArray
+    ) -> tuple[int, FloatArray]:
+        """Find the living face inside an input face that holds a point, and its coordinates."""
+        best: tuple[int, FloatArray] = (input_face, barycentric)
+        if self._alive[input_face]:
+            return best
+        best_inside = -np.inf
+        for face in sorted(self._children[input_face]):
+            # Columns: the child's corners in the input face's barycentric coordinates.
+            child = np.array(
+                [
+                    [self.weights(corner).get(vertex, 0.0) for corner in self.corners(face)]
+                    for vertex in input_corners
+                ]
+            )
+            local = np.linalg.solve(child, barycentric)
+            if local.min() > best_inside:
+                best_inside = float(local.min())
+                best = (face, local)
+        return best
+
+    def _split_edge_at(self, start: int, end: int, weights: Weights) -> int:
+        middle = self._add_vertex(weights)
+        for face in sorted(self.faces_around(start) & self.faces_around(end)):
+            corners = self.corners(face)
+            halves = [
+                tuple(middle if corner == replaced else corner for corner in corners)
+                for replaced in (start, end)
+            ]
+            self._replace_face(face, halves)
+        return middle
+
+    def _split_face_at(self, face: int, weights: Weights) -> int:
+        middle = self._add_vertex(weights)
+        a, b, c = self.corners(face)
+        self._replace_face(face, [(a, b, middle), (b, c, middle), (c, a, middle)])
+        return middle
+
+    def _living_new_faces(self) -> tuple[IntArray, IntArray]:
+        """Corners and input face of the faces that splits have made and that are left."""
+        new = np.flatnonzero(np.frombuffer(bytes(self._new_alive), dtype=bool))
+        faces = np.array(self._new_faces, dtype=np.int64).reshape(-1, 3)
+        parents = np.array(self._new_parents, dtype=np.int64)
+        return faces[new], parents[new]
+
+    def _add_vertex(self, weights: Weights) -> int:
+        vertex = self.n_vertices
+        self._new_weights.append(weights)
+        corners = self._mesh.vertices[list(weights)]
+        self._new_positions.append(np.fromiter(weights.values(), dtype=np.float64) @ corners)
+        self._faces_around[vertex] = set()
+        return vertex
+
+    def _parent(self, face: int) -> int:
+        """The input face that a face lies in."""
+        n_input = len(self._mesh.faces)
+        return face if face < n_input else self._new_parents[face - n_input]
+
+    def _replace_face(self, face: int, children: list[tuple[int, ...]]) -> None:
+        n_input = len(self._mesh.faces)
+        parent = self._parent(face)
+        siblings = self._children.setdefault(parent, set())
+        siblings.discard(face)
+        if face < n_input:
+            self._alive[face] = False
+        else:
+            self._new_alive[face - n_input] = False
+        for corner in self.corners(face):
+            self.faces_around(corner).discard(face)
+        for a, b, c in children:
+            child = n_input + len(self._new_faces)
+            self._new_faces.append((a, b, c))
+            self._new_parents.append(parent)
+            self._new_alive.append(True)
+            siblings.add(child)
+            for corner in (a, b, c):
+                self.faces_around(corner).add(child)
+
+
+def _mixed(first: Weights, second: Weights, fraction: float) -> Weights:
+    """The point at ``fraction`` of the way from one point to another."""
+    mixed = {vertex: (1.0 - fraction) * weight for vertex, weight in first.items()}
+    for vertex, weight in second.items():
+        mixed[vertex] = mixed.get(vertex, 0.0) + fraction * weight
+    return mixed

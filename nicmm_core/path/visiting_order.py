@@ -1,0 +1,130 @@
+"""The order in which a loop visits its control points: the shortest cyclic or open tour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+
+EXACT_UP_TO = 9
+"""Tours of more points are improved by exchanges instead of being optimal (2^k states)."""
+
+LONGEST_MOVE = 3
+"""Points that are moved to another place of the tour together, at most."""
+
+
+def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
+    """Order that makes the tour through all points short, starting at point 0.
+
+    Parameters
+    ----------
+    distance : (k, k) float array
+        Symmetric distances along the surface.
+    closed : bool
+        Whether the tour returns to its start. An open tour may start anywhere.
+
+    Returns
+    -------
+    (k,) int array
+        Optimal for up to `EXACT_UP_TO` points (Held and Karp 1962); beyond, the nearest
+        neighbour's tour improved until no reversal of a stretch (2-opt, Croes 1958) and no move of
+        up to three points to another place (Or 1976) shortens it.
+    """
+    if not closed:
+        # An open tour is a closed one through an extra point at distance zero from all.
+        padded = np.pad(distance, ((1, 0), (1, 0)))
+        return shortest_order(padded, closed=True)[1:] - 1
+    if len(distance) <= EXACT_UP_TO:
+        return _held_karp(distance)
+    return _improved(distance, _nearest_neighbour(distance))
+
+
+def _held_karp(distance: FloatArray) -> IntArray:
+    k = len(distance)
+    if k <= 3:
+        return np.arange(k)
+    # best[subset, last]: shortest path from 0 through the subset of 1 … k-1 that ends at last.
+    n_subsets = 1 << (k - 1)
+    best = np.full((n_subsets, k - 1), np.inf)
+    previous = np.zeros((n_subsets, k - 1), dtype=np.int64)
+    between = distance[1:, 1:]
+    for last in range(k - 1):
+        best[1 << last, last] = distance[0, last + 1]
+    for subset in range(1, n_subsets):
+        for last in range(k - 1):
+            rest = subset ^ (1 << last)
+            if subset >> last & 1 and rest:
+                through = best[rest] + between[:, last]
+                previous[subset, last] = through.argmin()
+                best[subset, last] = through.min()
+    subset = n_subsets - 1
+    last = int((best[subset] + distance[1:, 0]).argmin())
+    tour = []
+    while subset:
+        tour.append(last + 1)
+        subset, last = subset ^ (1 << last), int(previous[subset, last])
+    return np.array([0, *reversed(tour)], dtype=np.int64)
+
+
+def _nearest_neighbour(distance: FloatArray) -> IntArray:
+    unvisited = np.ones(len(distance), dtype=bool)
+    tour = [0]
+    unvisited[0] = False
+    while unvisited.any():
+        nearest = int(np.where(unvisited, distance[tour[-1]], np.inf).argmin())
+        tour.append(nearest)
+        unvisited[nearest] = False
+    return np.array(tour, dtype=np.int64)
+
+
+def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
+    """The tour after the best exchange again and again, starting at point 0."""
+    # Below rounding an exchange could undo itself for ever.
+    least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
+    while True:
+        gain, i, j = _best_reversal(distance, tour)
+        if gain > least:
+            tour[i + 1 : j + 1] = tour[i + 1 : j + 1][::-1].copy()
+            continue
+        gain, moved = _best_move(distance, tour)
+        if gain <= least:
+            return np.roll(tour, -int(np.flatnonzero(tour == 0)[0]))
+        tour = moved
+
+
+def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, int]:
+    """What reversing the stretch from i + 1 to j saves, and the best i and j."""
+    following = np.roll(tour, -1)
+    leg = distance[tour, following]
+    gain = leg[:, None] + leg[None] - distance[np.ix_(tour, tour)]
+    gain -= distance[np.ix_(following, following)]
+    gain[np.tril_indices(len(tour))] = -np.inf
+    i, j = np.unravel_index(gain.argmax(), gain.shape)
+    return float(gain[i, j]), int(i), int(j)
+
+
+def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
+    """What moving a few points to another leg saves at best, and the tour after it."""
+    k = len(tour)
+    best, moved = 0.0, tour
+    for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
+        # Row i: the points moved are those at i … i + count - 1; column j: to the leg after j.
+        before, first = np.roll(tour, 1), tour
+        last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
+        saved = distance[before, first] + distance[last, after] - distance[before, after]
+        start, end = tour, np.roll(tour, -1)
+        straight = distance[np.ix_(first, start)] + distance[np.ix_(last, end)]
+        turned = distance[np.ix_(last, start)] + distance[np.ix_(first, end)]
+        gain = saved[:, None] + distance[start, end] - np.minimum(straight, turned)
+        offset = (np.arange(k)[None] - np.arange(k)[:, None]) % k
+        gain[(offset < count) | (offset == k - 1)] = -np.inf
+        i, j = np.unravel_index(gain.argmax(), gain.shape)
+        if gain[i, j] > best:
+            best = float(gain[i, j])
+            onward = np.roll(tour, -int(i))
+            stretch, rest = onward[:count], onward[count:]
+            if turned[i, j] < straight[i, j]:
+                stretch = stretch[::-1]
+            place = int(offset[i, j]) - count + 1
+            moved = np.concatenate([rest[:place], stretch, rest[place:]])
+    return best, moved

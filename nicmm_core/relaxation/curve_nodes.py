@@ -1,0 +1,145 @@
+"""Nodes of a curve on a surface: where they are, and how the surface and the curve lie there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import FloatArray, IntArray
+from ..level_set.features import vertex_normals
+from ..mesh import Mesh, unoriented_vertices
+from ..surface_points import SurfacePoints
+
+
+@dataclass(frozen=True)
+class CurveSurface:
+    """What a curve needs of the surface that it moves on.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    vertex_normals : (V, 3) float array
+        Unit vectors. Their signs are of no account: every face reads them to its own side.
+    feature_map : (V,) float array or None
+        φ_fea.
+    feature_weight : float
+        λ_fea / λ_smooth, in 1/length², where there is a feature map.
+    """
+
+    mesh: Mesh
+    vertex_normals: FloatArray
+    feature_map: FloatArray | None = None
+    feature_weight: float = 0.0
+
+
+def unsigned_normals(mesh: Mesh) -> FloatArray:
+    """Unit normals at the vertices, up to their signs, shape (V, 3).
+
+    Weighted by corner angle. Where faces of opposite orientation meet, as somewhere on any Möbius
+    strip, they would cancel; there it is the direction that the faces' normals share best,
+    whatever their signs.
+    """
+    normals = vertex_normals(mesh.vertices, mesh.faces)
+    mixed = unoriented_vertices(mesh.faces)
+    incidence = mesh.vertex_faces[mixed]
+    owner = np.repeat(np.arange(len(mixed)), np.diff(incidence.indptr))
+    face_normals = mesh.face_normals[incidence.indices]
+    weighted = mesh.face_areas[incidence.indices, None] * face_normals
+    spread = np.zeros((len(mixed), 3, 3))
+    np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
+    normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
+    return normals
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Nodes of a curve on a surface.
+
+    Attributes
+    ----------
+    places : SurfacePoints
+        n points.
+    closed : bool
+        Whether the last node joins the first.
+    positions : (n, 3) float array
+    normals : (n, 3) float array
+        Unit vectors.
+    importance : (n,) float array
+        φ_fea.
+    """
+
+    places: SurfacePoints
+    closed: bool
+    positions: FloatArray
+    normals: FloatArray
+    importance: FloatArray
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Vectors from each node to the next, zero at the last of an open curve, (n, 3)."""
+        return _steps(self.positions, self.closed)
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of the steps; (n,), or (n - 1,) of an open curve."""
+        lengths = np.linalg.norm(self.steps, axis=1)
+        return lengths if self.closed else lengths[:-1]
+
+    @cached_property
+    def sideways(self) -> FloatArray:
+        """Unit vectors across the curve in the tangent planes, shape (n, 3)."""
+        unit = _unit(self.steps)
+        return _unit(np.cross(self.normals, unit + np.roll(unit, 1, axis=0)))
+
+    def sideways_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
+        """How normals, (n, 3), and φ_fea, (n,), change with a sideways move of their node."""
+        mesh, faces = surface.mesh, self.places.faces
+        a, b, c = mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2)
+        one, other = b - a, c - a
+        # Barycentric coordinates of the move: least squares in the plane of the face.
+        p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
+        f, g = (one * self.sideways).sum(axis=1), (other * self.sideways).sum(axis=1)
+        determinant = np.maximum(p * r - q * q, tolerances.TINY)
+        u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
+        change = np.stack([-u - v, u, v], axis=1)
+        corner_normals = _corner_normals(surface, faces)
+        length = np.einsum("nc,ncd,nd->n", self.places.barycentric, corner_normals, self.normals)
+        turn = np.einsum("nc,ncd->nd", change, corner_normals)
+        turn /= np.maximum(length, tolerances.TINY)[:, None]
+        turn -= (turn * self.normals).sum(axis=1, keepdims=True) * self.normals
+        drift = np.zeros(len(faces))
+        if surface.feature_map is not None:
+            drift = (change * surface.feature_map[mesh.faces[faces]]).sum(axis=1)
+        return turn, drift
+
+
+def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool) -> Nodes:
+    """Nodes with what the energy needs of the surface there."""
+    weight = places.barycentric
+    normals = _unit(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
+    importance = np.ones(len(places))
+    if surface.feature_map is not None:
+        corners = surface.mesh.faces[places.faces]
+        importance = (weight * surface.feature_map[corners]).sum(axis=1)
+    return Nodes(places, closed, places.positions(surface.mesh), normals, importance)
+
+
+def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
+    """Vertex normals at the corners, turned to the side of each face, shape (n, 3, 3)."""
+    normals = surface.vertex_normals[surface.mesh.faces[faces]]
+    against = (normals * surface.mesh.face_normals[faces][:, None]).sum(axis=2) < 0.0
+    return normals * np.where(against, -1.0, 1.0)[..., None]
+
+
+def _steps(positions: FloatArray, closed: bool) -> FloatArray:
+    steps = np.roll(positions, -1, axis=0) - positions
+    if not closed:
+        steps[-1] = 0.0
+    return steps
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), tolerances.TINY)

@@ -1,0 +1,351 @@
+"""A curve that is exactly on the mesh, and the nodes along it that move.
+
+The polyline is what counts: each of its segments lies in one face. Nodes are points of it, at
+about equal distances. When they move, the stretches between them are drawn anew by straight ways
+over the faces. A stretch that cannot be drawn, or that would cross another, keeps its two nodes
+where they were and stays as it is; so whatever is asked for, the result is a simple curve through
+the same control points in the same order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..crossings import crossing_segments
+from ..curve import SurfaceCurve, curve_on_mesh
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints
+from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .face_walks import join, moved, strictly_inside
+
+DETOUR = 1.5
+"""Longest way between two nodes, relative to their distance in space; a longer one is lost."""
+
+SAME_PLACE = 1e-5
+"""Distance, relative to the curve's length, at which an old point gives way to a new node."""
+
+FEWEST_OF_A_LEG = 6
+"""Nodes of a leg at least, with the control point at its start."""
+
+
+@dataclass(frozen=True)
+class ExactCurve:
+    """A polyline on the mesh with its nodes; the first point is a node.
+
+    Attributes
+    ----------
+    nodes : Nodes
+        n nodes; all but the control points lie strictly inside faces.
+    control_nodes : (k,) int array
+        Which of them are the control points, in order.
+    polyline : SurfacePoints
+        Each point in the face of the segment after it.
+    node_place : (n,) int array
+        Where in the polyline each node is, ascending.
+    """
+
+    nodes: Nodes
+    control_nodes: IntArray
+    polyline: SurfacePoints
+    node_place: IntArray
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last point joins the first."""
+        return self.nodes.closed
+
+    def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
+        """The polyline as a result."""
+        at_controls = self.node_place[self.control_nodes]
+        polyline = self.polyline
+        return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
+
+
+def exact_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> ExactCurve:
+    """Put nodes on a curve that passes its control points in order.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    curve : SurfaceCurve
+    count : int
+        About how many nodes.
+    """
+    first = int(curve.control_index[0])
+    faces, barycentric = np.roll(curve.faces, -first), np.roll(curve.barycentric, -first, axis=0)
+    control_place = (curve.control_index - first) % len(faces)
+    polyline = SurfacePoints(faces, barycentric)
+    return _with_nodes(surface, polyline, control_place, count, curve.closed)
+
+
+def respaced(surface: CurveSurface, curve: ExactCurve, count: int) -> ExactCurve:
+    """Another number of nodes, or the same at equal distances, on the same polyline."""
+    at_controls = curve.node_place[curve.control_nodes]
+    return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
+
+
+def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
+    """Nodes moved across the curve by lengths along `Nodes.sideways`, (n,).
+
+    Returns
+    -------
+    Nodes
+    (n,) bool array
+        Which came to a boundary and stayed beside it.
+    """
+    return shifted(surface, nodes, nodes.sideways * np.sign(step)[:, None], np.abs(step))
+
+
+def shifted(
+    surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
+) -> tuple[Nodes, BoolArray]:
+    """Nodes moved on the surface, with nothing drawn between them.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+    direction : (n, 3) float array
+        Unit vectors about tangent to the surface, anything where the length is zero.
+    length : (n,) float array
+        Zero at control points.
+
+    Returns
+    -------
+    Nodes
+    (n,) bool array
+        Which came to a boundary and stayed beside it.
+    """
+    going = np.flatnonzero(length)
+    targets, stuck = moved(surface.mesh, nodes.places[going], direction[going], length[going])
+    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
+    faces[going], barycentric[going] = targets.faces, targets.barycentric
+    blocked = np.zeros(len(length), dtype=bool)
+    blocked[going] = stuck
+    return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked
+
+
+def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:
+    """Whether the curve neither crosses nor touches itself."""
+    return not len(crossing_segments(surface.mesh, curve.polyline, curve.closed))
+
+
+def drawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> ExactCurve | None:
+    """The curve through nodes at new places, simple or not; None where it cannot be drawn."""
+    none = np.zeros(len(nodes.positions), dtype=bool)
+    polyline, node_place, lost = _drawn(surface.mesh, curve, nodes, none)
+    if lost.any():
+        return None
+    return ExactCurve(nodes, curve.control_nodes, polyline, node_place)
+
+
+def redrawn(
+    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, simple: bool
+) -> tuple[ExactCurve, BoolArray]:
+    """The curve through nodes at new places where it can be drawn, the old one elsewhere.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    curve : ExactCurve
+    nodes : Nodes
+        n nodes, the control points where they are.
+    simple : bool
+        Whether the curve, which is simple, has to stay simple.
+
+    Returns
+    -------
+    ExactCurve
+    (n,) bool array
+        Nodes that had to stay where they were.
+    """
+    old, new = curve.nodes.places, nodes.places
+    stays = np.zeros(len(old), dtype=bool)
+    kept = np.zeros(len(old), dtype=bool)
+    while True:
+        if stays.any():
+            places = SurfacePoints(
+                np.where(stays, old.faces, new.faces),
+                np.where(stays[:, None], old.barycentric, new.barycentric),
+            )
+            nodes = nodes_at(surface, places, curve.closed)
+        polyline, node_place, bad = _drawn(surface.mesh, curve, nodes, kept)
+        if simple and not bad.any():
+            pairs = crossing_segments(surface.mesh, polyline, curve.closed)
+            bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
+        if not bad.any():
+            return ExactCurve(nodes, curve.control_nodes, polyline, node_place), stays
+        if not (bad & ~kept).any():
+            return curve, np.ones(len(old), dtype=bool)
+        kept |= bad
+        stays |= bad | np.roll(bad, 1)
+
+
+def _with_nodes(
+    surface: CurveSurface,
+    polyline: SurfacePoints,
+    control_place: IntArray,
+    count: int,
+    closed: bool,
+) -> ExactCurve:
+    """Insert nodes at equal distances on each leg and drop what was no more than a node."""
+    mesh, n = surface.mesh, len(polyline)
+    positions = polyline.positions(mesh)
+    lengths = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
+    n_segments = n if closed else n - 1
+    arc = np.concatenate([[0.0], np.cumsum(lengths[:n_segments])])
+    bounds = arc[np.append(control_place, n) if closed else control_place]
+    legs = np.diff(bounds)
+    counts = np.maximum(np.round(count * legs / legs.sum()), FEWEST_OF_A_LEG).astype(np.int64)
+    leg = np.repeat(np.arange(len(legs)), counts)
+    control_nodes = np.cumsum(counts) - counts
+    share = (np.arange(len(leg)) - control_nodes[leg]) / counts[leg]
+    at = bounds[leg] + share * legs[leg]
+    if not closed:
+        at, control_nodes = np.append(at, bounds[-1]), np.append(control_nodes, len(at))
+    segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
+    along = (at - arc[segment]) / np.maximum(lengths[segment], tolerances.TINY)
+    along = np.clip(along, 0.0, 1.0)[:, None]
+    faces = polyline.faces[segment]
+    end = in_faces(mesh, polyline[(segment + 1) % n], faces).barycentric
+    barycentric = strictly_inside((1.0 - along) * polyline.barycentric[segment] + along * end)
+    faces[control_nodes] = polyline.faces[control_place]
+    barycentric[control_nodes] = polyline.barycentric[control_place]
+    places = SurfacePoints(faces, barycentric)
+
+    # Old points remain between the nodes, but no point of a face where a node is now.
+    inside = (polyline.barycentric > 0.0).all(axis=1)
+    nodes_along = np.append(at, arc[-1])
+    ahead = np.searchsorted(nodes_along, arc[:n]).clip(max=len(at))
+    nearest = np.minimum(nodes_along[ahead] - arc[:n], arc[:n] - nodes_along[ahead - 1])
+    nearest = np.where(ahead > 0, nearest, 0.0)
+    dropped = inside & (nearest < SAME_PLACE * arc[-1])
+    dropped[control_place] = True
+    old = np.flatnonzero(~dropped)
+    # A node comes after the point where its segment begins, also where it has the same place.
+    segment[control_nodes] = control_place
+    before = np.concatenate([segment, old])
+    order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
+    merged = SurfacePoints(
+        np.concatenate([faces, polyline.faces[old]])[order],
+        np.concatenate([barycentric, polyline.barycentric[old]])[order],
+    )
+    node_place = np.flatnonzero(order < len(at))
+    nodes = nodes_at(surface, places, closed)
+    return ExactCurve(nodes, control_nodes, merged, node_place)
+
+
+def _drawn(
+    mesh: Mesh, curve: ExactCurve, nodes: Nodes, kept: BoolArray
+) -> tuple[SurfacePoints, IntArray, BoolArray]:
+    """The polyline through nodes at new places.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    curve : ExactCurve
+    nodes : Nodes
+        n nodes at new places.
+    kept : (n,) bool array
+        Nodes after which the polyline stays as it is; they and the next ones have not moved.
+
+    Returns
+    -------
+    SurfacePoints
+    (n,) int array
+        Where in it each node is.
+    (n,) bool array
+        Nodes after which no way to the next one was found.
+    """
+    places = nodes.places
+    n = len(places)
+    node = np.arange(n if curve.closed else n - 1)
+    following = (node + 1) % n
+    redraw = ~kept[node]
+    lost = np.zeros(n, dtype=bool)
+    parts = [_kept_stretches(curve, np.flatnonzero(~redraw))]
+    controls = np.zeros(n, dtype=bool)
+    controls[curve.control_nodes] = True
+    # A way starts inside a face, which a control point need not.
+    for backwards in (False, True):
+        here = node[redraw & (controls[node] == backwards)]
+        ends = (here, following[here])
+        part, reached = _drawn_stretches(mesh, nodes.normals, places, here, ends, backwards)
+        lost[here[~reached]] = True
+        parts.append(part)
+    if not curve.closed:
+        parts.append((np.array([n - 1]), places[np.array([n - 1])]))
+    owner = np.concatenate([part[0] for part in parts])
+    order = np.argsort(owner, kind="stable")
+    polyline = SurfacePoints(
+        np.concatenate([part[1].faces for part in parts])[order],
+        np.concatenate([part[1].barycentric for part in parts])[order],
+    )
+    return polyline, np.searchsorted(owner[order], np.arange(n)), lost
+
+
+Stretches = tuple[IntArray, SurfacePoints]
+"""Points of stretches between nodes, each with the node before it; that node comes first."""
+
+
+def _kept_stretches(curve: ExactCurve, nodes: IntArray) -> Stretches:
+    bounds = np.append(curve.node_place, len(curve.polyline))
+    count = bounds[nodes + 1] - bounds[nodes]
+    owner = np.repeat(nodes, count)
+    offset = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    return owner, curve.polyline[bounds[owner] + offset]
+
+
+def _drawn_stretches(
+    mesh: Mesh,
+    normals: FloatArray,
+    places: SurfacePoints,
+    nodes: IntArray,
+    ends: tuple[IntArray, IntArray],
+    backwards: bool,
+) -> tuple[Stretches, BoolArray]:
+    """Straight ways from nodes to the ones after them, drawn from there if backwards."""
+    start, end = reversed(ends) if backwards else ends
+    # A mesh need not be oriented: both normals count as pointing to the same side.
+    agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    plane = normals[start] + agree * normals[end]
+    ways = join(mesh, places[start], places[end], plane, DETOUR)
+    first, crossings = places[start], ways.crossings
+    if not backwards:
+        owner = np.concatenate([nodes, nodes[ways.pair]])
+        order = np.argsort(owner, kind="stable")
+        points = _joined(first, crossings)
+        return (owner[order], points[order]), ways.reached
+    # In reverse, a crossing belongs to the face that the way came from, and the node before all
+    # of them to the face where it ended.
+    begins = np.searchsorted(ways.pair, np.arange(len(nodes)))
+    ends_at = np.searchsorted(ways.pair, np.arange(len(nodes)), side="right")
+    came_from = np.roll(crossings.faces, 1)
+    passes = ends_at > begins
+    came_from[begins[passes]] = first.faces[passes]
+    last_face = first.faces.copy()
+    last_face[passes] = crossings.faces[ends_at[passes] - 1]
+    reverse = np.arange(len(crossings))[::-1]
+    crossings = in_faces(mesh, crossings, came_from)[reverse]
+    # A way that got lost did not end beside its node, whose coordinates are then of no account.
+    node_points = in_faces(mesh, places[end], last_face)
+    owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
+    order = np.argsort(owner, kind="stable")
+    return (owner[order], _joined(node_points, crossings)[order]), ways.reached
+
+
+def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
+    """The same points seen from other faces that hold them."""
+    same = mesh.faces[points.faces][:, :, None] == mesh.faces[faces][:, None, :]
+    return SurfacePoints(faces, (points.barycentric[:, :, None] * same).sum(axis=1))
+
+
+def _joined(first: SurfacePoints, second: SurfacePoints) -> SurfacePoints:
+    return SurfacePoints(
+        np.concatenate([first.faces, second.faces]),
+        np.concatenate([first.barycentric, second.barycentric]),
+    )

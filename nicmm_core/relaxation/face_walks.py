@@ -1,0 +1,291 @@
+"""Straight ways over the faces of a mesh: from point to point, and sideways by a length.
+
+A way is a normal section: the intersection of the surface with a plane that stands on it. It is
+followed from face to face by the signs of the plane at their corners, so that it cannot get lost
+between two faces, and all ways of one call advance together. Two consecutive points of a way lie
+in one face, the one that carries the first of them.
+
+Costs follow the number of faces passed and not the size of the mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints
+
+MOST_FACES = 4096
+"""Faces that a way may pass; a section that goes round the surface is no short way."""
+
+
+@dataclass(frozen=True)
+class Joins:
+    """Ways between m pairs of points, without their ends.
+
+    Attributes
+    ----------
+    reached : (m,) bool array
+        Whether the way arrived. Those that did not have no crossings.
+    pair : (q,) int array
+        The pair that each crossing of an edge belongs to, ascending.
+    crossings : SurfacePoints
+        Where the ways cross edges, in order, each in the face that it enters there.
+    """
+
+    reached: BoolArray
+    pair: IntArray
+    crossings: SurfacePoints
+
+
+def join(
+    mesh: Mesh, start: SurfacePoints, end: SurfacePoints, normals: FloatArray, detour: float
+) -> Joins:
+    """Ways from points inside faces to other points nearby.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    start : SurfacePoints
+        m points, each strictly inside its face.
+    end : SurfacePoints
+        m points anywhere: a vertex counts as reached in every face round it.
+    normals : (m, 3) float array
+        Directions that the planes contain.
+    detour : float
+        Longest way, relative to the straight distance in space.
+    """
+    origin, goal = start.positions(mesh), end.positions(mesh)
+    forward = goal - origin
+    longest = detour * np.linalg.norm(forward, axis=1)
+    reached = _holds(mesh, end, start.faces)
+    walkers = _Walkers(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
+    travelled = np.zeros(len(origin))
+    pairs, crossings = [], []
+    for _ in range(MOST_FACES):
+        if not len(walkers.index):
+            break
+        step = walkers.step_lengths()
+        walkers.enter_next_faces(step <= longest[walkers.index] - travelled[walkers.index])
+        travelled[walkers.index] += walkers.last_step
+        pairs.append(walkers.index)
+        crossings.append(walkers.entry())
+        arrived = _holds(mesh, end[walkers.index], walkers.faces)
+        reached[walkers.index[arrived]] = True
+        walkers.leave_edges(~arrived)
+    if not pairs:
+        return Joins(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
+    pair = np.concatenate(pairs)
+    kept = np.flatnonzero(reached[pair])
+    kept = kept[np.argsort(pair[kept], kind="stable")]
+    parts = zip(*crossings, strict=True)
+    faces, low, high, fraction = (np.concatenate(part)[kept] for part in parts)
+    points = SurfacePoints(faces, _on_edges(mesh, faces, low, high, fraction))
+    once = _last_of_each_vertex(mesh, pair[kept], points)
+    return Joins(reached, pair[kept][once], points[once])
+
+
+def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
+    """Crossings without those of a way that turns about a vertex and crosses there once more."""
+    here = crossings.barycentric > 0.0
+    vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
+    vertex[here.sum(axis=1) > 1] = -1
+    last = np.ones(len(pair), dtype=bool)
+    last[:-1] = (vertex[:-1] < 0) | (vertex[:-1] != vertex[1:]) | (pair[:-1] != pair[1:])
+    return np.flatnonzero(last)
+
+
+def moved(
+    mesh: Mesh, start: SurfacePoints, direction: FloatArray, length: FloatArray
+) -> tuple[SurfacePoints, BoolArray]:
+    """Points moved along the surface.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    start : SurfacePoints
+        m points, each strictly inside its face.
+    direction : (m, 3) float array
+        Unit vectors about tangent to the faces.
+    length : (m,) float array
+        Not negative.
+
+    Returns
+    -------
+    SurfacePoints
+        Strictly inside their faces.
+    (m,) bool array
+        Which came to a boundary, or an edge of three faces, and stayed beside it.
+    """
+    origin = start.positions(mesh)
+    normals = mesh.face_normals[start.faces]
+    walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(length > 0.0))
+    left = length.copy()
+    faces, barycentric = start.faces.copy(), start.barycentric.copy()
+    blocked = np.zeros(len(origin), dtype=bool)
+    lost = np.setdiff1d(np.flatnonzero(length > 0.0), walkers.index)
+    blocked[lost] = True
+    for _ in range(MOST_FACES):
+        if not len(walkers.index):
+            break
+        step = walkers.step_lengths()
+        index = walkers.index
+        beyond = walkers.beyond()
+        stops = (left[index] <= step) | (beyond < 0)
+        ends = index[stops]
+        share = np.clip(left[ends] / np.maximum(step[stops], tolerances.TINY), 0.0, 1.0)[:, None]
+        leaving = walkers.exit_barycentric()[stops]
+        barycentric[ends] += share * (leaving - barycentric[ends])
+        blocked[ends] = left[ends] > step[stops]
+        left[index] -= step
+        walkers.enter_next_faces(~stops)
+        faces[walkers.index] = walkers.faces
+        barycentric[walkers.index] = _on_edges(mesh, *walkers.entry())
+        walkers.leave_edges(np.ones(len(walkers.index), dtype=bool))
+    return SurfacePoints(faces, strictly_inside(barycentric)), blocked
+
+
+def strictly_inside(barycentric: FloatArray) -> FloatArray:
+    """Coordinates drawn off the sides and corners of their faces by `tolerances.INSIDE`."""
+    drawn = np.maximum(barycentric, tolerances.INSIDE)
+    return drawn / drawn.sum(axis=1, keepdims=True)
+
+
+_OF_EACH_WALKER = (
+    *("index", "faces", "last_step", "_start", "_origin", "_across", "_position", "_side"),
+    *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
+    *("_fraction", "_crossing"),
+)
+"""Arrays of `_Walkers`."""
+
+
+class _Walkers:
+    """Walkers on their way, each in its plane, about to cross an edge of the face that it is in.
+
+    Of that edge one end lies above the plane or in it, the other below. In the next face only the
+    third corner is new: its height says which of the two other sides comes next.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        faces: IntArray,
+        origin: FloatArray,
+        normals: FloatArray,
+        forward: FloatArray,
+        index: IntArray,
+    ) -> None:
+        self.mesh = mesh
+        self.index = index  # (w,) which of the caller's walkers
+        self.faces = self._start = faces[index]
+        self.last_step = np.zeros(len(index))
+        self._origin = origin[index]
+        self._across = np.cross(normals[index], forward[index])
+        self._position = self._crossing = self._origin
+        self._fraction = np.zeros(len(index))
+        corners = mesh.faces[self.faces]  # (w, 3)
+        positions = mesh.vertices[corners]
+        offset = positions - self._origin[:, None]
+        height = (offset * self._across[:, None]).sum(axis=2)
+        # Side j lies opposite corner j. Two of them are crossed, one of them ahead.
+        above = height >= 0.0
+        first, second = [1, 2, 0], [2, 0, 1]
+        crossed = above[:, first] != above[:, second]
+        rise = height[:, second] - height[:, first]
+        share = -height[:, first] / np.where(crossed, rise, 1.0)
+        points = offset[:, first] + share[..., None] * (offset[:, second] - offset[:, first])
+        ahead = (points * forward[index][:, None]).sum(axis=2)
+        side = np.where(crossed, ahead, -np.inf).argmax(axis=1)
+        rows = np.arange(len(index))
+        one, other = (side + 1) % 3, (side + 2) % 3
+        up = above[rows, one]
+        high, low = np.where(up, one, other), np.where(up, other, one)
+        self._side = side
+        self._high, self._low = corners[rows, high], corners[rows, low]
+        self._high_height, self._low_height = height[rows, high], height[rows, low]
+        self._high_position, self._low_position = positions[rows, high], positions[rows, low]
+        # A plane that leaves its face nowhere belongs to no walker.
+        self._keep(crossed[rows, side])
+        self._find_crossing()
+
+    def step_lengths(self) -> FloatArray:
+        """Distance to the edge ahead, shape (w,)."""
+        self.last_step = np.linalg.norm(self._crossing - self._position, axis=1)
+        return self.last_step
+
+    def beyond(self) -> IntArray:
+        """The face beyond that edge, -1 where there is none or more than one, shape (w,)."""
+        return self.mesh.face_neighbours[self.faces, self._side]
+
+    def exit_barycentric(self) -> FloatArray:
+        """Where the walkers leave their faces, in coordinates of these, shape (w, 3)."""
+        return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
+
+    def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+        """Where the walkers have entered their faces: face, ends of the edge and share of one."""
+        return self.faces, self._low, self._high, self._fraction
+
+    def enter_next_faces(self, goes: BoolArray) -> None:
+        """Take walkers over their edges; those that may not or cannot go drop out.
+
+        So do those that come back to the face where they started: their section is closed.
+        """
+        beyond = self.beyond()
+        goes = goes & (beyond >= 0) & (beyond != self._start)
+        if not goes.all():
+            self._keep(goes)
+            beyond = beyond[goes]
+        self.faces = beyond
+        self._position = self._crossing
+
+    def leave_edges(self, goes: BoolArray) -> None:
+        """Find the next edge of walkers that have just entered a face; others drop out."""
+        if not goes.all():
+            self._keep(goes)
+        corners = self.mesh.faces[self.faces]
+        third = corners.sum(axis=1) - self._low - self._high
+        position = self.mesh.vertices[third]
+        height = ((position - self._origin) * self._across).sum(axis=1)
+        up = height >= 0.0
+        left = np.where(up, self._high, self._low)
+        self._side = (corners == left[:, None]).argmax(axis=1)
+        self._high = np.where(up, third, self._high)
+        self._low = np.where(up, self._low, third)
+        self._high_height = np.where(up, height, self._high_height)
+        self._low_height = np.where(up, self._low_height, height)
+        self._high_position = np.where(up[:, None], position, self._high_position)
+        self._low_position = np.where(up[:, None], self._low_position, position)
+        self._find_crossing()
+
+    def _find_crossing(self) -> None:
+        self._fraction = self._high_height / (self._high_height - self._low_height)
+        step = self._low_position - self._high_position
+        self._crossing = self._high_position + self._fraction[:, None] * step
+
+    def _keep(self, mask: BoolArray) -> None:
+        for name in _OF_EACH_WALKER:
+            setattr(self, name, getattr(self, name)[mask])
+
+
+def _on_edges(
+    mesh: Mesh, faces: IntArray, low: IntArray, high: IntArray, fraction: FloatArray
+) -> FloatArray:
+    """Barycentric coordinates of points on edges, a share of the way from high to low, (p, 3)."""
+    corners = mesh.faces[faces]
+    share = fraction[:, None]
+    return (corners == high[:, None]) * (1.0 - share) + (corners == low[:, None]) * share
+
+
+def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
+    """Whether each point lies in its face: a vertex lies in every face round it."""
+    holds = points.faces == faces
+    on_side = np.flatnonzero(~holds & (points.barycentric == 0.0).any(axis=1))
+    if len(on_side):
+        support = mesh.faces[points.faces[on_side]]
+        found = (support[:, :, None] == mesh.faces[faces[on_side]][:, None, :]).any(axis=2)
+        holds[on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=1)
+    return holds

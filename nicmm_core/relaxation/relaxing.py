@@ -1,0 +1,321 @@
+"""Bring a curve on the surface to rest: Levenberg–Marquardt steps on its own energy.
+
+A level set is as fine as its mesh, and two strands of it a few edges apart hold each other. What it
+settles is where the curve runs. From there nodes move on the surface until the energy of Eq. 6
+and 7, taken along the curve, rests (`elastic_energy`).
+
+Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. On the way
+the curve may pass through itself, which only its end must not: strands often have to swap. When
+they do not part again, the relaxation is done once more with strands that keep apart, where every
+state in between is a simple curve (`exact_curve`). The same goes for nodes that are too far
+apart for a thin limb, so that no straight way over the surface joins them: a level with more nodes
+takes over from the start.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..curve import SurfaceCurve
+from .curve_nodes import CurveSurface, Nodes
+from .elastic_energy import (
+    Balance,
+    balance,
+    bending_energy,
+    damped_step,
+    elastic_energy,
+    elastic_system,
+    feature_energy,
+)
+from .exact_curve import ExactCurve, drawn, exact_curve, is_simple, redrawn, respaced, sideways
+
+
+@dataclass(frozen=True)
+class RelaxationConfig:
+    """How the iteration runs; lengths are in mean steps from node to node.
+
+    Attributes
+    ----------
+    levels : tuple of int
+        Numbers of nodes, rising.
+    longest_move : float
+        Farthest that a node moves at once.
+    damping : float
+        At the start of a level, relative to the greatest diagonal entry. Far below 1, because that
+        measures the stiffness of a zigzag from node to node, against which a slow swing of the
+        whole curve has almost none.
+    most_damping : float
+        Where the search for a step ends.
+    least_decrease : float
+        Decrease of the energy, relative to the bending, that ends the last level,
+    least_decrease_before : float
+        and those before.
+    stretch : float
+        Ratio of the longest to the shortest step of a leg at which nodes are spaced anew.
+    iterations : int
+        The cap, over all levels of one attempt.
+    """
+
+    levels: tuple[int, ...] = (64, 128, 256, 512)
+    longest_move: float = 4.0
+    damping: float = 1e-6
+    most_damping: float = 1e2
+    least_decrease: float = 1e-4
+    least_decrease_before: float = 1e-2
+    stretch: float = 1.6
+    iterations: int = 100
+
+
+DAMPING_FACTOR = 10.0
+"""By which damping rises when a step does not lower the energy, and falls when one does."""
+
+HELD_TRIES = 3
+"""Steps that are tried without the nodes that could not follow the one before."""
+
+STRAIGHT = 1e-2
+"""Share of bending in the energy below which a curve is straight enough not to go on for it."""
+
+SMALL_MOVE = 0.1
+"""Moves that do not disturb the spacing, in mean steps."""
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """Where a relaxation ended.
+
+    Attributes
+    ----------
+    curve : SurfaceCurve
+        Simple.
+    bending : float
+        ∮ κ_g² ds, in 1/length.
+    feature : float
+        ∮ φ_fea² ds, in units of length.
+    iterations : int
+        Of all attempts, each of which has its own cap.
+    stopped : str
+        "converged", "cap" or "cancelled"; "unrelaxed" where strands of the start are so close to
+        one another that nodes on it would touch.
+    """
+
+    curve: SurfaceCurve
+    bending: float
+    feature: float
+    iterations: int
+    stopped: str
+
+
+Watch = Callable[[float, FloatArray], bool]
+
+
+def relax(
+    surface: CurveSurface,
+    start: SurfaceCurve,
+    smoothness: float,
+    config: RelaxationConfig,
+    watch: Watch | None = None,
+) -> Relaxed:
+    """Let a curve come to rest.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    start : SurfaceCurve
+        Simple, and through its control points in order.
+    smoothness : float
+        Divides the tension.
+    config : RelaxationConfig
+    watch : callable, optional
+        Called with the fraction of an attempt's cap that is done and the nodes' positions, (n, 3),
+        after every iteration; relaxation stops when it returns False.
+    """
+    relaxation = _Relaxation(surface, smoothness, config, watch)
+    first = exact_curve(surface, start, config.levels[0])
+    curve = None
+    for place in range(len(config.levels)):
+        levels = config.levels[place:]
+        drawing = _Drawing.HOLD if len(levels) == 1 else _Drawing.END
+        curve = relaxation.run(first, levels, drawing)
+        if curve is not None:
+            break
+    if relaxation.stopped != "cancelled" and not (curve and is_simple(surface, curve)):
+        # Strands that cross here would do so with more nodes too.
+        curve = relaxation.run(first, config.levels[1:] or config.levels, _Drawing.SIMPLE)
+    if curve and is_simple(surface, curve):
+        result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
+    else:
+        curve, result = first, start
+        stopped = "cancelled" if relaxation.stopped == "cancelled" else "unrelaxed"
+    nodes = curve.nodes
+    return Relaxed(
+        result, bending_energy(nodes), feature_energy(nodes), relaxation.iterations, stopped
+    )
+
+
+def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
+    """Greatest ratio of the longest to the shortest step of one leg."""
+    lengths = nodes.lengths
+    first = control_nodes[control_nodes < len(lengths)]
+    longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
+    return float((longest / np.maximum(shortest, tolerances.TINY)).max())
+
+
+class _Drawing(enum.Enum):
+    """What happens where the curve cannot be drawn through nodes that have moved."""
+
+    END = "the attempt ends"
+    HOLD = "those nodes stay"
+    SIMPLE = "those nodes stay, and so do nodes whose strands would cross"
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step that lowered the energy."""
+
+    curve: ExactCurve  # as it was last drawn
+    nodes: Nodes
+    held: BoolArray  # (n,) nodes that could not follow
+    damping: float  # for the next step
+    farthest: float  # move, in mean steps
+
+
+class _LostError(Exception):
+    """The curve cannot be drawn with so few nodes."""
+
+
+class _Relaxation:
+    """Attempts from one start; counts iterations and keeps the reason of the last stop."""
+
+    def __init__(
+        self,
+        surface: CurveSurface,
+        smoothness: float,
+        config: RelaxationConfig,
+        watch: Watch | None,
+    ) -> None:
+        self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
+        self.iterations, self.stopped = 0, "converged"
+
+    def run(
+        self, curve: ExactCurve, levels: tuple[int, ...], drawing: _Drawing
+    ) -> ExactCurve | None:
+        """Bring a curve to rest level by level; None where the attempt ended early."""
+        last_iteration = self.iterations + self.config.iterations
+        self.stopped = "converged"
+        try:
+            for level in levels:
+                least = self.config.least_decrease_before
+                if level == levels[-1]:
+                    least = self.config.least_decrease
+                curve = self._level(curve, level, least, last_iteration, drawing)
+                if self.stopped != "converged":
+                    break
+        except _LostError:
+            return None
+        return curve
+
+    def _level(
+        self,
+        curve: ExactCurve,
+        level: int,
+        least: float,
+        last_iteration: int,
+        drawing: _Drawing,
+    ) -> ExactCurve:
+        """Steps with one number of nodes until the energy falls by less than the least share."""
+        config, damping = self.config, self.config.damping
+        curve = self._respaced(curve, level, drawing)
+        nodes = curve.nodes
+        held = np.zeros(len(nodes.positions), dtype=bool)
+        released = False
+        while self.iterations < last_iteration:
+            self.iterations += 1
+            apart = drawing is _Drawing.SIMPLE
+            weights = balance(self.surface, nodes, self.smoothness, apart)
+            before = elastic_energy(nodes, weights)
+            step = self._step(curve, nodes, held, weights, damping, drawing)
+            if step is not None:
+                curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
+                done = 1.0 - (last_iteration - self.iterations) / config.iterations
+                if self.watch is not None and not self.watch(done, nodes.positions):
+                    self.stopped = "cancelled"
+                    break
+            scale = max(bending_energy(nodes), STRAIGHT * before)
+            if step is not None and before - elastic_energy(nodes, weights) > least * scale:
+                released = False
+            elif released or not held.any():
+                break
+            else:
+                # At rest with nodes that once could not follow: perhaps they can now.
+                released, damping = True, config.damping
+                held = np.zeros(len(held), dtype=bool)
+            moved = step is not None and step.farthest > SMALL_MOVE
+            if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
+                curve = self._respaced(self._drawn(curve, nodes), level, drawing)
+                nodes = curve.nodes
+                held = np.zeros(len(nodes.positions), dtype=bool)
+        else:
+            self.stopped = "cap"
+        return self._drawn(curve, nodes)
+
+    def _step(
+        self,
+        curve: ExactCurve,
+        nodes: Nodes,
+        held: BoolArray,
+        weights: Balance,
+        damping: float,
+        drawing: _Drawing,
+    ) -> _Step | None:
+        """The least damped step that lowers the energy; None when there is none."""
+        config, surface = self.config, self.surface
+        energy = elastic_energy(nodes, weights)
+        system = elastic_system(surface, nodes, weights)
+        spacing = float(nodes.lengths.mean())
+        free = ~held
+        free[curve.control_nodes] = False
+        tries = 0
+        while damping <= config.most_damping and free.any():
+            move = damped_step(system, free, damping)
+            farthest = float(np.abs(move).max()) / spacing
+            if not np.isfinite(farthest):
+                return None
+            if farthest > config.longest_move:
+                move *= config.longest_move / farthest
+            moved, stayed = sideways(surface, nodes, move)
+            lowered = elastic_energy(moved, weights) < energy
+            if lowered and drawing is not _Drawing.END:
+                drawn_curve, kept = redrawn(surface, curve, moved, drawing is _Drawing.SIMPLE)
+                if kept.any() and tries < HELD_TRIES:
+                    free &= ~kept
+                    tries += 1
+                    continue
+                moved, stayed = drawn_curve.nodes, stayed | kept
+                lowered = not kept.any() or elastic_energy(moved, weights) < energy
+                if lowered:
+                    curve = drawn_curve
+            if lowered:
+                damping = max(damping / DAMPING_FACTOR, config.damping)
+                return _Step(curve, moved, stayed, damping, min(farthest, config.longest_move))
+            damping *= DAMPING_FACTOR
+        return None
+
+    def _drawn(self, curve: ExactCurve, nodes: Nodes) -> ExactCurve:
+        """The curve through its nodes, which may have moved since it was last drawn."""
+        changed = curve if nodes is curve.nodes else drawn(self.surface, curve, nodes)
+        if changed is None:
+            raise _LostError
+        return changed
+
+    def _respaced(self, curve: ExactCurve, level: int, drawing: _Drawing) -> ExactCurve:
+        """Nodes at equal distances; where they would make strands touch, the ones it has."""
+        changed = respaced(self.surface, curve, level)
+        if drawing is _Drawing.SIMPLE and not is_simple(self.surface, changed):
+            return curve
+        return changed

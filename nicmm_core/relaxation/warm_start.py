@@ -1,0 +1,84 @@
+"""Start from the curve before: its control points move, and the curve beside them with them.
+
+A point that is dragged takes the nearby nodes along, less and less with their distance, so that
+relaxation starts from a curve without a kink. It works for small moves; others start anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import FloatArray, IntArray
+from ..curve import SurfaceCurve
+from ..surface_points import SurfacePoints
+from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .exact_curve import drawn, exact_curve, is_simple, shifted
+from .relaxing import RelaxationConfig
+
+NODES = 512
+"""Nodes that are moved; as many as the curve was relaxed with."""
+
+WARM = RelaxationConfig(levels=(128, NODES), least_decrease=1e-3, least_decrease_before=5e-2)
+"""Relaxation from there: the curve is fine already and near its rest."""
+
+LONGEST_MOVE = 0.1
+"""Farthest that a control point may have moved, relative to the curve's length."""
+
+TAKEN_ALONG = 4.0
+"""Distance along the curve up to which nodes move with a control point, in moves."""
+
+
+def moved_along(
+    surface: CurveSurface, curve: SurfaceCurve, controls: SurfacePoints
+) -> SurfaceCurve | None:
+    """A curve with its control points at new places nearby.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    curve : SurfaceCurve
+        Simple, and through its control points in order.
+    controls : SurfacePoints
+        The new places, in the order visited.
+
+    Returns
+    -------
+    SurfaceCurve or None
+        Simple; None where the moves are too far for that.
+    """
+    mesh = surface.mesh
+    move = controls.positions(mesh) - curve.points[curve.control_index]
+    if np.linalg.norm(move, axis=1).max() > LONGEST_MOVE * curve.length:
+        return None
+    exact = exact_curve(surface, curve, NODES)
+    nodes, at_controls = exact.nodes, exact.control_nodes
+    shift = _shifts(nodes, at_controls, move)
+    shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
+    length = np.linalg.norm(shift, axis=1)
+    length[at_controls] = 0.0
+    direction = shift / np.maximum(length, tolerances.TINY)[:, None]
+    places = shifted(surface, nodes, direction, length)[0].places
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    faces[at_controls], barycentric[at_controls] = controls.faces, controls.barycentric
+    places = SurfacePoints(faces, barycentric)
+    changed = drawn(surface, exact, nodes_at(surface, places, curve.closed))
+    if changed is None or not is_simple(surface, changed):
+        return None
+    return changed.surface_curve(mesh)
+
+
+def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:
+    """How far each node is taken along, (n, 3): by the control points before and after it."""
+    total = float(nodes.lengths.sum())
+    arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])[: len(nodes.positions)]
+    shift = np.zeros((len(arc), 3))
+    for here, vector in zip(arc[at_controls], move, strict=True):
+        reach = TAKEN_ALONG * np.linalg.norm(vector)
+        if reach > 0.0:
+            away = np.abs(arc - here)
+            if nodes.closed:
+                away = np.minimum(away, total - away)
+            share = np.clip(1.0 - away / reach, 0.0, 1.0)
+            shift += (share * share * (3.0 - 2.0 * share))[:, None] * vector
+    return shift

@@ -1,0 +1,85 @@
+"""Smoothing: a minimiser, zero at the control points, with a response to each of them."""
+
+import numpy as np
+import pytest
+
+from nicmm_core.level_set.finite_elements import build_finite_elements
+from nicmm_core.level_set.smoothing import build_smoother
+from nicmm_core.path.virtual_splits import SplitMesh
+
+CONTROLS = np.array([3, 40, 111])
+LENGTH = 0.3
+
+
+@pytest.fixture(scope="module")
+def elements(small_ball):
+    working, _ = SplitMesh(small_ball).assemble(0)
+    return build_finite_elements(working.vertices, working.faces, working.on_boundary)
+
+
+@pytest.fixture(scope="module")
+def smoother(elements):
+    return build_smoother(elements, CONTROLS, LENGTH)
+
+
+@pytest.fixture
+def noise(elements):
+    return np.random.default_rng(3).normal(size=len(elements.vertex_areas))
+
+
+def bending(elements, field):
+    return elements.vertex_areas @ (elements.laplacian @ field) ** 2
+
+
+def test_smoothed_field_is_zero_at_the_control_points(smoother, noise):
+    np.testing.assert_array_equal(smoother.smoothed(noise)[CONTROLS], 0.0)
+    np.testing.assert_array_equal(smoother.interpolating(noise)[CONTROLS], 0.0)
+
+
+def test_response_is_one_at_its_own_point_and_zero_at_the_others(smoother):
+    np.testing.assert_allclose(smoother.response[CONTROLS], np.eye(3), rtol=0, atol=1e-12)
+
+
+def test_response_fades_away_from_its_point(smoother, small_ball):
+    far = np.linalg.norm(small_ball.vertices - small_ball.vertices[CONTROLS[0]], axis=1) > 1.5
+    assert np.abs(smoother.response[far, 0]).max() < 0.1
+
+
+def test_smoothing_bends_less(elements, smoother, noise):
+    assert bending(elements, smoother.smoothed(noise)) < 0.1 * bending(elements, noise)
+
+
+def test_longer_length_bends_less(elements, noise):
+    bendings = [
+        bending(elements, build_smoother(elements, CONTROLS, length).smoothed(noise))
+        for length in (0.1, 0.2, 0.4)
+    ]
+    assert bendings[0] > bendings[1] > bendings[2]
+
+
+def test_no_length_changes_nothing(elements, noise):
+    noise[CONTROLS] = 0.0
+    np.testing.assert_allclose(
+        build_smoother(elements, CONTROLS, 1e-4).smoothed(noise), noise, rtol=0, atol=1e-6
+    )
+
+
+def test_smoothed_field_is_the_minimiser(elements, smoother, noise):
+    """No field that is zero at the control points has less ∫ (φ - f)² + ℓ⁴ (Δφ)²."""
+
+    def energy(field):
+        return elements.vertex_areas @ (field - noise) ** 2 + LENGTH**4 * bending(elements, field)
+
+    best = smoother.smoothed(noise)
+    generator = np.random.default_rng(8)
+    for size in (1e-3, 1e-1, 1.0):
+        change = size * generator.normal(size=len(noise))
+        change[CONTROLS] = 0.0
+        assert energy(best + change) > energy(best)
+        # At a minimum the energy of a step does not depend on its direction.
+        assert energy(best + change) == pytest.approx(energy(best - change), rel=1e-6)
+
+
+def test_interpolating_leaves_a_field_that_is_zero_already(smoother, noise):
+    noise[CONTROLS] = 0.0
+    np.testing.assert_array_equal(smoother.interpolating(noise), noise)

@@ -1,0 +1,166 @@
+"""Stage 1 at toy size: it learns, it is seeded, and an interruption changes nothing."""
+
+import numpy as np
+import pytest
+import torch
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.network.forward_pass import NetworkConfig
+from nicmm_core.network.pretraining import PretrainingConfig, pretrain
+from nicmm_core.network.weights_file import load_weights
+
+NETWORK = NetworkConfig(width=12, depth=1, gate_rank=2)
+SETTINGS = PretrainingConfig(sets=4, epochs=3, seed=7)
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return [shapes.creature(seed, faces=200, subdivisions=0) for seed in (1, 2)]
+
+
+def train(meshes, path, settings=SETTINGS, network=NETWORK, progress=None):
+    return pretrain(meshes, path, network, settings, progress=progress)
+
+
+def weights_in(path):
+    return load_weights(path).parameters
+
+
+def assert_same_weights(first, second):
+    assert set(first) == set(second)
+    for name in first:
+        np.testing.assert_array_equal(first[name], second[name], name)
+
+
+@pytest.fixture(scope="module")
+def finished(meshes, tmp_path_factory):
+    """An uninterrupted run: where its weights are and the losses of its epochs."""
+    path = tmp_path_factory.mktemp("pretraining") / "weights.npz"
+    return path, train(meshes, path)
+
+
+def test_loss_falls(meshes, tmp_path):
+    losses = train(meshes, tmp_path / "weights.npz", PretrainingConfig(sets=4, epochs=6, seed=7))
+    assert len(losses) == 6
+    assert np.isfinite(losses).all()
+    assert losses[-1] < 0.97 * losses[0], losses
+
+
+def test_writes_weights_that_load_and_nothing_else(finished):
+    path, losses = finished
+    assert len(losses) == SETTINGS.epochs
+    assert load_weights(path).config == NETWORK
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+def test_training_changes_the_network(finished):
+    assert np.abs(weights_in(finished[0])["head.weight"]).max() > 0.0
+
+
+def test_same_seed_gives_identical_weights(meshes, finished, tmp_path):
+    torch.manual_seed(123)
+    np.random.seed(123)
+    losses = train(meshes, tmp_path / "again.npz")
+    assert losses == finished[1]
+    assert_same_weights(weights_in(tmp_path / "again.npz"), weights_in(finished[0]))
+
+
+def test_other_seed_gives_other_weights(meshes, finished, tmp_path):
+    train(meshes, tmp_path / "other.npz", PretrainingConfig(sets=4, epochs=3, seed=8))
+    other, first = weights_in(tmp_path / "other.npz"), weights_in(finished[0])
+    assert not np.array_equal(other["stem.weight"], first["stem.weight"])
+
+
+class StopError(Exception):
+    """What a progress function may raise to stop a run."""
+
+
+def interrupt_in_epoch(number, settings=SETTINGS):
+    """A progress function that stops the run in the middle of an epoch."""
+
+    def progress(stage, done, total, loss):
+        if stage == "training" and done == (number - 1) * settings.sets + 2:
+            raise StopError
+
+    return progress
+
+
+@pytest.mark.parametrize("epoch", [1, 2, 3])
+def test_interrupted_run_ends_with_the_weights_of_an_uninterrupted_one(
+    meshes, finished, tmp_path, epoch
+):
+    path = tmp_path / "weights.npz"
+    with pytest.raises(StopError):
+        train(meshes, path, progress=interrupt_in_epoch(epoch))
+    assert not path.exists()
+    steps = []
+    losses = train(
+        meshes,
+        path,
+        progress=lambda stage, done, *_: steps.append(done) if stage == "training" else None,
+    )
+    # It goes on after the last epoch that was complete instead of starting again.
+    assert steps[0] == (epoch - 1) * SETTINGS.sets + 1
+    assert losses == finished[1]
+    assert_same_weights(weights_in(path), weights_in(finished[0]))
+
+
+def test_checkpoint_of_other_settings_is_refused(meshes, tmp_path):
+    path = tmp_path / "weights.npz"
+    with pytest.raises(StopError):
+        train(meshes, path, progress=interrupt_in_epoch(2))
+    for change in (
+        {"settings": PretrainingConfig(sets=4, epochs=5, seed=7)},
+        {"settings": PretrainingConfig(sets=4, epochs=3, seed=8)},
+        {"network": NetworkConfig(width=12, depth=1, gate_rank=2, attention=False)},
+    ):
+        with pytest.raises(nicmm.ArgumentError, match="settings"):
+            train(meshes, path, **change)
+
+
+def test_checkpoint_of_other_meshes_is_refused(meshes, tmp_path):
+    """Going on with other meshes would give weights that no command made."""
+    path = tmp_path / "weights.npz"
+    with pytest.raises(StopError):
+        train(meshes, path, progress=interrupt_in_epoch(2))
+    with pytest.raises(nicmm.ArgumentError):
+        train(meshes[:1], path)
+
+
+def test_unreadable_checkpoint_is_refused_by_name(meshes, tmp_path):
+    """As a run leaves it that is stopped while it writes."""
+    path = tmp_path / "weights.npz"
+    with pytest.raises(StopError):
+        train(meshes, path, progress=interrupt_in_epoch(2))
+    (checkpoint,) = tmp_path.iterdir()
+    checkpoint.write_bytes(checkpoint.read_bytes()[:200])
+    with pytest.raises(nicmm.ArgumentError, match=checkpoint.name):
+        train(meshes, path)
+
+
+def test_progress_counts_up_to_all_steps(meshes, tmp_path):
+    calls = []
+    train(meshes, tmp_path / "weights.npz", progress=lambda *call: calls.append(call))
+    for stage, total in (("preparing", 4), ("training", 12)):
+        done = [call[1:3] for call in calls if call[0] == stage]
+        assert done == [(i, total) for i in range(1, total + 1)]
+    assert all(np.isfinite(call[3]) for call in calls)
+
+
+def test_no_meshes_are_refused(tmp_path):
+    with pytest.raises(nicmm.ArgumentError, match="^meshes"):
+        train([], tmp_path / "weights.npz")
+
+
+def test_mesh_with_too_few_vertices_is_refused(tmp_path):
+    triangle = nicmm.Mesh(np.eye(3), [[0, 1, 2]])
+    with pytest.raises(nicmm.ArgumentError, match=r"^meshes\[0\]"):
+        train([triangle], tmp_path / "weights.npz")
+
+
+def test_folder_that_does_not_exist_is_refused_before_the_training(meshes, tmp_path):
+    steps = []
+    with pytest.raises(nicmm.NicmmError):
+        train(meshes, tmp_path / "nowhere" / "weights.npz", progress=lambda *c: steps.append(c))
+    assert not [stage for stage, *_ in steps if stage == "training"]

@@ -1,0 +1,300 @@
+"""The initial loop: simple, without chords, along edges and through the points in order."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.path import legs
+from nicmm_core.path.initial_loop import build_initial_loop
+from nicmm_core.path.visiting_order import shortest_order
+from nicmm_core.surface_points import locate_control_points
+from tests.core.checks import circle, nearest_vertices, random_surface_points
+
+BALL = shapes.sphere(1)
+
+
+def assert_simple_loop(mesh, points, order, working, loop, closed=True):
+    assert loop.closed == closed
+    vertices = loop.vertices.tolist()
+    assert len(set(vertices)) == len(vertices), "a vertex is passed twice"
+    edges = {tuple(edge) for edge in working.edges.tolist()}
+    steps = {
+        tuple(sorted(step))
+        for step in zip(vertices, np.roll(loop.vertices, -1).tolist(), strict=True)
+    }
+    if not closed:
+        steps.remove(tuple(sorted((vertices[-1], vertices[0]))))
+        assert loop.control_vertices[[0, -1]].tolist() == [vertices[0], vertices[-1]]
+    assert steps <= edges, "a step follows no edge"
+    on_loop = set(vertices)
+    chords = {edge for edge in edges if on_loop.issuperset(edge)} - steps
+    assert not chords, f"two strands are neighbours: {chords}"
+
+    assert sorted(loop.order.tolist()) == list(range(len(points)))
+    if order == "given":
+        np.testing.assert_array_equal(loop.order, np.arange(len(points)))
+    np.testing.assert_allclose(
+        working.vertices[loop.control_vertices],
+        points.positions(mesh)[loop.order],
+        rtol=0,
+        atol=1e-12 * mesh.diagonal,
+    )
+    place = [vertices.index(control) for control in loop.control_vertices]
+    first = place.index(min(place))
+    assert place[first:] + place[:first] == sorted(place), "points are met out of order"
+    controls = set(loop.control_vertices.tolist())
+    assert not any(controls.issuperset(edge) for edge in edges), "control points are neighbours"
+
+
+@pytest.mark.parametrize("order", ["given", "shortest"])
+@pytest.mark.parametrize("count", [3, 5, 8])
+def test_loops_through_random_vertices_are_simple(surface, count, order):
+    for seed in range(3):
+        inner = interior_vertices(surface)
+        chosen = np.random.default_rng([count, seed]).choice(inner, size=count, replace=False)
+        points = locate_control_points(surface, chosen, closed=True)
+        working, loop = build_initial_loop(surface, points, order)
+        assert_simple_loop(surface, points, order, working, loop)
+
+
+@pytest.mark.parametrize("order", ["given", "shortest"])
+def test_loops_through_points_in_faces_are_simple(surface, order):
+    for seed in range(3):
+        points = random_surface_points(surface, 5, seed)
+        working, loop = build_initial_loop(surface, points, order)
+        assert_simple_loop(surface, points, order, working, loop)
+
+
+PLACES = st.lists(
+    st.tuples(
+        st.integers(0, len(BALL.faces) - 1),
+        st.sampled_from(
+            [(1, 0, 0), (0.5, 0.5, 0), (0, 0.9, 0.1), (0.2, 0.3, 0.5), (0.98, 0.01, 0.01)]
+        ),
+    ),
+    min_size=3,
+    max_size=7,
+)
+
+
+@settings(max_examples=25)
+@given(places=PLACES, order=st.sampled_from(["given", "shortest"]))
+@example(places=[(0, (1, 0, 0)), (0, (0.5, 0.5, 0)), (0, (0.2, 0.3, 0.5))], order="given")
+def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
+    """A path never cuts a sphere in two, so every order of different points has a loop."""
+    faces, barycentric = zip(*places, strict=True)
+    given_points = nicmm.SurfacePoints(np.array(faces), np.array(barycentric, dtype=float))
+    try:
+        points = locate_control_points(BALL, given_points, closed=True)
+    except nicmm.ControlPointError:
+        return  # Two of them are the same point.
+    working, loop = build_initial_loop(BALL, points, order)
+    assert_simple_loop(BALL, points, order, working, loop)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loops_of_many_strands_are_simple(small_ball, seed):
+    """Points in random order: the paths wind round one another and split the mesh often."""
+    chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
+    points = locate_control_points(small_ball, chosen, closed=True)
+    working, loop = build_initial_loop(small_ball, points, "given")
+    assert_simple_loop(small_ball, points, "given", working, loop)
+
+
+def test_shortest_order_is_that_of_the_distances(ball):
+    angles = 2 * np.pi * np.array([0.0, 0.6, 0.2, 0.8, 0.4])
+    points = locate_control_points(ball, nearest_vertices(ball, circle(angles)), closed=True)
+    _, loop = build_initial_loop(ball, points, "shortest")
+    chord = np.linalg.norm(circle(angles)[:, None] - circle(angles)[None], axis=2)
+    expected = shortest_order(chord, closed=True)
+    assert loop.order.tolist() in (expected.tolist(), [0, *expected[:0:-1].tolist()])
+
+
+SURFACES = {
+    "sphere": shapes.sphere(2),
+    "torus": shapes.torus(around=18, across=9),
+    "body": shapes.creature(1, faces=200, subdivisions=0),
+    "tetrahedron": nicmm.Mesh(
+        [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
+        [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+    ),
+}
+
+
+class TestEveryOrder:
+    """Arcs that are apart separate no surface without boundary, so every order has a path."""
+
+    @settings(max_examples=40)
+    @given(
+        name=st.sampled_from(sorted(SURFACES)),
+        count=st.integers(2, 12),
+        seed=st.integers(0, 10**6),
+        closed=st.booleans(),
+    )
+    def test_without_boundary(self, name, count, seed, closed):
+        mesh = SURFACES[name]
+        count = max(count, 2 + closed)
+        generator = np.random.default_rng(seed)
+        faces = generator.integers(len(mesh.faces), size=count)
+        barycentric = generator.dirichlet([1.0, 1.0, 1.0], size=count)
+        points = locate_control_points(mesh, nicmm.SurfacePoints(faces, barycentric), closed)
+        working, loop = build_initial_loop(mesh, points, "given", None, closed)
+        assert_simple_loop(mesh, points, "given", working, loop, closed)
+
+    @settings(max_examples=15)
+    @given(count=st.integers(3, 9), seed=st.integers(0, 10**6), closed=st.booleans())
+    def test_inside_a_disc(self, flat_disc, count, seed, closed):
+        """Nor do they separate a disc as long as they keep off its boundary."""
+        inner = interior_vertices(flat_disc)
+        chosen = np.random.default_rng(seed).choice(inner, count, replace=False)
+        points = locate_control_points(flat_disc, chosen, closed)
+        working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        assert_simple_loop(flat_disc, points, "given", working, loop, closed)
+        assert not working.on_boundary[loop.vertices].any()
+
+    @pytest.mark.parametrize("closed", [True, False])
+    def test_many_points(self, ball, closed):
+        """Twenty to and fro: laid one after the other the path was four times as long."""
+        chosen = np.random.default_rng(20).choice(len(ball.vertices), 20, replace=False)
+        points = locate_control_points(ball, chosen, closed)
+        working, loop = build_initial_loop(ball, points, "given", None, closed)
+        assert_simple_loop(ball, points, "given", working, loop, closed)
+        onward = np.roll(chosen, -1)
+        apart = np.linalg.norm(ball.vertices[chosen] - ball.vertices[onward], axis=1).sum()
+        along = working.vertices[loop.vertices]
+        assert np.linalg.norm(np.diff(along, axis=0), axis=1).sum() < 3.5 * apart
+
+
+class TestBoundary:
+    @settings(max_examples=15)
+    @given(count=st.integers(4, 8), seed=st.integers(0, 10**6), closed=st.booleans())
+    def test_an_order_along_the_rim_works_and_any_other_names_one(
+        self, flat_disc, count, seed, closed
+    ):
+        """Two legs between points of the rim cross exactly if their ends alternate round it."""
+        generator = np.random.default_rng(seed)
+        rim = boundary_loop(flat_disc)
+        places = np.sort(generator.choice(len(rim), count, replace=False))
+        order = generator.permutation(count)
+        points = locate_control_points(flat_disc, rim[places[order]], closed)
+        try:
+            working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        except nicmm.UnreachableError as error:
+            assert legs_alternate(order, closed)
+            named = re.search(r"in the order (\[[\d, ]*\]), which works", str(error))
+            assert named, error
+            works = json.loads(named.group(1))
+            points = locate_control_points(flat_disc, rim[places[order[works]]], closed)
+            working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        else:
+            assert not legs_alternate(order, closed)
+        assert_simple_loop(flat_disc, points, "given", working, loop, closed)
+        assert working.on_boundary[loop.vertices].sum() == count
+
+    @pytest.mark.parametrize("closed", [True, False])
+    @pytest.mark.parametrize("seed", range(3))
+    def test_points_inside_do_not_hinder_those_of_the_rim(self, flat_disc, seed, closed):
+        """Leg 0 cuts the disc, and all points inside have to be left on one side of it."""
+        rim = nearest_vertices(flat_disc, circle([0.0, np.pi]))
+        inner = np.setdiff1d(interior_vertices(flat_disc), flat_disc.faces[0])
+        chosen = np.random.default_rng(seed).choice(inner, 4, replace=False)
+        points = locate_control_points(flat_disc, [*rim, *chosen], closed)
+        working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        assert_simple_loop(flat_disc, points, "given", working, loop, closed)
+
+    def test_strip_one_triangle_wide(self):
+        """Every vertex is on the boundary, and there and back lead through the same triangles."""
+        x = np.repeat(np.arange(12.0), 2)
+        vertices = np.stack([x, np.tile([0.0, 1.0], 12), 0 * x], axis=1)
+        faces = [f for i in range(0, 22, 2) for f in ((i, i + 2, i + 1), (i + 1, i + 2, i + 3))]
+        strip = nicmm.Mesh(vertices, faces)
+        middle = np.array([[0.4, 0.5, 0], [5.4, 0.3, 0], [10.6, 0.5, 0], [5.6, 0.7, 0]])
+        points = locate_control_points(strip, middle[[0, 1, 2, 3]], closed=True)
+        working, loop = build_initial_loop(strip, points, "given")
+        assert_simple_loop(strip, points, "given", working, loop)
+        assert not working.on_boundary[loop.vertices].any()
+        corners = locate_control_points(strip, [0, 23, 1], closed=True)
+        working, loop = build_initial_loop(strip, corners, "given")
+        assert_simple_loop(strip, corners, "given", working, loop)
+        assert working.on_boundary[loop.vertices].sum() == 3
+
+    def test_triangle_through_its_corners(self):
+        """A face whose three edges are all boundary has to be split before any leg."""
+        mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        points = locate_control_points(mesh, [0, 1, 2], closed=True)
+        working, loop = build_initial_loop(mesh, points, "given")
+        assert_simple_loop(mesh, points, "given", working, loop)
+
+
+class TestNoManifold:
+    def test_spheres_that_touch_have_open_curves_only(self):
+        """A curve may pass the common vertex once."""
+        ball = shapes.sphere(1)
+        top = int(ball.vertices[:, 2].argmax())
+        other = ball.vertices * [1, 1, -1] + [0, 0, 2 * ball.vertices[top, 2]]
+        count = len(ball.vertices)
+        number = np.arange(count) + count
+        number[top] = top
+        both = np.concatenate([ball.vertices, other])
+        mesh = nicmm.Mesh(both, np.concatenate([ball.faces, number[ball.faces[:, ::-1]]]))
+        lowest = int(ball.vertices[:, 2].argmin())
+        points = locate_control_points(mesh, [lowest, lowest + count], closed=False)
+        working, loop = build_initial_loop(mesh, points, "given", None, False)
+        assert_simple_loop(mesh, points, "given", working, loop, closed=False)
+        chosen = [lowest, lowest + count, int(ball.vertices[:, 0].argmax())]
+        points = locate_control_points(mesh, chosen, closed=True)
+        with pytest.raises(nicmm.UnreachableError, match="no order was found"):
+            build_initial_loop(mesh, points, "given")
+
+    def test_a_path_leaves_an_edge_of_three_faces_alone(self):
+        """A fin stands on a sheet; points on either side of it are joined round its end."""
+        x, y = (c.ravel() for c in np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"))
+        corner = np.array([7 * i + j for i in range(6) for j in range(6)])
+        sheet = np.concatenate([corner[:, None] + [0, 7, 8], corner[:, None] + [0, 8, 1]])
+        fin = np.array([[22, 23, 49], [23, 24, 50], [49, 23, 50]])
+        vertices = np.concatenate([np.stack([x, y, 0 * x], axis=1), [[3, 1.5, 1], [3, 2.5, 1]]])
+        mesh = nicmm.Mesh(vertices, np.concatenate([sheet, fin]))
+        points = locate_control_points(mesh, [9, 37, 33], closed=True)
+        working, loop = build_initial_loop(mesh, points, "given")
+        assert_simple_loop(mesh, points, "given", working, loop)
+        assert not set(working.input_vertex[loop.vertices]) & {22, 23, 24}
+
+
+def test_a_path_that_winds_too_often_names_an_order(ball, monkeypatch):
+    monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
+    chosen = np.random.default_rng(0).choice(len(ball.vertices), 24, replace=False)
+    points = locate_control_points(ball, chosen, closed=True)
+    with pytest.raises(nicmm.UnreachableError, match=r"winds round itself too often.*which works"):
+        build_initial_loop(ball, points, "given")
+
+
+def boundary_loop(mesh):
+    """Vertices of a boundary in order; the mesh has only one, about the origin."""
+    rim = np.setdiff1d(mesh.faces, interior_vertices(mesh))
+    return rim[np.argsort(np.arctan2(mesh.vertices[rim, 1], mesh.vertices[rim, 0]))]
+
+
+def legs_alternate(order, closed):
+    """Whether any two legs of an order of places on a circle have ends that alternate."""
+    onward = np.roll(order, -1) if closed else order[1:]
+    pairs = [sorted(pair) for pair in zip(order.tolist(), onward.tolist(), strict=False)]
+    return any(first[0] < second[0] < first[1] < second[1] for first in pairs for second in pairs)
+
+
+def test_unknown_order_is_refused(small_ball):
+    points = locate_control_points(small_ball, [0, 5, 9], closed=True)
+    with pytest.raises(nicmm.ArgumentError, match="order is 'random'"):
+        build_initial_loop(small_ball, points, "random")
+
+
+def interior_vertices(mesh):
+    """Vertices off the boundary."""
+    sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    return np.setdiff1d(mesh.faces, edges[count == 1])

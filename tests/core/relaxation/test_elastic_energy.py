@@ -1,0 +1,311 @@
+"""The energy of a curve against closed forms, and its linearisation against differences."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.elastic_energy import (
+    Balance,
+    ElasticSystem,
+    balance,
+    bending_energy,
+    damped_step,
+    elastic_energy,
+    elastic_system,
+    feature_energy,
+)
+from nicmm_core.relaxation.exact_curve import sideways
+from tests.core.checks import circle, flipped, points_near, renumbered, scaled
+
+
+def surface_of(mesh, feature_map=None, weight=0.0):
+    return CurveSurface(mesh, unsigned_normals(mesh), feature_map, weight)
+
+
+def nodes_on(mesh, positions, closed=True, feature_map=None):
+    return nodes_at(surface_of(mesh, feature_map), points_near(mesh, positions), closed)
+
+
+def angles(count):
+    return np.arange(count) * 2 * np.pi / count
+
+
+def wobble(count, factor=1.0):
+    angle = angles(count)
+    radius = factor * (0.55 + 0.1 * np.sin(3 * angle) + 0.05 * np.cos(5 * angle))
+    return circle(angle) * radius[:, None]
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_a_circle_in_the_plane_has_its_own_energies(flat_disc, factor):
+    """∮ κ² ds = 2π / r and ∮ ds = 2π r, and without a map both terms weigh the same."""
+    errors = []
+    for count in (32, 128):
+        radius = 0.6 * factor
+        nodes = nodes_on(scaled(flat_disc, factor), circle(angles(count), radius))
+        errors.append(bending_energy(nodes) / (2 * np.pi / radius) - 1.0)
+        polygon = 2 * count * radius * np.sin(np.pi / count)
+        assert feature_energy(nodes) == pytest.approx(polygon, rel=1e-5)
+        weights = balance(surface_of(flat_disc), nodes, 1.0, apart=False)
+        assert weights.tension * feature_energy(nodes) == pytest.approx(
+            bending_energy(nodes), rel=1e-2
+        )
+    assert abs(errors[1]) < 1e-3
+    assert abs(errors[1]) < 0.1 * abs(errors[0])
+
+
+@pytest.mark.parametrize("latitude", [0.0, 0.4, -1.0])
+def test_a_parallel_of_the_sphere_bends_by_the_tangent_of_its_latitude(latitude):
+    """∮ κ_g² ds = tan² φ · 2π cos φ; the equator is a geodesic."""
+    mesh = shapes.sphere(4)
+    height = [0.0, 0.0, np.sin(latitude)]
+    nodes = nodes_on(mesh, circle(angles(60), np.cos(latitude)) + height)
+    expected = 2 * np.pi * np.cos(latitude) * np.tan(latitude) ** 2
+    assert bending_energy(nodes) == pytest.approx(expected, rel=0.02, abs=5e-3)
+    assert feature_energy(nodes) == pytest.approx(2 * np.pi * np.cos(latitude), rel=5e-3)
+
+
+def test_few_nodes_turn_in_the_tangent_plane():
+    """Three on a parallel: the angle there is that of the chords seen along the normal."""
+    mesh = shapes.sphere(4)
+    latitude = 0.5
+    height = [0.0, 0.0, np.sin(latitude)]
+    nodes = nodes_on(mesh, circle(angles(3), np.cos(latitude)) + height)
+    place = circle(angles(3), np.cos(latitude)) + height
+    before, after = place[0] - place[2], place[1] - place[0]
+    before, after = (v - (v @ place[0]) * place[0] for v in (before, after))
+    cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
+    side = np.sqrt(3.0) * np.cos(latitude)
+    assert bending_energy(nodes) == pytest.approx(3 * np.arccos(cosine) ** 2 / side, rel=0.02)
+
+
+def test_the_core_of_a_moebius_strip_bends_across_its_seam_as_elsewhere():
+    """κ_g = cos(u / 2), as rulings make that angle with the radius: π for one turn."""
+    core = nodes_on(shapes.moebius_strip(96, 7), circle(angles(96)))
+    assert bending_energy(core) == pytest.approx(np.pi, rel=0.01)
+
+
+def test_an_open_arc_bends_between_its_ends_only(flat_disc):
+    """Half a circle bends by π / r, and a straight line not at all."""
+    arc = nodes_on(flat_disc, circle(np.linspace(0, np.pi, 65), 0.6), closed=False)
+    assert bending_energy(arc) == pytest.approx(np.pi / 0.6 * 63 / 64, rel=2e-3)
+    assert feature_energy(arc) == pytest.approx(np.pi * 0.6, rel=1e-3)
+    x = np.linspace(-0.5, 0.6, 40)
+    line = nodes_on(flat_disc, np.stack([x, 0.3 * x, 0 * x], axis=1), closed=False)
+    assert bending_energy(line) == pytest.approx(0.0, abs=1e-6)
+    assert feature_energy(line) == pytest.approx(1.1 * np.hypot(1, 0.3), rel=1e-5)
+
+
+def test_the_map_weighs_length(flat_disc):
+    """∮ (2 + x)² ds round a circle about the origin is (4 + r²/2) 2π r."""
+    mapped = 2.0 + flat_disc.vertices[:, 0]
+    nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=mapped)
+    assert feature_energy(nodes) == pytest.approx(4.18 * 2 * np.pi * 0.6, rel=2e-3)
+
+
+@pytest.mark.parametrize("count", [20, 21, 22])
+def test_the_energy_has_no_first_node_and_no_direction(flat_disc, count):
+    weights = Balance(tension=3.0, contact=0.0)
+    points = wobble(count)
+    energies = [
+        elastic_energy(nodes_on(flat_disc, polygon), weights)
+        for polygon in (points, np.roll(points, 7, axis=0), points[::-1])
+    ]
+    assert energies == pytest.approx([energies[0]] * 3)
+
+
+def test_the_energy_does_not_depend_on_numbers_orientation_or_pose(body):
+    """Positive on a surface that bends, whichever way its faces are turned."""
+    turn = Rotation.from_rotvec([0.3, -1.0, 2.0])
+    posed = nicmm.Mesh(turn.apply(body.vertices.copy()), body.faces)
+    section = body.vertices[np.argsort(body.vertices[:, 0])[::30]]
+    weights = Balance(tension=3.0, contact=0.0)
+    energy = elastic_energy(nodes_on(body, section), weights)
+    assert elastic_energy(nodes_on(renumbered(body, 1), section), weights) == pytest.approx(energy)
+    assert elastic_energy(nodes_on(posed, turn.apply(section)), weights) == pytest.approx(energy)
+    other = nicmm.Mesh(body.vertices, body.faces[:, ::-1])
+    assert elastic_energy(nodes_on(other, section), weights) == pytest.approx(energy)
+
+
+def test_faces_turned_over_hardly_change_the_energy(ball):
+    loop = circle(angles(60), 0.9) + [0.0, 0.0, 0.436]
+    straight, turned = (bending_energy(nodes_on(mesh, loop)) for mesh in (ball, flipped(ball, 3)))
+    assert turned == pytest.approx(straight, rel=0.02)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_energies_scale_as_their_units_say(flat_disc, factor):
+    one, other = (nodes_on(scaled(flat_disc, f), wobble(50, f)) for f in (1.0, factor))
+    assert bending_energy(other) == pytest.approx(bending_energy(one) / factor)
+    assert feature_energy(other) == pytest.approx(feature_energy(one) * factor)
+    surface = surface_of(flat_disc)
+    weights = [balance(surface, nodes, 2.0, apart=True) for nodes in (one, other)]
+    assert weights[1].tension == pytest.approx(weights[0].tension / factor**2)
+    assert weights[1].contact == pytest.approx(weights[0].contact / factor)
+
+
+def test_smoothness_divides_the_tension(flat_disc):
+    nodes = nodes_on(flat_disc, wobble(40))
+    for surface in (surface_of(flat_disc), surface_of(flat_disc, np.ones(len(flat_disc.vertices)))):
+        whole, quarter = (balance(surface, nodes, s, apart=False).tension for s in (1.0, 4.0))
+        assert quarter == pytest.approx(whole / 4.0)
+
+
+def test_with_a_map_the_tension_is_that_of_the_surface(flat_disc):
+    surface = surface_of(flat_disc, np.ones(len(flat_disc.vertices)), 17.0)
+    assert balance(surface, nodes_on(flat_disc, wobble(40)), 1.0, apart=False).tension == 17.0
+
+
+def near_strands(count=60):
+    """A closed loop, long and narrow, whose two sides are less than a clearance apart."""
+    x = np.linspace(-0.6, 0.6, count)
+    side = np.stack([x, 0.004 * np.sin(9 * x), 0 * x], axis=1)
+    tip = np.array([[0.615, 0.0, 0.0]])
+    up = np.array([0.0, 0.014, 0.0])
+    return np.concatenate([side - up, tip, side[::-1] + up, -tip])
+
+
+CASES = {
+    "closed": (lambda: wobble(40), True, Balance(3.0, 0.0)),
+    "forty-one nodes": (lambda: wobble(41), True, Balance(3.0, 0.0)),
+    "forty-two nodes": (lambda: wobble(42), True, Balance(3.0, 0.0)),
+    "open": (lambda: wobble(40)[:30], False, Balance(3.0, 0.0)),
+    "bending only": (lambda: wobble(40), True, Balance(0.0, 0.0)),
+    "much tension": (lambda: wobble(40), True, Balance(300.0, 0.0)),
+    "strands apart": (near_strands, True, Balance(3.0, 5.0)),
+}
+
+
+@pytest.mark.parametrize(("points", "closed", "weights"), CASES.values(), ids=CASES.keys())
+@pytest.mark.parametrize("mapped", [False, True])
+def test_the_slope_is_half_the_derivative_by_moves_on_the_surface(points, closed, weights, mapped):
+    mesh = shapes.disc(7)
+    feature_map = 1.5 + mesh.vertices[:, 0] - 0.4 * mesh.vertices[:, 1] if mapped else None
+    surface = surface_of(mesh, feature_map, 1.0)
+    nodes = nodes_at(surface, points_near(mesh, points()), closed)
+    slope = elastic_system(surface, nodes, weights).slope
+    step = 1e-4 * nodes.lengths.mean()
+    expected = np.empty(len(slope))
+    for node in range(len(slope)):
+        move = np.zeros(len(slope))
+        move[node] = step
+        ahead, behind = (sideways(surface, nodes, sign * move)[0] for sign in (1.0, -1.0))
+        change = elastic_energy(ahead, weights) - elastic_energy(behind, weights)
+        expected[node] = 0.5 * change / (2.0 * step)
+    # The mean step, which contact compares with, knows of single nodes only at sharp tips.
+    compared = (np.abs(nodes.positions[:, 0]) < 0.55) | (weights.contact == 0.0)
+    scale = np.abs(expected[compared]).max()
+    np.testing.assert_allclose(slope[compared], expected[compared], rtol=0, atol=0.01 * scale)
+
+
+def test_on_a_sphere_the_slope_is_nearly_that_of_the_energy():
+    """Within what the mesh differs from the smooth surface that its normals belong to."""
+    mesh = shapes.sphere(4)
+    surface = surface_of(mesh)
+    angle = angles(60)
+    loop = circle(angle) + np.outer(0.3 + 0.1 * np.sin(3 * angle), [0.0, 0.0, 1.0])
+    nodes = nodes_at(surface, points_near(mesh, loop), True)
+    weights = Balance(1.0, 0.0)
+    slope = elastic_system(surface, nodes, weights).slope
+    step = 1e-4 * nodes.lengths.mean()
+    generator = np.random.default_rng(1)
+    for _ in range(5):
+        phase, waves = generator.uniform(0, 6), generator.integers(1, 6)
+        move = np.cos(waves * angle + phase)
+        ahead, behind = (sideways(surface, nodes, s * step * move)[0] for s in (1.0, -1.0))
+        change = elastic_energy(ahead, weights) - elastic_energy(behind, weights)
+        expected = 0.5 * change / (2.0 * step)
+        assert move @ slope == pytest.approx(expected, abs=0.05 * np.linalg.norm(slope))
+
+
+def dense(system):
+    """The matrix of the bands."""
+    n = system.bands.shape[1]
+    matrix = np.zeros((n, n))
+    for i in range(n):
+        matrix[i, i] += system.bands[0, i]
+        for offset in (1, 2):
+            j = (i + offset) % n
+            matrix[i, j] += system.bands[offset, i]
+            matrix[j, i] += system.bands[offset, i]
+    return matrix
+
+
+@pytest.mark.parametrize("count", [6, 7, 8, 41])
+@pytest.mark.parametrize("held", [(), (0,), (0, 1), (2, 5)])
+def test_a_step_solves_the_dense_system_of_the_free_nodes(count, held):
+    generator = np.random.default_rng(count)
+    jacobian = sum(
+        generator.normal(size=count)[:, None] * np.roll(np.eye(count), shift, axis=1)
+        for shift in (-1, 0, 1)
+    )
+    matrix = jacobian.T @ jacobian
+    index = np.arange(count)
+    bands = np.stack([matrix[index, (index + offset) % count] for offset in range(3)])
+    system = ElasticSystem(bands, generator.normal(size=count))
+    free = np.ones(count, dtype=bool)
+    free[list(held)] = False
+    step = damped_step(system, free, damping=0.01)
+    np.testing.assert_allclose(dense(system), matrix)
+    kept = matrix[np.ix_(free, free)]
+    kept = kept + 0.01 * np.diag(kept).max() * np.eye(free.sum())
+    np.testing.assert_array_equal(step[~free], 0.0)
+    np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_faces_turned_over_only_turn_the_moves_of_their_nodes(flat_disc, seed):
+    """Matrix and slope are the same but for the signs of nodes whose left is the other side."""
+    mesh = flipped(flat_disc, seed)
+    weights = Balance(3.0, 0.0)
+    here, there = nodes_on(flat_disc, wobble(41)), nodes_on(mesh, wobble(41))
+    one = elastic_system(surface_of(flat_disc), here, weights)
+    other = elastic_system(surface_of(mesh), there, weights)
+    side = there.normals[:, 2]
+    assert set(np.round(side)) == {-1.0, 1.0}
+    np.testing.assert_allclose(
+        dense(other), side[:, None] * dense(one) * side, rtol=0, atol=1e-3 * one.bands.max()
+    )
+    np.testing.assert_allclose(other.slope, side * one.slope, atol=1e-3 * np.abs(one.slope).max())
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_matrix_is_positive_and_more_damping_takes_shorter_steps(flat_disc, closed):
+    surface = surface_of(flat_disc)
+    nodes = nodes_on(flat_disc, wobble(40), closed)
+    system = elastic_system(surface, nodes, Balance(3.0, 0.0))
+    assert np.linalg.eigvalsh(dense(system)).min() > -1e-9 * system.bands[0].max()
+    free = np.arange(40) % 13 > 0
+    lengths = [np.linalg.norm(damped_step(system, free, d)) for d in (1e-8, 1e-4, 1e-2, 1.0)]
+    assert lengths == sorted(lengths, reverse=True)
+
+
+def test_a_step_lowers_the_energy_to_second_order(flat_disc):
+    """Of a curve near rest: an arc in the plane, its ends held, pulled straight at once."""
+    surface = surface_of(flat_disc)
+    x = np.linspace(-0.5, 0.5, 40)
+    nodes = nodes_on(flat_disc, np.stack([x, 0.02 * np.cos(np.pi * x), 0 * x], axis=1), False)
+    weights = Balance(1.0, 0.0)
+    free = np.ones(40, dtype=bool)
+    free[[0, -1]] = False
+    step = damped_step(elastic_system(surface, nodes, weights), free, 1e-10)
+    moved, _ = sideways(surface, nodes, step)
+    excess = [elastic_energy(n, weights) - 1.0 for n in (nodes, moved)]
+    assert excess[0] > 1e-3
+    assert excess[1] < 0.01 * excess[0]
+    np.testing.assert_allclose(moved.positions[:, 1], 0.0, atol=1e-3)
+
+
+def test_touching_strands_raise_the_energy_by_the_share_that_contact_has(flat_disc):
+    nodes = nodes_on(flat_disc, near_strands())
+    weights = balance(surface_of(flat_disc), nodes, 1.0, apart=True)
+    without = elastic_energy(nodes, Balance(weights.tension, 0.0))
+    assert weights.contact > 0.0
+    assert elastic_energy(nodes, weights) > 2.0 * without
+    free = nodes_on(flat_disc, circle(angles(60), 0.6))
+    assert elastic_energy(free, Balance(2.0, weights.contact)) == elastic_energy(
+        free, Balance(2.0, 0.0)
+    )

@@ -1,0 +1,269 @@
+"""Polylines with nodes: they stay on the mesh, in order, through their points, and simple."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.exact_curve import (
+    drawn,
+    exact_curve,
+    in_faces,
+    is_simple,
+    redrawn,
+    respaced,
+    sideways,
+)
+from nicmm_core.surface_points import SurfacePoints
+from tests.core.checks import (
+    assert_lies_on_surface,
+    assert_valid_curve,
+    assert_visits,
+    circle,
+    curve_through,
+    flipped,
+    grid,
+    scaled,
+)
+
+ANGLES = np.arange(40) * 2 * np.pi / 40
+CONTROLS = [5, 14, 29]
+
+
+def surface_of(mesh):
+    return CurveSurface(mesh, unsigned_normals(mesh))
+
+
+def ring_on(mesh, closed=True, radius=0.6):
+    return curve_through(mesh, circle(ANGLES, radius), CONTROLS if closed else [0, 9, 39], closed)
+
+
+def distance_to(points, polyline, closed):
+    """Greatest distance of points to a polyline."""
+    end = np.roll(polyline, -1, axis=0)[None] if closed else polyline[None, 1:]
+    start = polyline[None] if closed else polyline[None, :-1]
+    step, offset = end - start, points[:, None] - start
+    squared = np.maximum((step**2).sum(axis=2), 1e-300)
+    along = np.clip((offset * step).sum(axis=2) / squared, 0.0, 1.0)
+    return np.linalg.norm(offset - along[:, :, None] * step, axis=2).min(axis=1).max()
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("count", [10, 64, 300])
+def test_nodes_are_points_of_the_same_curve_at_equal_distances_on_each_leg(ball, closed, count):
+    curve = ring_on(ball, closed, radius=1.0)
+    exact = exact_curve(surface_of(ball), curve, count)
+    result = exact.surface_curve(ball)
+    assert_valid_curve(ball, result, curve.points[curve.control_index], closed)
+    assert result.length == pytest.approx(curve.length, rel=1e-5)
+    assert distance_to(result.points, curve.points, closed) < 1e-5
+    np.testing.assert_array_equal(result.points[exact.node_place], exact.nodes.positions)
+    assert (np.diff(exact.node_place) > 0).all()
+    n = len(exact.nodes.positions)
+    assert n == pytest.approx(count, abs=3) or count < 18
+    bounds = [*exact.control_nodes, n] if closed else exact.control_nodes
+    place = np.append(exact.node_place, len(result.points))
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(result.steps, axis=1))])
+    arc = arc if closed else np.append(arc, arc[-1])
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        assert last - first >= 6
+        lengths = np.diff(arc[place[first : last + 1]])
+        np.testing.assert_allclose(lengths, lengths.mean(), rtol=1e-3)
+
+
+def test_the_first_control_point_is_the_first_node(ball):
+    curve = ring_on(ball)
+    exact = exact_curve(surface_of(ball), curve, 50)
+    assert exact.control_nodes[0] == exact.node_place[0] == 0
+    np.testing.assert_array_equal(
+        exact.nodes.positions[exact.control_nodes], curve.points[curve.control_index]
+    )
+
+
+def test_control_points_at_vertices_are_there_once(ball):
+    curve = nicmm.design_curve(ball, [12, 80, 41], method="variational").curves[0]
+    exact = exact_curve(surface_of(ball), curve, 64)
+    assert_valid_curve(ball, exact.surface_curve(ball), ball.vertices[[12, 80, 41]])
+    again = respaced(surface_of(ball), exact, 100)
+    assert_valid_curve(ball, again.surface_curve(ball), ball.vertices[[12, 80, 41]])
+
+
+def test_nodes_exactly_at_points_of_edges_keep_the_order():
+    """Sides of a square in a grid, whose edges they cross just where nodes are to be."""
+    mesh = grid(8)
+    low, high = 0.203125, 0.703125
+    corners = np.array([[low, 0.1875], [high, 0.1875], [high, 0.6875], [low, 0.6875]])
+    curve = curve_through(mesh, np.pad(corners, ((0, 0), (0, 1))), np.arange(4))
+    # Inside a face, on its diagonal, at whole coordinates and so on: no rounding anywhere.
+    for count in (32, 64, 128, 256):
+        result = exact_curve(surface_of(mesh), curve, count).surface_curve(mesh)
+        assert_valid_curve(mesh, result, curve.points[curve.control_index])
+        assert result.length == pytest.approx(2.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("counts", [(64, 64), (64, 256), (256, 64), (40, 41)])
+def test_spacing_nodes_anew_leaves_the_curve_where_it_is(ring, counts):
+    angle = ANGLES
+    place = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3 * angle)], axis=1)
+    place[:, :2] *= 1.3
+    curve = curve_through(ring, place, CONTROLS)
+    surface = surface_of(ring)
+    first = exact_curve(surface, curve, counts[0])
+    again = respaced(surface, first, counts[1]).surface_curve(ring)
+    assert_valid_curve(ring, again, curve.points[curve.control_index])
+    assert again.length == pytest.approx(curve.length, rel=1e-5)
+    assert distance_to(again.points, curve.points, True) < 1e-5
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
+    mesh = scaled(flat_disc, factor)
+    surface = surface_of(mesh)
+    curve = curve_through(mesh, circle(ANGLES, 0.6 * factor), CONTROLS)
+    nodes = exact_curve(surface, curve, 60).nodes
+    step = np.full(len(nodes.positions), 0.1 * factor)
+    step[::7] = 0.0
+    moved, blocked = sideways(surface, nodes, step)
+    assert not blocked.any()
+    before, after = (np.linalg.norm(n.positions, axis=1) for n in (nodes, moved))
+    np.testing.assert_allclose(before - after, step, atol=5e-3 * factor)
+    np.testing.assert_array_equal(moved.positions[::7], nodes.positions[::7])
+    outwards, blocked = sideways(surface, nodes, -7.0 * step)
+    np.testing.assert_array_equal(blocked, step > 0.0)
+    assert np.linalg.norm(outwards.positions, axis=1).max() < factor
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("seed", [None, 3])
+def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed):
+    """Round a section of the body, every node moved a little to its own side."""
+    mesh = body if seed is None else flipped(body, seed)
+    surface = surface_of(mesh)
+    exact = exact_curve(surface, section(mesh, closed), 80)
+    step = 0.02 * np.sin(np.arange(len(exact.nodes.positions)))
+    step[exact.control_nodes] = 0.0
+    nodes, _ = sideways(surface, exact.nodes, step)
+    new = drawn(surface, exact, nodes)
+    result = new.surface_curve(mesh)
+    assert_lies_on_surface(mesh, result)
+    assert_visits(mesh, result, exact.nodes.positions[exact.control_nodes])
+    np.testing.assert_array_equal(result.points[new.node_place], nodes.positions)
+    assert new.node_place[0] == 0 and (np.diff(new.node_place) > 0).all()
+    if not closed:
+        assert new.node_place[-1] == len(result.points) - 1
+
+
+def section(mesh, closed=True):
+    """A level set of a coordinate, as a design finds it."""
+    x = mesh.vertices[:, 0]
+    points = [int(np.argmin(np.abs(x - x.mean()) + 10 * side)) for side in sides(mesh)]
+    design = nicmm.design_curve(mesh, points, closed=closed, order="shortest", method="variational")
+    return design.curves[0]
+
+
+def sides(mesh):
+    """Where vertices do not lie on each of three sides."""
+    y = mesh.vertices[:, 1:] - mesh.vertices[:, 1:].mean(axis=0)
+    angle = np.arctan2(y[:, 1], y[:, 0])
+    return [np.abs(np.angle(np.exp(1j * (angle - k * 2 * np.pi / 3)))) for k in range(3)]
+
+
+def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
+    surface = surface_of(ball)
+    exact = exact_curve(surface, ring_on(ball, radius=1.0), 100)
+    again = drawn(surface, exact, exact.nodes)
+    assert_valid_curve(ball, again.surface_curve(ball))
+    length = exact.surface_curve(ball).length
+    assert again.surface_curve(ball).length == pytest.approx(length, rel=1e-3)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10_000))
+def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_disc, seed):
+    """Random moves of up to half the radius, where ways cross one another everywhere."""
+    generator = np.random.default_rng(seed)
+    surface = surface_of(flat_disc)
+    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    n = len(exact.nodes.positions)
+    controls = exact.nodes.positions[exact.control_nodes]
+    for size in (0.02, 0.1, 0.3):
+        step = generator.normal(scale=size, size=n)
+        step[exact.control_nodes] = 0.0
+        nodes, _ = sideways(surface, exact.nodes, step)
+        new, stays = redrawn(surface, exact, nodes, simple=True)
+        assert is_simple(surface, new)
+        result = new.surface_curve(flat_disc)
+        assert_valid_curve(flat_disc, result, controls)
+        expected = np.where(stays[:, None], exact.nodes.positions, nodes.positions)
+        np.testing.assert_allclose(new.nodes.positions, expected, atol=1e-15)
+        np.testing.assert_allclose(result.points[new.node_place], expected, atol=1e-15)
+        exact = new
+
+
+def test_moves_that_cross_nothing_are_all_made(flat_disc):
+    surface = surface_of(flat_disc)
+    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    step = np.full(len(exact.nodes.positions), 0.02)
+    step[exact.control_nodes] = 0.0
+    nodes, _ = sideways(surface, exact.nodes, step)
+    new, stays = redrawn(surface, exact, nodes, simple=True)
+    assert not stays.any()
+    np.testing.assert_array_equal(new.nodes.positions, nodes.positions)
+
+
+def test_only_the_nodes_that_would_cross_stay(flat_disc):
+    """Far from the crossing nodes do move."""
+    surface = surface_of(flat_disc)
+    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    here = exact.nodes.positions
+    step = np.full(len(here), 0.02)
+    step[here[:, 0] > 0.5] = 1.19  # over to the other side
+    step[exact.control_nodes] = 0.0
+    nodes, _ = sideways(surface, exact.nodes, step)
+    assert not is_simple(surface, drawn(surface, exact, nodes))
+    crossing, nobody = redrawn(surface, exact, nodes, simple=False)
+    assert not nobody.any() and not is_simple(surface, crossing)
+    simple, stays = redrawn(surface, exact, nodes, simple=True)
+    assert is_simple(surface, simple)
+    assert stays.any() and not stays[np.abs(here[:, 1]) > 0.5].any()
+
+
+def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
+    """On both sides of a hole in the disc."""
+    mesh = shapes.annulus(12, 0.4)
+    surface = surface_of(mesh)
+    exact = exact_curve(surface, ring_on(mesh), 60)
+    n = len(exact.nodes.positions)
+    chosen = SurfacePoints(exact.nodes.places.faces.copy(), exact.nodes.places.barycentric.copy())
+    node = int(np.setdiff1d(np.arange(n), exact.control_nodes)[20])
+    far = (node + n // 2) % n
+    chosen.faces[node], chosen.barycentric[node] = chosen.faces[far], chosen.barycentric[far]
+    nodes = nodes_at(surface, chosen, True)
+    assert drawn(surface, exact, nodes) is None
+    kept, stays = redrawn(surface, exact, nodes, simple=False)
+    assert stays[node]
+    np.testing.assert_array_equal(kept.nodes.positions[node], exact.nodes.positions[node])
+    assert_valid_curve(mesh, kept.surface_curve(mesh), kept.nodes.positions[kept.control_nodes])
+
+
+def test_a_curve_that_crosses_itself_is_not_simple(flat_disc):
+    eight = np.stack([0.6 * np.sin(ANGLES), 0.4 * np.sin(2 * ANGLES), 0 * ANGLES], axis=1)
+    surface = surface_of(flat_disc)
+    assert not is_simple(surface, exact_curve(surface, curve_through(flat_disc, eight, [0]), 60))
+    assert is_simple(surface, exact_curve(surface, ring_on(flat_disc), 60))
+
+
+def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
+    """Whatever the order of the corners there."""
+    mesh = flipped(ball, 2)
+    face = np.arange(len(mesh.faces))
+    for side in range(3):
+        weights = np.tile([0.3, 0.3, 0.3], (len(face), 1))
+        weights[:, (side + 1) % 3], weights[:, side] = 0.7, 0.0
+        points = SurfacePoints(face, weights)
+        beyond = in_faces(mesh, points, mesh.face_neighbours[:, side])
+        np.testing.assert_allclose(beyond.positions(mesh), points.positions(mesh), atol=1e-15)
+        np.testing.assert_array_equal(beyond.faces, mesh.face_neighbours[:, side])

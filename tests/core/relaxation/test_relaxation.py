@@ -1,0 +1,370 @@
+"""Curves come to rest: at known shapes, simple, through their points, and never worse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.crossings import crossing_segments
+from nicmm_core.curve import geodesic_curvature, resample
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.elastic_energy import bending_energy, feature_energy
+from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
+from nicmm_core.surface_points import SurfacePoints
+from tests.core.checks import (
+    apart,
+    assert_valid_curve,
+    circle,
+    curve_through,
+    flipped,
+    grid,
+    points_near,
+    renumbered,
+    scaled,
+)
+
+ANGLES = np.arange(60) * 2 * np.pi / 60
+CONTROLS = np.arange(0, 60, 12)
+DEFAULT = RelaxationConfig()
+
+
+def relaxed(mesh, curve, smoothness=1.0, config=DEFAULT, watch=None, feature=None, weight=0.0):
+    """A relaxed curve, which is valid whatever else is asked of it."""
+    surface = CurveSurface(mesh, unsigned_normals(mesh), feature, weight)
+    result = relax(surface, curve, smoothness, config, watch)
+    controls = curve.points[curve.control_index]
+    assert_valid_curve(mesh, result.curve, controls, curve.closed)
+    kept = result.curve.points[result.curve.control_index]
+    np.testing.assert_allclose(kept, controls, rtol=0, atol=1e-15 * np.abs(mesh.vertices).max())
+    return result
+
+
+def wave_on_equator(mesh, waves=5, height=0.25):
+    """A wavy loop on the sphere that passes the equator at its control points."""
+    points = circle(ANGLES)
+    points[:, 2] = height * np.sin(waves * ANGLES) * np.abs(np.sin(waves * ANGLES / 2))
+    points[CONTROLS, 2] = 1e-3
+    return curve_through(mesh, points, CONTROLS)
+
+
+def star(mesh, factor=1.0, wave=0.2, controls=CONTROLS):
+    """A loop in the plane that swings about the circle on which its control points lie."""
+    radius = 0.6 * factor * (1.0 + wave * np.sin(7 * ANGLES))
+    radius[controls] = 0.6 * factor
+    return curve_through(mesh, circle(ANGLES) * radius[:, None], controls)
+
+
+def bow(mesh):
+    """A simple loop whose points lie so that straight legs between them would cross."""
+    corners = [(-0.5, -0.3), (0.5, 0.3), (0.5, -0.3), (0.1, -0.6), (-0.6, -0.6), (-0.75, 0.0)]
+    corners = np.array([*corners, (-0.5, 0.3), (-0.6, 0.0)])
+    line = np.concatenate([corners, corners[:1]])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = np.unique(np.concatenate([arc[:-1], np.linspace(0.0, arc[-1], 60, endpoint=False)]))
+    flat = np.stack([np.interp(at, arc, line[:, axis]) for axis in (0, 1)] + [0 * at], axis=1)
+    return curve_through(mesh, flat, np.searchsorted(at, arc[[0, 1, 2, 6]]))
+
+
+def straight_bow(mesh):
+    """The same points joined by straight legs: an eight."""
+    return curve_through(mesh, bow(mesh).points[bow(mesh).control_index], np.arange(4))
+
+
+def measured(curve, normals):
+    """∮ κ_g² ds from evenly spaced points, which the relaxation does not know of."""
+    points, segment = resample(curve.points, 200, curve.closed)
+    curvature = geodesic_curvature(points, normals(points), curve.closed)
+    return (curvature**2).sum() * curve.length / 200
+
+
+def upwards(points):
+    return np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+
+def outwards(points):
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def potential(bending, length, smoothness=1.0):
+    """What steps with the tension (2π / L)² / smoothness lower, as d(1 / L) = -dL / L²."""
+    return bending - (2.0 * np.pi) ** 2 / (smoothness * length)
+
+
+def test_through_points_of_a_great_circle_it_is_that_circle(ball):
+    start = wave_on_equator(ball)
+    result = relaxed(ball, start)
+    assert result.stopped == "converged"
+    assert start.length > 1.1 * 2 * np.pi
+    assert result.curve.length == pytest.approx(2 * np.pi, rel=5e-3)
+    assert np.abs(result.curve.points[:, 2]).max() < 5e-3
+    assert result.bending < 1e-3
+    assert measured(result.curve, outwards) < 0.02 * measured(start, outwards)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_through_points_of_a_circle_it_bends_hardly_more_than_the_circle(flat_disc, factor):
+    """Closed elasticae of minimal bending with the length of a circle are circles."""
+    mesh = scaled(flat_disc, factor)
+    result = relaxed(mesh, star(mesh, factor))
+    assert result.stopped == "converged"
+    radius = 0.6 * factor
+    best = potential(2 * np.pi / radius, 2 * np.pi * radius)
+    assert potential(result.bending, result.feature) < best + 0.01 / radius
+    assert result.bending * radius == pytest.approx(2 * np.pi, rel=0.01)
+    distance = np.linalg.norm(result.curve.points, axis=1)
+    np.testing.assert_allclose(distance, radius, rtol=0.01)
+    assert measured(result.curve, upwards) == pytest.approx(result.bending, rel=0.02)
+
+
+def test_what_it_reports_is_that_of_its_curve(flat_disc):
+    """Without a map ∮ φ_fea² ds is the length."""
+    result = relaxed(flat_disc, star(flat_disc, controls=[0, 13, 22, 41]))
+    assert result.feature == pytest.approx(result.curve.length, rel=2e-3)
+    assert measured(result.curve, upwards) == pytest.approx(result.bending, rel=0.05)
+
+
+def test_size_and_pose_of_the_mesh_do_not_matter(flat_disc):
+    turn = Rotation.from_rotvec([0.3, 1.1, -0.5])
+    posed = nicmm.Mesh(1e3 * turn.apply(flat_disc.vertices.copy()), flat_disc.faces)
+    controls = [0, 13, 22, 41]
+    start = star(flat_disc, controls=controls)
+    moved = replace(start, points=SurfacePoints(start.faces, start.barycentric).positions(posed))
+    here, there = relaxed(flat_disc, start), relaxed(posed, moved)
+    assert there.iterations == here.iterations
+    back = turn.inv().apply(there.curve.points) / 1e3
+    assert apart(here.curve.points, back) < 1e-4
+    assert there.bending == pytest.approx(here.bending / 1e3, rel=1e-3)
+
+
+@pytest.mark.parametrize("change", [flipped, renumbered])
+def test_in_the_plane_neither_numbers_nor_orientation_of_faces_matter(flat_disc, change):
+    other = change(flat_disc, 3)
+    controls = [0, 13, 22, 41]
+    here, there = (relaxed(mesh, star(mesh, controls=controls)) for mesh in (flat_disc, other))
+    assert there.curve.length == pytest.approx(here.curve.length, rel=1e-4)
+    assert apart(here.curve.points, there.curve.points) < 1e-3
+
+
+def test_on_a_sphere_with_faces_turned_over_it_is_the_same_curve(ball):
+    angle = ANGLES
+    loop = circle(angle, 0.9) + np.outer(0.4 + 0.1 * np.sin(3 * angle), [0.0, 0.0, 1.0])
+    here, there = (
+        relaxed(mesh, curve_through(mesh, loop, [0, 17, 40])) for mesh in (ball, flipped(ball, 2))
+    )
+    assert apart(here.curve.points, there.curve.points) < 0.01
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_on_a_moebius_strip_a_loop_comes_to_rest_across_the_seam(seed):
+    """Beside its core, which bends by π, and at the same place if other faces are turned over."""
+    strip = shapes.moebius_strip(96, 7)
+    swing = 0.2 * np.sin(2.5 * ANGLES) * np.abs(np.sin(2.5 * ANGLES))
+    radius = 1.0 + swing * np.cos(0.5 * ANGLES)
+    loop = circle(ANGLES) * radius[:, None]
+    loop[:, 2] = swing * np.sin(0.5 * ANGLES)
+    here, there = (
+        relaxed(mesh, curve_through(mesh, loop, CONTROLS)) for mesh in (strip, flipped(strip, seed))
+    )
+    assert here.stopped == there.stopped == "converged"
+    assert potential(here.bending, here.feature) < potential(np.pi, 2 * np.pi) + 0.01
+    assert apart(here.curve.points, circle(np.arange(400) * 2 * np.pi / 400)) < 0.03
+    assert apart(here.curve.points, there.curve.points) < 5e-3
+
+
+def test_an_open_curve_between_two_points_is_straight(flat_disc):
+    """Natural ends: nothing bends, whatever the start."""
+    x = np.linspace(-0.5, 0.6, 30)
+    start = curve_through(flat_disc, np.stack([x, 0.3 * np.cos(3 * x), 0 * x], 1), [0, 29], False)
+    result = relaxed(flat_disc, start)
+    ends = start.points[[0, -1]]
+    assert result.bending < 1e-3
+    assert result.curve.length == pytest.approx(np.linalg.norm(ends[1] - ends[0]), rel=1e-4)
+
+
+def test_an_open_curve_through_three_points_ends_without_curvature(flat_disc):
+    """An elastica under tension: curvature falls from the middle point to none at both ends."""
+    corners = np.array([[-0.6, -0.2], [-0.3, 0.05], [0.0, 0.3], [0.3, 0.05], [0.6, -0.2]])
+    start = curve_through(flat_disc, np.pad(corners, ((0, 0), (0, 1))), [0, 2, 4], False)
+    result = relaxed(flat_disc, start)
+    points, _ = resample(result.curve.points, 81, closed=False)
+    curvature = np.abs(geodesic_curvature(points, upwards(points), closed=False))
+    assert curvature[[2, -3]].max() < 0.1 * curvature[38:43].max()
+    assert curvature[38:43].max() < 2.0 * curvature[30]
+
+
+def test_legs_along_edges_and_through_vertices_are_no_trouble():
+    """A square whose corners are vertices of a grid."""
+    mesh = grid(8)
+    square = 0.25 + 0.5 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    vertices = [int(np.argmin(np.linalg.norm(mesh.vertices[:, :2] - c, axis=1))) for c in square]
+    design = nicmm.design_curve(mesh, vertices, method="variational")
+    result = relaxed(mesh, design.curves[0])
+    radius = np.linalg.norm(result.curve.points[:, :2] - 0.5, axis=1)
+    np.testing.assert_allclose(radius, np.sqrt(0.125), rtol=0.02)
+
+
+def states(mesh, curve, config=DEFAULT, smoothness=1.0):
+    """The nodes after every iteration."""
+    seen = []
+
+    def watch(done, state):
+        seen.append((done, state))
+        return True
+
+    return relaxed(mesh, curve, smoothness, config, watch), seen
+
+
+@pytest.mark.parametrize("smoothness", [0.3, 1.0, 5.0])
+def test_the_energy_never_rises(flat_disc, smoothness):
+    """Without spacing nodes anew, which moves the places where they sample the curve."""
+    config = RelaxationConfig(levels=(128,), stretch=np.inf)
+    _, seen = states(flat_disc, star(flat_disc), config, smoothness)
+    surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
+    values = []
+    for _, positions in seen:
+        nodes = nodes_at(surface, points_near(flat_disc, positions), closed=True)
+        values.append(potential(bending_energy(nodes), feature_energy(nodes), smoothness))
+    assert len(values) > 3
+    assert (np.diff(values) <= 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_from_any_start_it_ends_better(ball, seed):
+    """Random loops round the sphere, measured by the polyline and not by nodes."""
+    generator = np.random.default_rng(seed)
+    a, b = generator.normal(scale=0.12, size=(2, 5, 1))
+    wave = np.arange(2, 7)[:, None] * ANGLES
+    height = (a * np.cos(wave) + b * np.sin(wave)).sum(axis=0)
+    start = curve_through(ball, circle(ANGLES) + np.outer(height, [0, 0, 1]), CONTROLS[::2])
+    result = relaxed(ball, start)
+    before, after = (
+        potential(measured(curve, outwards), curve.length) for curve in (start, result.curve)
+    )
+    assert after < before
+
+
+def test_more_smoothness_gives_no_more_bending_and_no_shorter_curve(flat_disc):
+    start = star(flat_disc, controls=[0, 13, 22, 41])
+    results = [relaxed(flat_disc, start, smoothness=s) for s in (0.05, 0.3, 1.0, 5.0)]
+    bending = [result.bending for result in results]
+    lengths = [result.curve.length for result in results]
+    assert bending == sorted(bending, reverse=True)
+    assert lengths == sorted(lengths)
+    assert bending[0] > 1.2 * bending[-1]
+
+
+def test_obstacles_are_avoided(flat_disc):
+    """A hill on one side of the straight way: the curve leaves it and ∮ φ_fea² ds falls."""
+    hill = 1.0 + 4.0 * np.exp(-np.sum((flat_disc.vertices[:, :2] - [0, -0.05]) ** 2, 1) / 0.02)
+    x = np.linspace(-0.6, 0.6, 30)
+    start = curve_through(flat_disc, np.stack([x, 0.01 + 0 * x, 0 * x], axis=1), [0, 29], False)
+    aside = relaxed(flat_disc, start, feature=hill, weight=30.0)
+    straight = relaxed(flat_disc, start, feature=hill, weight=1e-6)
+    assert aside.feature < 0.6 * straight.feature
+    assert aside.curve.points[:, 1].max() > 0.15
+    assert aside.curve.length > straight.curve.length
+    assert np.abs(straight.curve.points[:, 1]).max() < 0.02
+
+
+def test_a_flat_map_is_a_tension(flat_disc):
+    """φ_fea = 2 with weight w is tension 4 w: as stiff a string makes the same curve."""
+    start = star(flat_disc, controls=[0, 13, 22, 41])
+    flat = np.ones(len(flat_disc.vertices))
+    one = relaxed(flat_disc, start, feature=2.0 * flat, weight=5.0)
+    other = relaxed(flat_disc, start, feature=flat, weight=20.0)
+    assert apart(one.curve.points, other.curve.points) < 2e-3
+    assert one.feature == pytest.approx(4.0 * other.feature, rel=1e-3)
+
+
+def test_strands_that_would_cross_stay_apart(flat_disc):
+    """The eight through these points would bend less, but crosses itself."""
+    start = bow(flat_disc)
+    polyline = straight_bow(flat_disc)
+    pairs = crossing_segments(
+        flat_disc, SurfacePoints(polyline.faces, polyline.barycentric), closed=True
+    )
+    assert len(pairs) > 0
+    result, seen = states(flat_disc, start)
+    assert result.stopped == "converged"
+    assert measured(result.curve, upwards) < 0.5 * measured(start, upwards)
+    points, _ = resample(result.curve.points, 300)
+    gap = np.linalg.norm(points[:, None] - points, axis=2)
+    along = np.abs(np.arange(300)[:, None] - np.arange(300))
+    along = np.minimum(along, 300 - along)
+    # Two mean steps of the last level, less what a push of finite strength gives way.
+    assert gap[along > 25].min() > result.curve.length / 512
+
+
+@pytest.mark.parametrize("after", [0, 3, 20])
+def test_a_cancelled_relaxation_gives_a_valid_curve(flat_disc, after):
+    """Also in the midst of strands that pass through each other."""
+    for start in (star(flat_disc), bow(flat_disc)):
+        calls = []
+
+        def watch(done, state, calls=calls):
+            calls.append(done)
+            return len(calls) <= after
+
+        result = relaxed(flat_disc, start, watch=watch)
+        if len(calls) > after:
+            assert result.stopped == "cancelled"
+            assert len(calls) == after + 1
+        else:
+            assert result.stopped == "converged"
+        assert all(0.0 <= done <= 1.0 for done in calls)
+
+
+@pytest.mark.parametrize("cap", [1, 4])
+def test_the_cap_is_kept(flat_disc, cap):
+    config = RelaxationConfig(iterations=cap)
+    result, seen = states(flat_disc, star(flat_disc), config)
+    assert result.stopped == "cap"
+    assert result.iterations == cap
+    assert len(seen) <= cap
+    # Two attempts where strands cross: one that may, one that may not.
+    assert relaxed(flat_disc, bow(flat_disc), config=config).iterations <= 2 * cap
+
+
+def test_a_coil_round_a_thin_ring_stays_on_it():
+    """Few nodes are too far apart for straight ways round the tube; more take over."""
+    thin = shapes.torus(major=1.0, minor=0.05, around=96, across=8)
+    angle = np.arange(600) * 2 * np.pi / 600
+    radius = 1 + 0.05 * np.cos(40 * angle)
+    coil = circle(angle) * radius[:, None]
+    coil[:, 2] = 0.05 * np.sin(40 * angle)
+    result = relaxed(thin, curve_through(thin, coil, [0, 150, 340]))
+    assert turns(result.curve.points) == 40
+
+
+def turns(points):
+    """How often a closed polyline goes round the tube of a torus with radius 1."""
+    tube = np.arctan2(points[:, 2], np.linalg.norm(points[:, :2], axis=1) - 1.0)
+    change = np.angle(np.exp(1j * (np.roll(tube, -1) - tube)))
+    return round(change.sum() / (2 * np.pi))
+
+
+def test_more_levels_end_at_the_same_curve(flat_disc):
+    start = star(flat_disc, controls=[0, 13, 22, 41])
+    coarse, fine = (
+        relaxed(flat_disc, start, config=RelaxationConfig(levels=levels))
+        for levels in ((64, 128), (64, 128, 256, 512))
+    )
+    assert apart(coarse.curve.points, fine.curve.points) < 0.01
+    assert coarse.bending == pytest.approx(fine.bending, rel=0.02)
+
+
+def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
+    """Exactly, each as it was given."""
+    near = points_near(ball, [[0.2, 0.1, 1.0]])
+    face, other = near.faces[0], np.argmin(ball.vertices[ball.faces].mean(axis=1)[:, 2])
+    points = nicmm.SurfacePoints(
+        np.array([face, other, 77]), np.array([[1.0, 0, 0], [0.5, 0.5, 0], [0.2, 0.3, 0.5]])
+    )
+    design = nicmm.design_curve(ball, points, method="variational")
+    result = relaxed(ball, design.curves[0])
+    np.testing.assert_allclose(
+        result.curve.points[result.curve.control_index], points.positions(ball), atol=1e-15
+    )

@@ -1,0 +1,123 @@
+"""Contacts of strands against closed forms and differences."""
+
+import numpy as np
+import pytest
+
+from nicmm_core import shapes
+from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes, nodes_at, unsigned_normals
+from nicmm_core.relaxation.strand_contact import CLEARANCE, contact_residuals
+from tests.core.checks import circle, points_near, scaled
+
+STEP = 0.02
+
+
+def lanes(mesh, gap, factor=1.0, closed=False):
+    """There along y = 0 and back along y = gap, thirty nodes each way and a bow between."""
+    x = STEP * np.arange(-15, 16)
+    bow = 2.0 * STEP * np.arange(1, 8)
+    there = np.stack([x, 0 * x], axis=1)
+    out = np.stack([x[-1] + bow, 0 * bow], axis=1)
+    up = np.stack([np.full(3, out[-1, 0]), gap * np.array([0.25, 0.5, 0.75])], axis=1)
+    back = np.stack([out[::-1, 0], np.full(7, gap)], axis=1)
+    points = np.concatenate([there, out, up, back, there[::-1] + [0.0, gap]])
+    surface = CurveSurface(mesh, unsigned_normals(mesh))
+    return nodes_at(surface, points_near(mesh, factor * np.pad(points, ((0, 0), (0, 1)))), closed)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_the_overlap_of_two_lanes_is_what_lacks_of_the_clearance(flat_disc, factor):
+    mesh = scaled(flat_disc, factor)
+    nodes = lanes(mesh, STEP, factor)
+    contacts = contact_residuals(nodes)
+    clearance = CLEARANCE * nodes.lengths.mean()
+    # Opposite nodes of the middle of both lanes: straight across.
+    opposite = {(i, len(nodes.positions) - 1 - i) for i in range(5, 25)}
+    assert len(contacts.node) % 2 == 0
+    nearest = [contacts.overlap[contacts.node == i].max() for i, _ in opposite]
+    np.testing.assert_allclose(nearest, 1.0 - factor * STEP / clearance, rtol=1e-3)
+    # Sideways is to the left, and the other lane lies there: a move brings them together.
+    for i, j in opposite:
+        for node in (i, j):
+            straight = contacts.overlap[contacts.node == node].argmax()
+            slope = contacts.derivative[contacts.node == node][straight]
+            assert slope == pytest.approx(1.0 / clearance, rel=1e-3)
+
+
+def test_lanes_farther_apart_than_the_clearance_do_not_touch(flat_disc):
+    wide = lanes(flat_disc, 0.3)
+    gap = 1.05 * CLEARANCE * wide.lengths.mean()
+    assert len(contact_residuals(lanes(flat_disc, gap)).node) == 0
+    assert len(contact_residuals(lanes(flat_disc, 0.8 * gap)).node) > 0
+
+
+def test_a_round_circle_does_not_touch_itself(flat_disc):
+    """Neighbours are near, and so are the last nodes and the first of a closed curve."""
+    surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
+    places = points_near(flat_disc, circle(np.arange(100) * 2 * np.pi / 100, 0.6))
+    assert len(contact_residuals(nodes_at(surface, places, True)).node) == 0
+
+
+def test_the_ends_of_an_open_curve_touch_each_other(flat_disc):
+    surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
+    places = points_near(flat_disc, circle(np.arange(100) * 2 * np.pi / 100, 0.6))
+    touching = contact_residuals(nodes_at(surface, places, False)).node
+    assert {0, 99} <= set(touching.tolist()) <= {0, 1, 98, 99}
+
+
+@pytest.mark.parametrize("uneven", [0.05, 0.1, 0.3])
+def test_the_same_strand_does_not_touch_itself_where_its_nodes_are_dense(flat_disc, uneven):
+    """Distance along the curve counts, and not how many nodes lie between."""
+    dense = np.concatenate([np.full(12, uneven), np.ones(88)])
+    angle = np.concatenate([[0.0], np.cumsum(dense)[:-1]]) * 2 * np.pi / dense.sum()
+    surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
+    places = points_near(flat_disc, circle(angle, 0.6))
+    assert len(contact_residuals(nodes_at(surface, places, True)).node) == 0
+
+
+def test_both_sides_of_a_thin_sheet_do_not_touch():
+    """Two strands of a flat ellipsoid, above each other on its two sides."""
+    ball = shapes.sphere(4)
+    thin = scaled(ball, 1.0).vertices * [1.0, 1.0, 0.005]
+    mesh = type(ball)(thin, ball.faces)
+    x = np.linspace(-0.6, 0.6, 40)
+    above = np.stack([x, 0 * x, 0 * x + 0.1], axis=1)
+    nodes = nodes_at(
+        CurveSurface(mesh, unsigned_normals(mesh)),
+        points_near(mesh, np.concatenate([above, above[::-1] * [1, 1, -1]])),
+        True,
+    )
+    assert len(contact_residuals(nodes).node) == 0
+
+
+def test_each_pair_counts_once_for_either_node(flat_disc):
+    contacts = contact_residuals(lanes(flat_disc, STEP))
+    assert len(contacts.node) > 40
+    half = len(contacts.node) // 2
+    np.testing.assert_allclose(np.sort(contacts.overlap)[::2], np.sort(contacts.overlap)[1::2])
+    assert (np.bincount(contacts.node).sum(), contacts.overlap.min() > 0.0) == (2 * half, True)
+
+
+def test_the_derivative_is_that_of_the_overlap(flat_disc):
+    """Differences with one node moved; the clearance, a mean, is not a matter of one node."""
+    nodes = lanes(flat_disc, 1.3 * STEP)
+    contacts = contact_residuals(nodes)
+    clearance = CLEARANCE * nodes.lengths.mean()
+    move = 1e-6 * STEP
+    for node in (8, 14, 60):
+        positions = nodes.positions.copy()
+        positions[node] += move * nodes.sideways[node]
+        moved = Nodes(nodes.places, False, positions, nodes.normals, nodes.importance)
+        after = contact_residuals(moved)
+        scale = CLEARANCE * moved.lengths.mean() / clearance
+        own = contacts.node == node
+        assert own.any()
+        change = 1.0 - (1.0 - after.overlap[after.node == node]) * scale - contacts.overlap[own]
+        np.testing.assert_allclose(
+            np.sort(change / move), np.sort(contacts.derivative[own]), rtol=1e-3, atol=1e-3
+        )
+
+
+def test_faces_turned_over_in_one_piece_do_not_matter(flat_disc):
+    turned = type(flat_disc)(flat_disc.vertices, flat_disc.faces[:, ::-1])
+    here, there = (contact_residuals(lanes(mesh, STEP)) for mesh in (flat_disc, turned))
+    np.testing.assert_array_equal(np.bincount(here.node), np.bincount(there.node))
