@@ -10,8 +10,7 @@ from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.sign_bundle import SignBundle
 from nicmm_core.surface_points import locate_control_points
-
-from .checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
+from tests.core.checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
 
 METHODS = ("variational", "nicmm-paper")
 
