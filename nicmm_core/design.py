@@ -3,8 +3,8 @@
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
 
-On a large mesh all of that is done on a coarse mesh of the same surface, and the curve is lifted
-from there and relaxed once more (`coarsening`).
+On a large mesh all but the last is done on a coarse mesh of the same surface, and the curve is
+lifted from there (`coarsening`).
 """
 
 from __future__ import annotations
@@ -20,21 +20,19 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_choices, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray, IntArray
-from .coarsening.coarse_start import CoarseStarts, Solve
-from .crossings import crossing_segments
+from .coarsening.coarse_start import CoarseStarts
 from .curve import SurfaceCurve
-from .design_result import STATUS, Design, Status, is_one_curve
+from .design_result import STATUS, Design, Status
 from .errors import ArgumentError
 from .level_set import variational
-from .level_set.contour import extract_curves
 from .level_set.features import feature_map
 from .level_set.losses import LossWeights, balanced
-from .level_set.problem import Problem, build_problem
+from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
-from .level_set.topology import keep_topology
+from .level_set.zero_set import ZeroSet, zero_set
 from .mesh import Mesh
 from .network.forward_pass import NetworkWeights
-from .network.single_pass import predict_once
+from .network.single_pass import predicted
 from .network.weights_file import load_weights
 from .path.via_points import ViaPoints, located_via_points
 from .relaxation.curve_field import curve_field
@@ -63,8 +61,6 @@ class _Start:
     surface: CurveSurface
     unit: float  # square root of the surface's area
     breaking: int = 0
-    iterations: int = 0  # until there
-    cancelled: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,6 @@ class Designer:
         self.mesh = mesh
         self._weights: dict[int, NetworkWeights] = {}
         self._last: _Remembered | None = None
-        self._coarse_starts: CoarseStarts | None = None
 
     def forget(self) -> None:
         """Start the next design anew."""
@@ -138,9 +133,10 @@ class Designer:
         )
         if method == "nicmm":
             return self._designed(request, progress, started)
-        problem = self._problem(request)
+        problem = requested_problem(self.mesh, request)
         solution = self._solution(problem, request, method, progress)
-        return self._from_level_set(problem, solution, started)
+        zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
+        return self._level_set_design(problem, solution, zeros, started)
 
     def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
@@ -150,19 +146,19 @@ class Designer:
         start = self._start_from_last(request)
         if start is not None:
             return self._relaxed(request, start, WARM, progress, started)
-        start = self._start_from_coarse(request, progress)
-        if start is not None:
-            config = RelaxationConfig()
-            later = None if progress is None else _part(progress, 0.5, 1.0)
-            return self._relaxed(request, start, config, later, started)
-        problem = self._problem(request)
-        weights = self._pretrained(problem.features.shape[1])
-        solution = predict_once(weights, problem)
-        field, breaking, curves = self._curves(problem, solution.field)
-        if not self._is_one(curves, request.closed):
-            return self._from_level_set(problem, solution, started)
-        surface = self._curve_surface(request)
-        start = _Start(curves[0], problem.loop.order, surface, problem.unit, breaking)
+        start = self._start_from_coarse(request)
+        if start is None:
+            found = predicted(self.mesh, request, self._pretrained)
+            problem, zeros = found.problem, found.zeros
+            if not zeros.is_simple_curve(self.mesh, request.closed):
+                return self._level_set_design(problem, found.solution, zeros, started)
+            start = _Start(
+                curve=zeros.curves[0],
+                visited=problem.loop.order,
+                surface=self._curve_surface(request),
+                unit=problem.unit,
+                breaking=zeros.breaking_vertices,
+            )
         return self._relaxed(request, start, RelaxationConfig(), progress, started)
 
     def _start_from_last(self, request: Request) -> _Start | None:
@@ -174,17 +170,14 @@ class Designer:
         curve = moved_along(last.start.surface, last.design.curves[0], points)
         if curve is None:
             return None
-        return replace(last.start, curve=curve, breaking=0, iterations=0)
+        return replace(last.start, curve=curve, breaking=0)
 
-    def _start_from_coarse(self, request: Request, progress: Progress | None) -> _Start | None:
+    def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
         component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
         if np.count_nonzero(component) < LARGE:
             return None
-        if self._coarse_starts is None:
-            self._coarse_starts = CoarseStarts(self.mesh, self._normals, _coarse_solver)
-        before = None if progress is None else _part(progress, 0.0, 0.5)
-        found = self._coarse_starts.find(request, before)
+        found = self._coarse_starts.find(request)
         if found is None:
             return None
         return _Start(
@@ -192,21 +185,7 @@ class Designer:
             visited=found.visited,
             surface=self._curve_surface(request),
             unit=float(np.sqrt(self.mesh.face_areas[component].sum())),
-            breaking=found.design.breaking_vertices,
-            iterations=found.design.iterations,
-            cancelled=found.design.status is Status.CANCELLED,
-        )
-
-    def _problem(self, request: Request) -> Problem:
-        return build_problem(
-            self.mesh,
-            request.points,
-            request.order,
-            request.obstacles,
-            request.alignment,
-            request.smoothness,
-            request.closed,
-            request.via_points or None,
+            breaking=found.breaking_vertices,
         )
 
     def _relaxed(
@@ -218,20 +197,16 @@ class Designer:
         started: float,
     ) -> Design:
         """The design that relaxation makes of a curve; it is kept for the next request."""
-        watch: Callable[[float, FloatArray], bool] | None = None
-        if start.cancelled:
-            watch = _stop
-        elif progress is not None:
-            watch = _seldom(progress, lambda points: points)
+        watch = None if progress is None else _seldom(progress, lambda points: points)
         surface, unit = start.surface, start.unit
         relaxed = relax(surface, start.curve, request.smoothness, config, watch)
         feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
         # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
         energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
         design = Design(
-            status=Status.CANCELLED if start.cancelled else STATUS[relaxed.stopped],
+            status=STATUS[relaxed.stopped],
             curves=[relaxed.curve],
-            iterations=start.iterations + relaxed.iterations,
+            iterations=relaxed.iterations,
             seconds=time.perf_counter() - started,
             energy=energy,
             breaking_vertices=start.breaking,
@@ -241,18 +216,19 @@ class Designer:
             self._last = _Remembered(request, start, design)
         return design
 
-    def _from_level_set(self, problem: Problem, solution: Solution, started: float) -> Design:
+    def _level_set_design(
+        self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
+    ) -> Design:
         """The design that a level set is."""
-        field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        one = self._is_one(curves, problem.loop.closed)
+        one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
         return Design(
             status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
-            curves=curves,
+            curves=zeros.curves,
             iterations=solution.iterations,
             seconds=time.perf_counter() - started,
             energy=solution.terms,
-            breaking_vertices=breaking,
-            find_field=partial(_at_input_vertices, self.mesh, problem, field),
+            breaking_vertices=zeros.breaking_vertices,
+            find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
         )
 
     def _solution(
@@ -270,13 +246,6 @@ class Designer:
 
         return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 
-    def _is_one(self, curves: list[SurfaceCurve], closed: bool) -> bool:
-        """Whether curves are a single one through all control points that is simple."""
-        if not is_one_curve(curves, closed):
-            return False
-        polyline = SurfacePoints(curves[0].faces, curves[0].barycentric)
-        return not len(crossing_segments(self.mesh, polyline, closed))
-
     def _curve_surface(self, request: Request) -> CurveSurface:
         """The surface that curves move on."""
         if not request.has_maps:
@@ -291,33 +260,20 @@ class Designer:
     def _normals(self) -> FloatArray:
         return unsigned_normals(self.mesh)
 
+    @cached_property
+    def _coarse_starts(self) -> CoarseStarts:
+        return CoarseStarts(self.mesh, self._normals, self._pretrained)
+
     def _pretrained(self, channels: int) -> NetworkWeights:
         if channels not in self._weights:
             self._weights[channels] = load_weights(channels=channels)
         return self._weights[channels]
 
-    def _curves(
-        self, problem: Problem, field: FloatArray, keeps_topology: bool = False
-    ) -> tuple[FloatArray, int, list[SurfaceCurve]]:
-        """Make φ exactly zero at the control points and one loop, and take its contour."""
-        breaking = 0
-        if not keeps_topology:
-            field, breaking = keep_topology(
-                problem.working,
-                problem.loop,
-                problem.initial_distance,
-                problem.smoother.interpolating(field),
-                problem.bundle,
-            )
-        controls = problem.loop.control_vertices
-        curves = extract_curves(self.mesh, problem.working, field, controls, problem.bundle)
-        return field, breaking, curves
-
     def _field_watcher(
         self, problem: Problem, progress: Progress
     ) -> Callable[[float, FloatArray], bool]:
         def points(field: FloatArray) -> FloatArray:
-            curves = self._curves(problem, field)[2]
+            curves = zero_set(self.mesh, problem, field).curves
             return curves[0].points if curves else np.zeros((0, 3))
 
         return _seldom(progress, points)
@@ -337,26 +293,6 @@ def _seldom(
         return progress(fraction, points(state)) is not False
 
     return watch
-
-
-def _part(progress: Progress, begin: float, end: float) -> Progress:
-    """A progress function for a part of the whole."""
-    return lambda fraction, points: progress(begin + (end - begin) * fraction, points)
-
-
-def _stop(fraction: float, points: FloatArray) -> bool:
-    return False
-
-
-def _coarse_solver(mesh: Mesh) -> Solve:
-    """What designs on a coarse mesh, each curve anew."""
-    designer = Designer(mesh)
-
-    def solve(request: Request, progress: Progress | None) -> Design:
-        designer.forget()
-        return designer._designed(request, progress, time.perf_counter())
-
-    return solve
 
 
 def design_curve(

@@ -1,4 +1,4 @@
-"""Where a curve on a large mesh begins: designed on a coarse mesh of the surface, then lifted."""
+"""Where a curve on a large mesh begins: predicted on a coarse mesh of the surface, then lifted."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 
 from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve
-from ..design_result import Design, Status
 from ..errors import NicmmError
 from ..mesh import Mesh
+from ..network.forward_pass import NetworkWeights
+from ..network.single_pass import predicted
 from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
-from ..request import Progress, Request
+from ..request import Request
 from ..surface_points import SurfacePoints, locate_control_points
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .lifting import lifted
@@ -27,9 +28,6 @@ The first is about as fine as the meshes that the network was trained on.
 LEAST_REDUCTION = 3.0
 """Vertices of the mesh for each cell, below which a coarse mesh saves nothing."""
 
-Solve = Callable[[Request, Progress | None], Design]
-"""How a curve on a coarse mesh is designed."""
-
 
 @dataclass(frozen=True)
 class CoarseStart:
@@ -41,20 +39,19 @@ class CoarseStart:
         Simple.
     visited : (k,) int array
         Which of the control points it passes, in order.
-    design : Design
-        On the coarse mesh.
+    breaking_vertices : int
+        Of the level set on the coarse mesh.
     """
 
     curve: SurfaceCurve
     visited: IntArray
-    design: Design
+    breaking_vertices: int
 
 
 @dataclass(frozen=True)
 class _CoarseSurface:
     coarse: CoarseMesh
     surface: CurveSurface
-    solve: Solve
 
 
 class CoarseStarts:
@@ -64,17 +61,20 @@ class CoarseStarts:
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-    solver : callable
-        Gives for a coarse mesh what designs on it.
+    weights_for : callable
+        Gives the network's weights for a number of input channels.
     """
 
     def __init__(
-        self, mesh: Mesh, vertex_normals: FloatArray, solver: Callable[[Mesh], Solve]
+        self,
+        mesh: Mesh,
+        vertex_normals: FloatArray,
+        weights_for: Callable[[int], NetworkWeights],
     ) -> None:
-        self._mesh, self._vertex_normals, self._solver = mesh, vertex_normals, solver
+        self._mesh, self._vertex_normals, self._weights_for = mesh, vertex_normals, weights_for
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
 
-    def find(self, request: Request, progress: Progress | None) -> CoarseStart | None:
+    def find(self, request: Request) -> CoarseStart | None:
         """The curve of the first coarse mesh that gives one; None where none does.
 
         That may be so for points too close to one another, or strands: the fine mesh decides.
@@ -86,34 +86,31 @@ class CoarseStarts:
             if LEAST_REDUCTION * count > n_vertices:
                 break
             try:
-                start = self._lifted(self._surface(component, count), request, progress)
+                start = self._lifted(self._surface(component, count), request)
             except NicmmError:
                 continue
             if start is not None:
                 return start
         return None
 
-    def _lifted(
-        self, level: _CoarseSurface, request: Request, progress: Progress | None
-    ) -> CoarseStart | None:
+    def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        design = level.solve(on_coarse, progress)
-        usable = design.status not in (Status.NOT_ONE_CURVE, Status.DIVERGED) and design.curves
-        if not usable:
+        zeros = predicted(coarse.mesh, on_coarse, self._weights_for).zeros
+        if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None
-        curve = design.curves[0]
+        curve = zeros.curves[0]
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
         surface = CurveSurface(self._mesh, self._vertex_normals)
         result = lifted(surface, coarse, level.surface, curve, request.points[visited])
-        return None if result is None else CoarseStart(result, visited, design)
+        return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._vertex_normals, component, count)
             surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-            self._made[key] = _CoarseSurface(coarse, surface, self._solver(coarse.mesh))
+            self._made[key] = _CoarseSurface(coarse, surface)
         return self._made[key]
 
 

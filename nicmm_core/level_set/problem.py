@@ -17,6 +17,7 @@ from ..mesh import Mesh
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
+from ..request import Request
 from ..surface_points import SurfacePoints
 from .features import (
     control_indicator,
@@ -173,6 +174,20 @@ def build_problem(
         initial_distance=initial_distance,
         feature_map=importance,
         features=features,
+    )
+
+
+def requested_problem(mesh: Mesh, request: Request) -> Problem:
+    """The problem of a request; see `build_problem`."""
+    return build_problem(
+        mesh,
+        request.points,
+        request.order,
+        request.obstacles,
+        request.alignment,
+        request.smoothness,
+        request.closed,
+        request.via_points or None,
     )
 
 
