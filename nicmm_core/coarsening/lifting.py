@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -21,7 +20,7 @@ from ..mesh import Mesh, unique_edges
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
 from ..relaxation.face_walks import strictly_inside
-from ..surface_points import SurfacePoints
+from ..surface_points import SurfacePoints, nearest_points
 from .coarse_mesh import CoarseMesh
 
 NODES = 256
@@ -85,13 +84,10 @@ def _nearest_points(
     faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
     for one in np.unique(cell).tolist():
         here = np.flatnonzero(cell == one)
-        inside = coarse.faces_of_cells(fine, np.array([one]))
-        _, nearest, places = igl.point_mesh_squared_distance(
-            positions[here], fine.vertices, fine.faces[inside]
+        found, _ = nearest_points(
+            fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))
         )
-        faces[here] = inside[nearest]
-        a, b, c = fine.vertices[fine.faces[faces[here]]].transpose(1, 0, 2)
-        barycentric[here] = igl.barycentric_coordinates(places.reshape(-1, 3), a, b, c)
+        faces[here], barycentric[here] = found.faces, found.barycentric
     return SurfacePoints(faces, strictly_inside(barycentric)), cell
 
 
