@@ -31,9 +31,8 @@ from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
 from .mesh import Mesh
-from .network.forward_pass import NetworkWeights
 from .network.single_pass import predicted
-from .network.weights_file import load_weights
+from .network.weights_file import shipped_weights
 from .path.via_points import ViaPoints, located_via_points
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
@@ -93,7 +92,6 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._weights: dict[int, NetworkWeights] = {}
         self._last: _Remembered | None = None
 
     def forget(self) -> None:
@@ -148,7 +146,7 @@ class Designer:
             return self._relaxed(request, start, WARM, progress, started)
         start = self._start_from_coarse(request)
         if start is None:
-            found = predicted(self.mesh, request, self._pretrained)
+            found = predicted(self.mesh, request)
             problem, zeros = found.problem, found.zeros
             if not zeros.is_simple_curve(self.mesh, request.closed):
                 return self._level_set_design(problem, found.solution, zeros, started)
@@ -239,7 +237,7 @@ class Designer:
         weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        pretrained = self._pretrained(problem.features.shape[1])
+        pretrained = shipped_weights(problem.features.shape[1])
         # These import PyTorch, which nothing else needs.
         from .network.prediction import PredictionConfig, predict
         from .network.trainable_network import build_network
@@ -262,12 +260,7 @@ class Designer:
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
-        return CoarseStarts(self.mesh, self._normals, self._pretrained)
-
-    def _pretrained(self, channels: int) -> NetworkWeights:
-        if channels not in self._weights:
-            self._weights[channels] = load_weights(channels=channels)
-        return self._weights[channels]
+        return CoarseStarts(self.mesh, self._normals)
 
     def _field_watcher(
         self, problem: Problem, progress: Progress

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve
 from ..errors import NicmmError
 from ..mesh import Mesh
-from ..network.forward_pass import NetworkWeights
 from ..network.single_pass import predicted
 from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
 from ..request import Request
@@ -61,17 +59,10 @@ class CoarseStarts:
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-    weights_for : callable
-        Gives the network's weights for a number of input channels.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        vertex_normals: FloatArray,
-        weights_for: Callable[[int], NetworkWeights],
-    ) -> None:
-        self._mesh, self._vertex_normals, self._weights_for = mesh, vertex_normals, weights_for
+    def __init__(self, mesh: Mesh, vertex_normals: FloatArray) -> None:
+        self._mesh, self._vertex_normals = mesh, vertex_normals
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
 
     def find(self, request: Request) -> CoarseStart | None:
@@ -96,7 +87,7 @@ class CoarseStarts:
     def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        zeros = predicted(coarse.mesh, on_coarse, self._weights_for).zeros
+        zeros = predicted(coarse.mesh, on_coarse).zeros
         if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None
         curve = zeros.curves[0]

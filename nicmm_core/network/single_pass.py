@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +12,10 @@ from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, zero_set
 from ..mesh import Mesh
+from ..path.band_refinement import PIECES_TO_START
 from ..request import Request
 from .forward_pass import NetworkInput, NetworkWeights, Operations, level_set
+from .weights_file import shipped_weights
 
 SingleArray = NDArray[np.float32]
 
@@ -28,17 +29,13 @@ class Predicted:
     zeros: ZeroSet
 
 
-def predicted(
-    mesh: Mesh, request: Request, weights_for: Callable[[int], NetworkWeights]
-) -> Predicted:
+def predicted(mesh: Mesh, request: Request) -> Predicted:
     """Where a curve runs by the network.
 
     Parameters
     ----------
     mesh : Mesh
     request : Request
-    weights_for : callable
-        Gives the weights for a number of input channels.
 
     Raises
     ------
@@ -47,8 +44,8 @@ def predicted(
     UnreachableError
         If no simple path passes the points in this order.
     """
-    problem = requested_problem(mesh, request)
-    solution = predict_once(weights_for(problem.features.shape[1]), problem)
+    problem = requested_problem(mesh, request, PIECES_TO_START)
+    solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
     return Predicted(problem, solution, zero_set(mesh, problem, solution.field))
 
 
