@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.level_set import sparse_solver
@@ -40,7 +39,7 @@ def chosen_on(mesh, count, seed=0):
 def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, closed):
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
-    assert max(unknowns) < 2 * coarse_start.COARSE[0]
+    assert max(unknowns) < 1.5 * coarse_start.CELLS
 
 
 def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
@@ -60,7 +59,7 @@ def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
     mesh = shapes.sphere(6)
     chosen = chosen_on(mesh, 4)
     by_cells = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
-    monkeypatch.setattr(design_module, "LARGE", 10**9)
+    monkeypatch.setattr(coarse_start, "SMALL", 10**9)
     directly = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
     apart, _ = cKDTree(directly.points).query(by_cells.points)
     assert apart.max() < 0.02
