@@ -23,6 +23,7 @@ MEASUREMENTS = (
     "curvature",
     "runtime",
     "dragging",
+    "stages",
     "peers",
     "degraded",
     "resolution",

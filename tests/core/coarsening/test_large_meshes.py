@@ -1,5 +1,7 @@
 """On a large mesh nothing but the relaxation and single passes over its arrays is done."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -40,6 +42,17 @@ def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, clo
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
     assert max(unknowns) < 1.5 * coarse_start.CELLS
+
+
+def test_memory_follows_the_vertices():
+    mesh = shapes.sphere(7)
+    tracemalloc.start()
+    try:
+        nicmm.design_curve(mesh, chosen_on(mesh, 4), order="shortest")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 1_000 * len(mesh.vertices)
 
 
 def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
