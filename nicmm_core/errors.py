@@ -26,5 +26,9 @@ class ArgumentError(NicmmError):
     """Another argument (a method, a map, a weight, a file) has a value that cannot be used."""
 
 
+class CurveError(NicmmError):
+    """A curve cannot be used so: it is not on the mesh, meets itself or bounds no region."""
+
+
 class MissingPackageError(NicmmError):
     """A method needs a package that is not installed."""

@@ -1,0 +1,221 @@
+"""The points of a curve as the places where a mesh is cut: at vertices, on edges, inside faces.
+
+A point close to a vertex or an edge is moved there, so that no thin faces come from it, and points
+close to each other become one. Where that would make the curve touch itself its points stay where
+they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..curve import SurfaceCurve
+from ..errors import CurveError
+from ..mesh import Mesh
+from ..tolerances import BARYCENTRIC_SUM
+
+ROUNDING = 1e-12
+"""Barycentric coordinates up to this are zeros that came out of a computation."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Places on a mesh that a curve passes, no two of them the same.
+
+    Attributes
+    ----------
+    closed : bool
+    faces : (m,) int array
+        An input face of each place.
+    barycentric : (m, 3) float array
+        Coordinates there; zero for corners that have no share in it.
+    first_point : (m,) int array
+        The first point of the curve that is this place; its points up to the next place are too.
+    point : (m,) int array
+        The point of the curve that the place was made from.
+    segment_faces : (m,) int array
+        A face that holds a place and the one after it; without meaning at an open end.
+    """
+
+    closed: bool
+    faces: IntArray
+    barycentric: FloatArray
+    first_point: IntArray
+    point: IntArray
+    segment_faces: IntArray
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+
+def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray, IntArray]:
+    """Faces, (n,), and coordinates, (n, 3), of a curve's points, and faces of its segments, (n,).
+
+    Raises
+    ------
+    CurveError
+        If the curve is none on this mesh.
+    """
+    faces, barycentric = np.asarray(curve.faces), np.asarray(curve.barycentric, dtype=np.float64)
+    if faces.ndim != 1 or barycentric.shape != (len(faces), 3):
+        raise CurveError(
+            f"curve has faces of shape {faces.shape} and barycentric of shape "
+            f"{barycentric.shape}; pass (n,) and (n, 3)"
+        )
+    least = 3 if curve.closed else 2
+    if len(faces) < least:
+        raise CurveError(f"curve has {len(faces)} points, too few to cut; it needs {least}")
+    off = (faces < 0) | (faces >= len(mesh.faces))
+    off |= ~(barycentric >= -ROUNDING).all(axis=1)
+    off |= ~(np.abs(barycentric.sum(axis=1) - 1.0) <= BARYCENTRIC_SUM)
+    if off.any():
+        first = int(off.argmax())
+        raise CurveError(
+            f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
+            f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
+        )
+    faces = faces.astype(np.int64)
+    barycentric = _without(barycentric, np.full(len(faces), ROUNDING))
+    return faces, barycentric, _segment_faces(mesh, curve.closed, faces, barycentric)
+
+
+def build_chain(
+    mesh: Mesh,
+    closed: bool,
+    faces: IntArray,
+    barycentric: FloatArray,
+    segment_faces: IntArray,
+    margin: FloatArray,
+    wanted: BoolArray,
+) -> Chain:
+    """Move points to vertices and edges near them, and join neighbours that are one place.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    closed : bool
+    faces, barycentric, segment_faces : arrays
+        As from `checked_curve`.
+    margin : (n,) float array
+        Coordinates below it become zero, and neighbours that differ by less become one.
+    wanted : (n,) bool array
+        Points that stand for their place rather than their neighbours, such as control points.
+    """
+    barycentric = _without(barycentric, margin)
+    corners = mesh.faces[faces]
+    n = len(faces)
+    following = (np.arange(n) + 1) % n
+    same = _same_support(corners, barycentric, following)
+    theirs = _in_other_face(corners[following], barycentric[following], corners)
+    near = np.abs(theirs - barycentric).max(axis=1) < np.minimum(margin, margin[following])
+    at_vertex = (barycentric > 0.0).sum(axis=1) == 1
+    joins = same & (near | at_vertex)  # with the next one
+    if not closed:
+        joins[-1] = False
+    if joins.all():
+        begins = np.array([0])
+    else:
+        begins = np.flatnonzero(~np.roll(joins, 1))
+    # A run of near points may be long: it is broken where it has left its first point.
+    begins = _broken_runs(begins, joins, faces, barycentric, corners, margin)
+    ends = np.roll(begins, -1)
+    count = (ends - begins - 1) % n + 1
+    point = np.array(
+        [
+            next((p for p in _run(b, c, n) if wanted[p]), b)
+            for b, c in zip(begins.tolist(), count.tolist(), strict=True)
+        ],
+        dtype=np.int64,
+    )
+    last = (ends - 1) % n
+    return Chain(closed, faces[point], barycentric[point], begins, point, segment_faces[last])
+
+
+def _broken_runs(
+    begins: IntArray,
+    joins: BoolArray,
+    faces: IntArray,
+    barycentric: FloatArray,
+    corners: IntArray,
+    margin: FloatArray,
+) -> IntArray:
+    n = len(joins)
+    found = []
+    bounds = [*begins.tolist(), int(begins[0]) + n]
+    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+        first = begin
+        found.append(first)
+        for p in range(begin + 1, end):
+            here = p % n
+            theirs = _in_other_face(corners[[here]], barycentric[[here]], corners[[first % n]])[0]
+            at_vertex = np.count_nonzero(theirs) == 1
+            if not at_vertex and np.abs(theirs - barycentric[first % n]).max() >= margin[here]:
+                first = p
+                found.append(here)
+    return np.sort(np.array(found, dtype=np.int64) % n)
+
+
+def _run(begin: int, count: int, n: int) -> list[int]:
+    return [(begin + k) % n for k in range(count)]
+
+
+def points_of(chain: Chain, places: Sequence[int], n_points: int) -> IntArray:
+    """The points of the curve that places were made from, with those of the places beside them."""
+    near = {(place + step) % len(chain) for place in places for step in (-1, 0, 1)}
+    count = (np.roll(chain.first_point, -1) - chain.first_point - 1) % n_points + 1
+    runs = [_run(int(chain.first_point[p]), int(count[p]), n_points) for p in sorted(near)]
+    return np.array([point for run in runs for point in run], dtype=np.int64)
+
+
+def _without(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
+    """Coordinates below a margin set to zero, and the others to the sum 1."""
+    kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
+    return kept / kept.sum(axis=1, keepdims=True)
+
+
+def _same_support(corners: IntArray, barycentric: FloatArray, following: IntArray) -> BoolArray:
+    """Whether points lie at one vertex, on one edge or inside one face with the next ones."""
+    support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
+    return (support == support[following]).all(axis=1)
+
+
+def _in_other_face(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
+    """Coordinates with respect to the corners of other faces, as far as these have them."""
+    same = corners[:, :, None] == others[:, None, :]
+    return (barycentric[:, :, None] * same).sum(axis=1)
+
+
+def _segment_faces(
+    mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray
+) -> IntArray:
+    """A face that holds each point and the next one, shape (n,)."""
+    n = len(faces)
+    following = (np.arange(n) + 1) % n
+    support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
+    found = faces.copy()
+    unknown = ~_holds(mesh.faces[found], support[following])
+    found[unknown] = faces[following][unknown]
+    unknown &= ~_holds(mesh.faces[found], support)
+    if not closed:
+        unknown[-1] = False
+    for point in np.flatnonzero(unknown).tolist():
+        both = np.concatenate([support[point], support[following[point]]])
+        candidates = mesh.faces_at(both[both >= 0][:1])
+        holds = _holds(mesh.faces[candidates], np.tile(both, (len(candidates), 1)))
+        if not holds.any():
+            raise CurveError(
+                f"curve is not on this mesh: no face holds its points {point} and "
+                f"{int(following[point])}; pass the mesh that it was designed on"
+            )
+        found[point] = candidates[holds.argmax()]
+    return found
+
+
+def _holds(corners: IntArray, support: IntArray) -> BoolArray:
+    """Whether faces have all vertices of a support, which is filled up with -1."""
+    found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
+    return (found | (support < 0)).all(axis=1)

@@ -1,0 +1,382 @@
+"""A mesh cut along a curve: the same surface, with the curve as a chain of its edges.
+
+Every face that the curve crosses or touches becomes triangles; faces beside a cut edge share its new
+vertices, so the result is as conforming as the mesh was. New vertices know where they are in the
+input, so whatever lives on the mesh can be carried over.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..curve import SurfaceCurve
+from ..errors import ArgumentError, CurveError
+from ..mesh import Mesh
+from .chain import ROUNDING, Chain, build_chain, checked_curve, points_of
+from .triangulation import ConstraintError, FaceTriangulation
+
+SNAP_CUT = 1e-3
+"""By default, points with a barycentric coordinate below this move to the edge or the vertex."""
+
+LARGEST_SNAP = 0.25
+"""Above a third there would be nowhere to go."""
+
+FLAT = 1e-9
+"""Least height of a face, relative to its longest side, at which its angles are measured."""
+
+
+@dataclass(frozen=True)
+class CutMesh:
+    """A mesh with a curve among its edges.
+
+    Attributes
+    ----------
+    vertices : (V + n, 3) float array
+        Those of the input mesh, then the new ones.
+    faces : (F', 3) int array
+        Faces that are as they were, in the old order, then the parts of the others; all turn as
+        the input faces do.
+    source_face : (F',) int array
+        The input face that each face is or is a part of.
+    new_face : (n,) int array
+        An input face that holds each new vertex.
+    new_barycentric : (n, 3) float array
+        Where the new vertices are in it.
+    chain : (m,) int array
+        Vertices along the curve, no one twice, each joined to the next one by an edge.
+    closed : bool
+        Whether the last vertex of the chain is joined to the first.
+    chain_point : (m,) int array
+        The point of the curve that each vertex of the chain stands for.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    source_face: IntArray
+    new_face: IntArray
+    new_barycentric: FloatArray
+    chain: IntArray
+    closed: bool
+    chain_point: IntArray
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The cut surface as a mesh."""
+        return Mesh(self.vertices, self.faces)
+
+    @property
+    def chain_edges(self) -> IntArray:
+        """Edges along the curve, (m, 2), or (m - 1, 2) where it is open."""
+        edges = np.stack([self.chain, np.roll(self.chain, -1)], axis=1)
+        return edges if self.closed else edges[:-1]
+
+    def corner_weights(self, mesh: Mesh) -> FloatArray:
+        """Barycentric coordinates of each face's corners in its source face, (F', 3, 3).
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh that was cut.
+        """
+        n_input = len(mesh.vertices)
+        theirs = mesh.faces[self.source_face]
+        weights = (self.faces[:, :, None] == theirs[:, None, :]).astype(np.float64)
+        face, corner = np.nonzero(self.faces >= n_input)
+        new = self.faces[face, corner] - n_input
+        same = mesh.faces[self.new_face[new]][:, :, None] == theirs[face][:, None, :]
+        inside = (self.new_barycentric[new][:, :, None] * same).sum(axis=1)
+        weights[face, corner] = inside
+        return weights
+
+    def at_corners(self, mesh: Mesh, values: FloatArray) -> FloatArray:
+        """Carry values at the corners of faces over, such as UVs, which have seams.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh that was cut.
+        values : (F, 3, ...) float array
+
+        Returns
+        -------
+        (F', 3, ...) float array
+        """
+        return np.einsum("fij,fj...->fi...", self.corner_weights(mesh), values[self.source_face])
+
+    def at_vertices(self, mesh: Mesh, values: FloatArray) -> FloatArray:
+        """Carry values at vertices over, such as weights.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh that was cut.
+        values : (V, ...) float array
+
+        Returns
+        -------
+        (V + n, ...) float array
+        """
+        corners = values[mesh.faces[self.new_face]]
+        return np.concatenate([values, np.einsum("nj,nj...->n...", self.new_barycentric, corners)])
+
+
+def cut_mesh(mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT) -> CutMesh:
+    """Cut a mesh along a curve on it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh that the curve was designed on. It may have boundaries and need not be oriented.
+    curve : SurfaceCurve
+        Closed or open, simple.
+    snap : float, default 0.001
+        Points with a barycentric coordinate below this move to the edge or the vertex near them, so
+        that there are no needles; not where the curve would then touch itself.
+
+    Returns
+    -------
+    CutMesh
+
+    Raises
+    ------
+    CurveError
+        If the curve is not on this mesh, or crosses or touches itself.
+    ArgumentError
+        If ``snap`` is out of range.
+
+    Examples
+    --------
+    >>> import nicmm_core as nicmm
+    >>> from nicmm_core import shapes
+    >>> mesh = shapes.sphere(3)
+    >>> curve = nicmm.design_curve(mesh, [12, 80, 41]).curves[0]
+    >>> cut = nicmm.cut_mesh(mesh, curve)
+    >>> len(cut.faces) > len(mesh.faces)
+    True
+    """
+    if not 0.0 <= snap <= LARGEST_SNAP:
+        raise ArgumentError(f"snap is {snap!r}; pass a number in 0 … {LARGEST_SNAP:g}")
+    faces, barycentric, segment_faces = checked_curve(mesh, curve)
+    wanted = np.zeros(len(faces), dtype=bool)
+    wanted[np.asarray(curve.control_index)[np.asarray(curve.control_index) >= 0]] = True
+    margin = np.full(len(faces), max(snap, ROUNDING))
+    while True:
+        chain = build_chain(
+            mesh, curve.closed, faces, barycentric, segment_faces, margin, wanted
+        )
+        try:
+            return _cut(mesh, chain)
+        except _ContactError as contact:
+            there = points_of(chain, contact.places, len(faces))
+        if (margin[there] <= ROUNDING).all():
+            raise CurveError(
+                f"curve crosses or touches itself near its points {sorted(set(there.tolist()))}; "
+                "only a simple curve can be cut"
+            )
+        margin[there] = ROUNDING
+
+
+class _ContactError(Exception):
+    """The chain meets itself at some of its places."""
+
+    def __init__(self, places: list[int]) -> None:
+        super().__init__(places)
+        self.places = places
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the places of a chain are: at a vertex, on an edge or inside a face."""
+
+    at_vertex: dict[int, int]  # place by vertex
+    on_edge: dict[tuple[int, int], list[int]]  # places in order along an edge, smaller vertex first
+    in_face: dict[int, list[int]]
+
+
+def _cut(mesh: Mesh, chain: Chain) -> CutMesh:
+    """The mesh cut along a chain, or a _ContactError."""
+    if len(chain) < (3 if chain.closed else 2):
+        raise _ContactError(list(range(len(chain))))
+    corners = mesh.faces[chain.faces]
+    count = (chain.barycentric > 0.0).sum(axis=1)
+    places = _places(chain, corners, count)
+    is_new = count > 1
+    number = np.cumsum(is_new) - 1 + len(mesh.vertices)
+    vertex = np.where(is_new, number, -1)
+    for at, place in places.at_vertex.items():
+        vertex[place] = at
+    segments = _segments_inside(chain, corners, places)
+
+    affected = set(segments) | set(places.in_face) | set(_faces_beside(mesh, places))
+    parts: list[tuple[int, int, int]] = []
+    source: list[int] = []
+    for face in sorted(affected):
+        found = _face_parts(mesh, face, chain, places, segments.get(face, []))
+        local_vertices, triangles = found
+        ids = [int(v) if kind < 0 else int(vertex[kind]) for kind, v in local_vertices]
+        parts += [(ids[a], ids[b], ids[c]) for a, b, c in triangles]
+        source += [face] * len(triangles)
+
+    stays = np.ones(len(mesh.faces), dtype=bool)
+    stays[sorted(affected)] = False
+    new_face, new_barycentric = chain.faces[is_new], chain.barycentric[is_new]
+    corner_positions = mesh.vertices[mesh.faces[new_face]]
+    positions = (new_barycentric[:, :, None] * corner_positions).sum(axis=1)
+    return CutMesh(
+        vertices=np.concatenate([mesh.vertices, positions]),
+        faces=np.concatenate([mesh.faces[stays], np.array(parts, np.int64).reshape(-1, 3)]),
+        source_face=np.concatenate([np.flatnonzero(stays), np.array(source, dtype=np.int64)]),
+        new_face=new_face,
+        new_barycentric=new_barycentric,
+        chain=vertex,
+        closed=chain.closed,
+        chain_point=chain.point,
+    )
+
+
+def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
+    at_vertex: dict[int, int] = {}
+    on_edge: dict[tuple[int, int], list[int]] = defaultdict(list)
+    in_face: dict[int, list[int]] = defaultdict(list)
+    share = np.zeros(len(chain))
+    for place, (row, weights) in enumerate(zip(corners, chain.barycentric, strict=True)):
+        if count[place] == 3:
+            in_face[int(chain.faces[place])].append(place)
+            continue
+        (here,) = np.nonzero(weights > 0.0)
+        if count[place] == 1:
+            vertex = int(row[here[0]])
+            if vertex in at_vertex:
+                raise _ContactError([at_vertex[vertex], place])
+            at_vertex[vertex] = place
+            continue
+        first, second = sorted(here, key=lambda corner: row[corner])
+        # The share of the farther end: rounding keeps it apart from 0 and from 1.
+        share[place] = weights[second] / (weights[first] + weights[second])
+        on_edge[int(row[first]), int(row[second])].append(place)
+    for along in on_edge.values():
+        along.sort(key=lambda place: share[place])
+        for one, other in zip(along[:-1], along[1:], strict=True):
+            if share[one] == share[other]:
+                raise _ContactError([one, other])
+    return _Places(at_vertex, dict(on_edge), dict(in_face))
+
+
+def _segments_inside(
+    chain: Chain, corners: IntArray, places: _Places
+) -> dict[int, list[tuple[int, int]]]:
+    """Segments that lead through the inside of a face, by the face.
+
+    Those along an edge need nothing, but must not lead past a place.
+    """
+    inside: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    support = [
+        frozenset(row[weights > 0.0].tolist())
+        for row, weights in zip(corners, chain.barycentric, strict=True)
+    ]
+    n = len(chain)
+    for place in range(n if chain.closed else n - 1):
+        following = (place + 1) % n
+        together = support[place] | support[following]
+        if len(together) > 2:
+            inside[int(chain.segment_faces[place])].append((place, following))
+            continue
+        low, high = sorted(together)
+        order: list[int] = places.on_edge.get((low, high), [])
+        where = [
+            order.index(p) if len(support[p]) == 2 else (-1 if support[p] == {low} else len(order))
+            for p in (place, following)
+        ]
+        if abs(where[0] - where[1]) != 1:
+            between = order[max(min(where) + 1, 0) : max(where)]
+            raise _ContactError([place, following, *between])
+    return dict(inside)
+
+
+def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
+    """Faces that have an edge with places on it."""
+    if not places.on_edge:
+        return []
+    edges = np.array(list(places.on_edge))
+    candidates = mesh.faces_at(np.unique(edges))
+    sides = np.sort(mesh.faces[candidates][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    size = len(mesh.vertices)
+    cut = np.isin(sides[:, :, 0] * size + sides[:, :, 1], edges[:, 0] * size + edges[:, 1])
+    return candidates[cut.any(axis=1)].tolist()
+
+
+def _face_parts(
+    mesh: Mesh,
+    face: int,
+    chain: Chain,
+    places: _Places,
+    segments: list[tuple[int, int]],
+) -> tuple[list[tuple[int, int]], list[tuple[int, int, int]]]:
+    """The triangles of one face.
+
+    Returns
+    -------
+    list of (place, vertex)
+        The points: a corner with its vertex and the place -1, or a place and -1.
+    list of (int, int, int)
+        Triangles of them.
+    """
+    corners = [int(v) for v in mesh.faces[face]]
+    points: list[tuple[int, int]] = [(-1, corner) for corner in corners]
+    weights: list[tuple[float, float, float]] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    local = {places.at_vertex[v]: k for k, v in enumerate(corners) if v in places.at_vertex}
+    sides = []
+    for corner in range(3):
+        start, end = corners[corner], corners[(corner + 1) % 3]
+        along = places.on_edge.get((min(start, end), max(start, end)), [])
+        along = along if start < end else along[::-1]
+        sides.append([len(points) + k for k in range(len(along))])
+        for place in along:
+            local[place] = len(points)
+            points.append((place, -1))
+            weights.append(_weights_in(chain, mesh, place, corners))
+    inner = places.in_face.get(face, [])
+    for place in inner:
+        local[place] = len(points)
+        points.append((place, -1))
+        weights.append(_weights_in(chain, mesh, place, corners))
+
+    triangulation = FaceTriangulation(weights, _flattened(mesh.vertices[corners], weights))
+    try:
+        for corner in range(3):
+            triangulation.add_on_side(corner, sides[corner])
+        for place in inner:
+            triangulation.add_inside(local[place])
+        for start_place, end_place in segments:
+            triangulation.add_segment(local[start_place], local[end_place])
+    except ConstraintError as error:
+        meeting = [place for place, at in local.items() if at in error.points]
+        raise _ContactError(meeting) from error
+    triangulation.improve()
+    return points, triangulation.triangles
+
+
+def _weights_in(
+    chain: Chain, mesh: Mesh, place: int, corners: list[int]
+) -> tuple[float, float, float]:
+    theirs = mesh.faces[chain.faces[place]].tolist()
+    weight = dict(zip(theirs, chain.barycentric[place].tolist(), strict=True))
+    return (weight.get(corners[0], 0.0), weight.get(corners[1], 0.0), weight.get(corners[2], 0.0))
+
+
+def _flattened(corners: FloatArray, weights: list[tuple[float, float, float]]) -> FloatArray:
+    """Points of a face in its plane; of a face without height in one that is equilateral."""
+    one, other = corners[1] - corners[0], corners[2] - corners[0]
+    length = np.linalg.norm(one)
+    x, y = one @ other, float(np.linalg.norm(np.cross(one, other)))
+    longest = max(length, np.linalg.norm(other), np.linalg.norm(other - one))
+    if y > FLAT * longest**2:
+        flat = np.array([[0.0, 0.0], [length, 0.0], [x / length, y / length]])
+    else:
+        flat = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
+    return np.array(weights) @ flat

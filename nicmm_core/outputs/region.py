@@ -1,0 +1,165 @@
+"""What a curve encloses: faces and vertices on one side of it.
+
+Two faces lie on the same side where a way leads from one to the other that crosses the curve an even
+number of times. Where a way round the surface crosses it an odd number of times, the curve bounds
+nothing. The rule is that of the sign of a design's level set, `relaxation.curve_field`, but a face of
+the cut mesh has a side even where no vertex of the input mesh lies inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..errors import ControlPointError, CurveError
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints, locate_points
+from .cut import CutMesh
+from .shared_sides import shared_sides
+
+
+@dataclass(frozen=True)
+class Region:
+    """One side of a curve.
+
+    Attributes
+    ----------
+    cut_faces : (F',) bool array
+        Faces of the cut mesh that are inside.
+    cut_vertices : (V + n,) bool array
+        Vertices of the cut mesh that are inside or on the curve.
+    share : (F,) float array
+        How much of the area of each input face is inside, from 0 to 1.
+    area : float
+        Of the region, in square mesh units.
+    """
+
+    cut_faces: BoolArray
+    cut_vertices: BoolArray
+    share: FloatArray
+    area: float
+
+    @property
+    def faces(self) -> BoolArray:
+        """Input faces that are inside by more than half of their area, (F,)."""
+        return self.share > 0.5
+
+    def vertices(self, mesh: Mesh) -> BoolArray:
+        """Input vertices that are inside or on the curve, (V,).
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh that was cut.
+        """
+        return self.cut_vertices[: len(mesh.vertices)]
+
+
+def enclosed_region(
+    mesh: Mesh, cut: CutMesh, side_of: ArrayLike | SurfacePoints | None = None
+) -> Region:
+    """The region that a curve encloses.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh that was cut.
+    cut : CutMesh
+        From `cut_mesh`.
+    side_of : (1,) int array_like, (1, 3) float array_like or SurfacePoints, optional
+        A point of the region: a vertex, a point on the surface, or a face with coordinates. By
+        default the region is the side with the smaller area.
+
+    Returns
+    -------
+    Region
+        Parts of the mesh that are not connected to the curve belong to it only where ``side_of`` is
+        no point of theirs, that is never.
+
+    Raises
+    ------
+    CurveError
+        If the curve bounds no region.
+    ControlPointError
+        If ``side_of`` is no single point beside the curve, on its part of the mesh.
+    """
+    side = _sides(cut)
+    areas = cut.mesh.face_areas
+    if side_of is not None:
+        inside = side == _side_at(mesh, cut, side, side_of)
+    else:
+        one, other = areas[side == 1].sum(), areas[side == -1].sum()
+        # All on one side: the curve runs along the boundary.
+        inside = side == (1 if other == 0.0 or 0.0 < one < other else -1)
+    vertices = np.zeros(len(cut.vertices), dtype=bool)
+    vertices[cut.faces[inside]] = True
+    n_faces = len(mesh.faces)
+    within = np.bincount(cut.source_face, areas * inside, n_faces)
+    whole = np.bincount(cut.source_face, areas, n_faces)
+    # Parts of a face without area are counted instead.
+    number = np.bincount(cut.source_face, inside, n_faces) / np.bincount(cut.source_face)
+    share = np.where(whole > 0.0, within / np.where(whole > 0.0, whole, 1.0), number)
+    return Region(inside, vertices, share, float(areas[inside].sum()))
+
+
+def _sides(cut: CutMesh) -> IntArray:
+    """1 or -1 for faces that are connected to the curve, 0 for others, (F',)."""
+    n_faces = len(cut.faces)
+    shared = shared_sides(cut.faces, cut.chain_edges)
+    one, other = shared.faces.T
+    crosses = shared.on_chain.astype(np.int64)
+    # Every face stands twice in the graph, for either side.
+    rows = np.concatenate([one, one + n_faces])
+    columns = np.concatenate([other + crosses * n_faces, other + (1 - crosses) * n_faces])
+    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * n_faces,) * 2)
+    _, label = csgraph.connected_components(graph, directed=False)
+    here, there = label[:n_faces], label[n_faces:]
+    part = np.minimum(here, there)
+    beside = _faces_beside(cut)
+    with_curve = np.isin(part, part[beside])
+    if (here == there)[with_curve].any():
+        kind = "It is closed, but leads" if cut.closed else "It is open and leaves a way"
+        raise CurveError(
+            f"curve bounds no region: a way on the surface leads from one side of it to the other. "
+            f"{kind} round a handle, a tube or its ends; cut the mesh along it instead, or design "
+            "a closed curve that encloses a part of the surface"
+        )
+    return np.where(with_curve, np.where(here < there, 1, -1), 0)
+
+
+def _faces_beside(cut: CutMesh) -> IntArray:
+    """Faces that have an edge of the chain."""
+    size = len(cut.vertices)
+    sides = np.sort(cut.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    wanted = np.sort(cut.chain_edges, axis=1) @ np.array([size, 1])
+    return np.flatnonzero(np.isin(sides @ np.array([size, 1]), wanted).any(axis=1))
+
+
+def _side_at(
+    mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | SurfacePoints
+) -> int:
+    """The side on which a point lies."""
+    point = locate_points(mesh, side_of, "side_of")
+    if len(point) != 1:
+        raise ControlPointError(f"side_of has {len(point)} points; pass one")
+    source, target = int(point.faces[0]), point.barycentric[0]
+    among = np.flatnonzero(cut.source_face == source)
+    weights = cut.corner_weights(mesh)[among]
+    # Coordinates with respect to each part; the point lies where the least one is greatest.
+    inside = np.linalg.solve(weights.transpose(0, 2, 1), np.tile(target[:, None], (len(among), 1, 1)))
+    least = inside.min(axis=1).ravel()
+    holding = among[least >= least.max() - 1e-9]
+    sides = np.unique(side[holding])
+    if len(sides) > 1:
+        raise ControlPointError("side_of lies on the curve; choose a point beside it")
+    if sides[0] == 0:
+        raise ControlPointError(
+            "side_of lies on a part of the mesh that is not connected to the curve; choose a point "
+            "on the curve's own part"
+        )
+    return int(sides[0])
