@@ -9,26 +9,37 @@ from .design_result import Design, Status
 from .errors import (
     ArgumentError,
     ControlPointError,
+    CurveError,
     MeshError,
     MissingPackageError,
     NicmmError,
     UnreachableError,
 )
 from .mesh import Mesh
+from .outputs.cut import CutMesh, cut_mesh
+from .outputs.parts import PartedMesh, part_mesh
+from .outputs.region import Region, enclosed_region
 from .surface_points import SurfacePoints
 
 __all__ = [
     "ArgumentError",
     "ControlPointError",
+    "CurveError",
+    "CutMesh",
     "Design",
     "Designer",
     "Mesh",
     "MeshError",
     "MissingPackageError",
     "NicmmError",
+    "PartedMesh",
+    "Region",
     "Status",
     "SurfaceCurve",
     "SurfacePoints",
     "UnreachableError",
+    "cut_mesh",
     "design_curve",
+    "enclosed_region",
+    "part_mesh",
 ]

@@ -16,7 +16,7 @@ from ..array_types import BoolArray, FloatArray, IntArray
 from ..curve import SurfaceCurve
 from ..errors import CurveError
 from ..mesh import Mesh
-from ..tolerances import BARYCENTRIC_SUM
+from ..tolerances import BARYCENTRIC_SUM, TINY
 
 ROUNDING = 1e-12
 """Barycentric coordinates up to this are zeros that came out of a computation."""
@@ -163,11 +163,75 @@ def _run(begin: int, count: int, n: int) -> list[int]:
     return [(begin + k) % n for k in range(count)]
 
 
-def points_of(chain: Chain, places: Sequence[int], n_points: int) -> IntArray:
-    """The points of the curve that places were made from, with those of the places beside them."""
+def superfluous_points(
+    positions: FloatArray,
+    barycentric: FloatArray,
+    faces: IntArray,
+    closed: bool,
+    wanted: BoolArray,
+    deviation: float,
+) -> BoolArray:
+    """Points inside faces without which the curve stays within a distance of its course.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+    barycentric : (n, 3) float array
+    faces : (n,) int array
+    closed : bool
+    wanted : (n,) bool array
+        Points that stay.
+    deviation : float
+        In mesh units.
+
+    Returns
+    -------
+    (n,) bool array
+    """
+    n = len(faces)
+    free = (barycentric > 0.0).all(axis=1) & ~wanted
+    if not closed:
+        free[[0, -1]] = False
+    superfluous = np.zeros(n, dtype=bool)
+    if deviation <= 0.0 or free.all():
+        return superfluous
+    # Between two points that stay, the curve does not leave the face.
+    stays = np.flatnonzero(~free).tolist()
+    waiting = list(zip(stays, [*stays[1:], stays[0] + n], strict=True))
+    while waiting:
+        begin, end = waiting.pop()
+        between = np.arange(begin + 1, end) % n
+        if not len(between) or (not closed and end >= n):
+            continue
+        start, along = positions[begin % n], positions[end % n] - positions[begin % n]
+        offset = positions[between] - start
+        share = np.clip(offset @ along / max(along @ along, TINY), 0.0, 1.0)
+        distance = np.linalg.norm(offset - share[:, None] * along, axis=1)
+        if distance.max() <= deviation:
+            superfluous[between] = True
+            continue
+        middle = begin + 1 + int(distance.argmax())
+        waiting += [(begin, middle), (middle, end)]
+    return superfluous
+
+
+def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int) -> IntArray:
+    """The points of the curve that some places stand for, with those beside them.
+
+    Parameters
+    ----------
+    chain : Chain
+        Made from some of the points of a curve.
+    places : sequence of int
+    kept : (k,) int array
+        Which points these were.
+    n_points : int
+        How many the curve has.
+    """
     near = {(place + step) % len(chain) for place in places for step in (-1, 0, 1)}
-    count = (np.roll(chain.first_point, -1) - chain.first_point - 1) % n_points + 1
-    runs = [_run(int(chain.first_point[p]), int(count[p]), n_points) for p in sorted(near)]
+    begins = kept[chain.first_point]
+    count = (np.roll(begins, -1) - begins - 1) % n_points + 1
+    runs = [_run(int(begins[p]), int(count[p]), n_points) for p in sorted(near)]
     return np.array([point for run in runs for point in run], dtype=np.int64)
 
 
@@ -189,9 +253,7 @@ def _in_other_face(corners: IntArray, barycentric: FloatArray, others: IntArray)
     return (barycentric[:, :, None] * same).sum(axis=1)
 
 
-def _segment_faces(
-    mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray
-) -> IntArray:
+def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray) -> IntArray:
     """A face that holds each point and the next one, shape (n,)."""
     n = len(faces)
     following = (np.arange(n) + 1) % n

@@ -1,14 +1,14 @@
 """A mesh cut along a curve: the same surface, with the curve as a chain of its edges.
 
-Every face that the curve crosses or touches becomes triangles; faces beside a cut edge share its new
-vertices, so the result is as conforming as the mesh was. New vertices know where they are in the
-input, so whatever lives on the mesh can be carried over.
+Every face that the curve crosses or touches becomes triangles; faces beside a cut edge share its
+new vertices, so the result is as conforming as the mesh was. New vertices know where they are in
+the input, so whatever lives on the mesh can be carried over.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,8 @@ from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve
 from ..errors import ArgumentError, CurveError
 from ..mesh import Mesh
-from .chain import ROUNDING, Chain, build_chain, checked_curve, points_of
+from ..surface_points import SurfacePoints
+from .chain import ROUNDING, Chain, build_chain, checked_curve, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 
 SNAP_CUT = 1e-3
@@ -75,6 +76,12 @@ class CutMesh:
         edges = np.stack([self.chain, np.roll(self.chain, -1)], axis=1)
         return edges if self.closed else edges[:-1]
 
+    @cached_property
+    def directed_chain_edges(self) -> frozenset[tuple[int, int]]:
+        """The same in either direction, to ask for single ones."""
+        edges = self.chain_edges.tolist()
+        return frozenset((a, b) for a, b in edges) | frozenset((b, a) for a, b in edges)
+
     def corner_weights(self, mesh: Mesh) -> FloatArray:
         """Barycentric coordinates of each face's corners in its source face, (F', 3, 3).
 
@@ -125,7 +132,9 @@ class CutMesh:
         return np.concatenate([values, np.einsum("nj,nj...->n...", self.new_barycentric, corners)])
 
 
-def cut_mesh(mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT) -> CutMesh:
+def cut_mesh(
+    mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT, deviation: float = 0.0
+) -> CutMesh:
     """Cut a mesh along a curve on it.
 
     Parameters
@@ -147,7 +156,7 @@ def cut_mesh(mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT) -> CutMesh
     CurveError
         If the curve is not on this mesh, or crosses or touches itself.
     ArgumentError
-        If ``snap`` is out of range.
+        If ``snap`` or ``deviation`` is out of range.
 
     Examples
     --------
@@ -161,24 +170,40 @@ def cut_mesh(mesh: Mesh, curve: SurfaceCurve, snap: float = SNAP_CUT) -> CutMesh
     """
     if not 0.0 <= snap <= LARGEST_SNAP:
         raise ArgumentError(f"snap is {snap!r}; pass a number in 0 … {LARGEST_SNAP:g}")
+    if not 0.0 <= deviation < np.inf:
+        raise ArgumentError(f"deviation is {deviation!r}; pass a length of at least 0")
     faces, barycentric, segment_faces = checked_curve(mesh, curve)
     wanted = np.zeros(len(faces), dtype=bool)
     wanted[np.asarray(curve.control_index)[np.asarray(curve.control_index) >= 0]] = True
-    margin = np.full(len(faces), max(snap, ROUNDING))
+    exact = np.zeros(len(faces), dtype=bool)
+    positions = SurfacePoints(faces, barycentric).positions(mesh)
     while True:
+        margin = np.where(exact, ROUNDING, max(snap, ROUNDING))
+        kept = np.flatnonzero(
+            ~superfluous_points(
+                positions, barycentric, faces, curve.closed, wanted | exact, deviation
+            )
+        )
         chain = build_chain(
-            mesh, curve.closed, faces, barycentric, segment_faces, margin, wanted
+            mesh,
+            curve.closed,
+            faces[kept],
+            barycentric[kept],
+            segment_faces[kept],
+            margin[kept],
+            wanted[kept],
         )
         try:
-            return _cut(mesh, chain)
+            cut = _cut(mesh, chain)
+            return replace(cut, chain_point=kept[cut.chain_point])
         except _ContactError as contact:
-            there = points_of(chain, contact.places, len(faces))
-        if (margin[there] <= ROUNDING).all():
+            there = points_of(chain, contact.places, kept, len(faces))
+        if exact[there].all():
             raise CurveError(
                 f"curve crosses or touches itself near its points {sorted(set(there.tolist()))}; "
                 "only a simple curve can be cut"
             )
-        margin[there] = ROUNDING
+        exact[there] = True
 
 
 class _ContactError(Exception):

@@ -1,9 +1,9 @@
 """What a curve encloses: faces and vertices on one side of it.
 
-Two faces lie on the same side where a way leads from one to the other that crosses the curve an even
-number of times. Where a way round the surface crosses it an odd number of times, the curve bounds
-nothing. The rule is that of the sign of a design's level set, `relaxation.curve_field`, but a face of
-the cut mesh has a side even where no vertex of the input mesh lies inside.
+Two faces lie on the same side where a way leads from one to the other that crosses the curve an
+even number of times. Where a way round the surface crosses it an odd number of times, the curve
+bounds nothing. The rule is that of the sign of a design's level set, `relaxation.curve_field`; but
+a face of the cut mesh has a side even where no vertex of the input mesh lies inside.
 """
 
 from __future__ import annotations
@@ -78,8 +78,7 @@ def enclosed_region(
     Returns
     -------
     Region
-        Parts of the mesh that are not connected to the curve belong to it only where ``side_of`` is
-        no point of theirs, that is never.
+        Without parts of the mesh that are not connected to the curve.
 
     Raises
     ------
@@ -140,9 +139,7 @@ def _faces_beside(cut: CutMesh) -> IntArray:
     return np.flatnonzero(np.isin(sides @ np.array([size, 1]), wanted).any(axis=1))
 
 
-def _side_at(
-    mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | SurfacePoints
-) -> int:
+def _side_at(mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | SurfacePoints) -> int:
     """The side on which a point lies."""
     point = locate_points(mesh, side_of, "side_of")
     if len(point) != 1:
@@ -151,7 +148,8 @@ def _side_at(
     among = np.flatnonzero(cut.source_face == source)
     weights = cut.corner_weights(mesh)[among]
     # Coordinates with respect to each part; the point lies where the least one is greatest.
-    inside = np.linalg.solve(weights.transpose(0, 2, 1), np.tile(target[:, None], (len(among), 1, 1)))
+    right = np.tile(target[:, None], (len(among), 1, 1))
+    inside = np.linalg.solve(weights.transpose(0, 2, 1), right)
     least = inside.min(axis=1).ravel()
     holding = among[least >= least.max() - 1e-9]
     sides = np.unique(side[holding])

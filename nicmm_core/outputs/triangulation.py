@@ -113,7 +113,10 @@ class FaceTriangulation:
                 continue
             self._flip(a, b)
             ends = {c, d}
-            if not ends & {start, end} and self._turn(start, end, c) * self._turn(start, end, d) < 0:
+            if (
+                not ends & {start, end}
+                and self._turn(start, end, c) * self._turn(start, end, d) < 0
+            ):
                 crossed.append((c, d))
         self._fixed |= {(start, end), (end, start)}
 

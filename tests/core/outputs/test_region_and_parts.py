@@ -1,0 +1,204 @@
+"""What curves enclose, and surfaces parted along them, against counts made in another way."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import nicmm_core as nicmm
+from benchmarks.named_curves import named_curves
+from nicmm_core import shapes
+from nicmm_core.outputs.cut import cut_mesh
+from nicmm_core.outputs.parts import part_mesh
+from nicmm_core.outputs.region import enclosed_region
+from tests.core.checks import euler_characteristic, grid, joined
+from tests.core.outputs.checks import components_without, edges_with_counts
+from tests.core.outputs.curves import designed
+from tests.core.outputs.test_cut import curve_at
+
+
+@pytest.fixture(scope="module")
+def cap():
+    """A parallel of the sphere with the angle 0.5 to the pole, as good as the mesh allows."""
+    mesh = shapes.sphere(4)
+    angles = np.arange(8) * 2 * np.pi / 8
+    ring = np.stack(
+        [np.sin(0.5) * np.cos(angles), np.sin(0.5) * np.sin(angles), np.full(8, np.cos(0.5))],
+        axis=1,
+    )
+    nearest = np.linalg.norm(mesh.vertices[None] - ring[:, None], axis=2).argmin(axis=1)
+    curve = nicmm.design_curve(mesh, nearest).curves[0]
+    return mesh, curve, cut_mesh(mesh, curve)
+
+
+def test_cap_has_its_area_and_its_vertices(cap):
+    mesh, _, cut = cap
+    region = enclosed_region(mesh, cut)
+    assert region.area == pytest.approx(2 * np.pi * (1 - np.cos(0.5)), rel=0.05)
+    assert region.area == pytest.approx(cut.mesh.face_areas[region.cut_faces].sum())
+    assert region.area == pytest.approx((region.share * mesh.face_areas).sum())
+    up = np.arccos(mesh.vertices[:, 2])
+    assert region.vertices(mesh)[up < 0.45].all()
+    assert not region.vertices(mesh)[up > 0.55].any()
+    assert region.cut_vertices[cut.chain].all()
+    middle = np.arccos(mesh.vertices[mesh.faces].mean(axis=1)[:, 2] / 0.999)
+    assert region.faces[middle < 0.4].all() and not region.faces[middle > 0.6].any()
+    assert ((region.share > 0) & (region.share < 1)).sum() < 0.1 * len(mesh.faces)
+
+
+def test_sides_are_those_of_the_level_set(cap):
+    mesh, curve, cut = cap
+    design = nicmm.design_curve(mesh, [100, 700, 1500, 2000], order="shortest")
+    for field, region in ((design.field, enclosed_region(mesh, cut_mesh(mesh, design.curves[0]))),):
+        clear = np.abs(field) > 0.01
+        np.testing.assert_array_equal(region.vertices(mesh)[clear], field[clear] < 0.0)
+    assert curve.closed
+
+
+@settings(max_examples=6)
+@given(
+    kind=st.sampled_from(["sphere", "creature", "torus", "disc", "annulus", "Möbius strip"]),
+    seed=st.integers(0, 4),
+    closed=st.booleans(),
+)
+def test_random_curves_bound_where_they_separate(kind, seed, closed):
+    mesh, curve = designed(kind, seed, False, closed, "nicmm")
+    assume(curve is not None)
+    cut = cut_mesh(mesh, curve)
+    parts = components_without(cut.faces, cut.chain_edges)
+    parted = part_mesh(cut)
+    assert parted.part.max() + 1 == parts
+    if parts == 1:
+        with pytest.raises(nicmm.CurveError, match="bounds no region"):
+            enclosed_region(mesh, cut)
+        return
+    region = enclosed_region(mesh, cut)
+    assert 0.0 < region.area <= 0.5 * mesh.face_areas.sum() * (1 + 1e-9)
+    # A side may be several parts, where the curve touches the rim.
+    assert not set(parted.part[region.cut_faces]) & set(parted.part[~region.cut_faces])
+    here = np.flatnonzero(region.cut_faces)[0]
+    source = cut.source_face[here]
+    centre = cut.corner_weights(mesh)[here].mean(axis=0)
+    for face, wanted in ((here, region.cut_faces), (None, ~region.cut_faces)):
+        if face is None:
+            here = np.flatnonzero(~region.cut_faces)[0]
+            source, centre = cut.source_face[here], cut.corner_weights(mesh)[here].mean(axis=0)
+        point = nicmm.SurfacePoints(np.array([source]), centre[None])
+        chosen = enclosed_region(mesh, cut, side_of=point)
+        np.testing.assert_array_equal(chosen.cut_faces, wanted)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["meridian of a torus", "(1, 1) curve of a torus", "core of a Möbius strip"],
+)
+def test_curves_round_a_tube_bound_nothing_and_open_the_surface(name):
+    found = next(entry for entry in named_curves() if entry.name == name)
+    curve = nicmm.design_curve(found.mesh, found.points, order=found.order).curves[0]
+    cut = cut_mesh(found.mesh, curve)
+    with pytest.raises(nicmm.CurveError, match="closed, but leads round a handle"):
+        enclosed_region(found.mesh, cut)
+    parted = part_mesh(cut)
+    assert parted.part.max() == 0
+    assert euler_characteristic(parted.faces) == euler_characteristic(found.mesh.faces)
+    # One-sided curves have one bank as long as both would be.
+    two_sided = "Möbius" not in name
+    assert len(parted.vertices) - len(cut.vertices) == len(cut.chain)
+    rims = rim_loops(parted.faces) - rim_loops(found.mesh.faces)
+    assert rims == (2 if two_sided else 1)
+
+
+def test_round_the_hole_of_an_annulus_is_a_region():
+    found = next(entry for entry in named_curves() if "annulus" in entry.name)
+    curve = nicmm.design_curve(found.mesh, found.points, order=found.order).curves[0]
+    cut = cut_mesh(found.mesh, curve)
+    region = enclosed_region(found.mesh, cut)
+    radius = np.linalg.norm(cut.vertices[cut.faces].mean(axis=1), axis=1)
+    assert radius[region.cut_faces].max() < radius[~region.cut_faces].max()
+
+
+def rim_loops(faces):
+    edges, count = edges_with_counts(faces)
+    rim = edges[count == 1].tolist()
+    parent = {v: v for edge in rim for v in edge}
+
+    def root(v):
+        while parent[v] != v:
+            v = parent[v]
+        return v
+
+    for a, b in rim:
+        parent[root(a)] = root(b)
+    return len({root(v) for v in parent})
+
+
+def test_parted_surface_keeps_faces_and_positions(cap):
+    mesh, _, cut = cap
+    parted = part_mesh(cut)
+    np.testing.assert_array_equal(parted.source_vertex[parted.faces], cut.faces)
+    np.testing.assert_array_equal(parted.vertices, cut.vertices[parted.source_vertex])
+    assert set(np.flatnonzero(np.bincount(parted.source_vertex) == 2)) == set(cut.chain)
+    assert not set(parted.faces[parted.part == 0].ravel()) & set(
+        parted.faces[parted.part == 1].ravel()
+    )
+    for part in (0, 1):
+        assert euler_characteristic(parted.faces[parted.part == part]) == 1
+
+
+def test_open_curve_inside_makes_a_slit(small_ball):
+    curve = nicmm.design_curve(small_ball, [1, 50, 90], closed=False).curves[0]
+    cut = cut_mesh(small_ball, curve)
+    parted = part_mesh(cut)
+    assert len(parted.vertices) - len(cut.vertices) == len(cut.chain) - 2
+    assert parted.part.max() == 0
+    assert euler_characteristic(parted.faces) == 1
+
+
+def test_open_curve_from_rim_to_rim_bounds():
+    mesh = grid(4)
+    curve = nicmm.design_curve(mesh, [1, 21], closed=False).curves[0]
+    cut = cut_mesh(mesh, curve)
+    region = enclosed_region(mesh, cut)
+    assert region.area < 0.5
+    assert part_mesh(cut).part.max() == 1
+    other = enclosed_region(mesh, cut, side_of=[24])
+    np.testing.assert_array_equal(other.cut_faces, ~region.cut_faces)
+
+
+def test_region_inside_one_face_has_no_vertices():
+    mesh = grid(2)
+    loop = [(3, w) for w in ((0.6, 0.2, 0.2), (0.2, 0.6, 0.2), (0.2, 0.2, 0.6))]
+    cut = cut_mesh(mesh, curve_at(mesh, loop, True))
+    region = enclosed_region(mesh, cut)
+    assert region.area == pytest.approx(0.16 * mesh.face_areas[3])
+    assert region.share[3] == pytest.approx(0.16)
+    assert not region.vertices(mesh).any() and not region.faces.any()
+
+
+def test_other_components_stay_outside(small_ball):
+    mesh = joined(small_ball, nicmm.Mesh(0.01 * small_ball.vertices, small_ball.faces))
+    curve = nicmm.design_curve(mesh, [1, 50, 90]).curves[0]
+    cut = cut_mesh(mesh, curve)
+    far = len(small_ball.vertices)
+    region = enclosed_region(mesh, cut)
+    assert not region.vertices(mesh)[far:].any()
+    with pytest.raises(nicmm.ControlPointError, match="not connected to the curve"):
+        enclosed_region(mesh, cut, side_of=[far])
+    assert part_mesh(cut).part.max() == 2
+
+
+def test_points_that_choose_no_side(cap):
+    mesh, curve, cut = cap
+    with pytest.raises(nicmm.ControlPointError, match="lies on the curve"):
+        enclosed_region(
+            mesh, cut, side_of=nicmm.SurfacePoints(curve.faces[:1], curve.barycentric[:1])
+        )
+    with pytest.raises(nicmm.ControlPointError, match="has 2 points"):
+        enclosed_region(mesh, cut, side_of=[1, 2])
+
+
+def test_curve_along_the_rim_bounds_the_whole_surface():
+    mesh = grid(1)
+    corners = [(0, (1, 0, 0)), (0, (0, 1, 0)), (0, (0, 0, 1)), (1, (0, 0, 1))]
+    cut = cut_mesh(mesh, curve_at(mesh, corners, True))
+    assert enclosed_region(mesh, cut).area == pytest.approx(1.0)
