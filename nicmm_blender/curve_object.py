@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a polyline on a mesh as a Blender curve object."""
+"""Writes a polyline on a mesh as a Blender curve object, and puts new objects into the scene."""
 
 import bpy
 import numpy as np
 
 
-def add(context, mesh_object, polylines, thickness: float):
-    """Add a curve object with one POLY spline for each (points, closed) pair and return it.
+def polyline_object(mesh_object, polylines, thickness: float):
+    """Make a curve object with one POLY spline for each (points, closed) pair.
 
     POLY splines stay on the surface, where NURBS and Bézier splines would leave it. The points are
-    in the mesh's own space, and the mesh is the parent, so the curve follows the object.
+    in the mesh's own space.
     """
     name = f"{mesh_object.name} Curve"
     curve = bpy.data.curves.new(name, "CURVE")
@@ -24,14 +24,22 @@ def add(context, mesh_object, polylines, thickness: float):
         spline.points.foreach_set("co", homogeneous.ravel())
         spline.use_cyclic_u = closed
 
-    curve_object = bpy.data.objects.new(name, curve)
+    return bpy.data.objects.new(name, curve)
+
+
+def place(context, mesh_object, curve_object) -> None:
+    """Put a new curve beside the mesh, as its child, so that it follows the object."""
     curve_object.parent = mesh_object
-    for collection in _collections(context, mesh_object):
-        collection.objects.link(curve_object)
-    if getattr(context.space_data, "local_view", None):
-        curve_object.local_view_set(context.space_data, True)
+    link(context, mesh_object, curve_object)
     _select(context, curve_object)
-    return curve_object
+
+
+def link(context, mesh_object, new_object) -> None:
+    """Show a new object where the mesh is shown."""
+    for collection in _collections(context, mesh_object):
+        collection.objects.link(new_object)
+    if getattr(context.space_data, "local_view", None):
+        new_object.local_view_set(context.space_data, True)
 
 
 def _collections(context, mesh_object):
@@ -40,10 +48,24 @@ def _collections(context, mesh_object):
     return editable or [context.scene.collection]
 
 
+def remove(curve_object) -> None:
+    """Delete a curve object, and its data where nothing else has it."""
+    data = curve_object.data
+    bpy.data.objects.remove(curve_object, do_unlink=True)
+    if not data.users:
+        bpy.data.batch_remove([data])
+
+
+def select_only(context, chosen) -> None:
+    """Make an object the active one and the only one selected; for Object Mode."""
+    for selected in context.selected_objects:
+        selected.select_set(False)
+    context.view_layer.objects.active = chosen
+    chosen.select_set(True)
+
+
 def _select(context, curve_object) -> None:
     """Select the curve. It becomes active too, unless the mesh is being edited and must stay so."""
     if context.mode == "OBJECT":
-        for selected in context.selected_objects:
-            selected.select_set(False)
-        context.view_layer.objects.active = curve_object
+        select_only(context, curve_object)
     curve_object.select_set(True)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where users find the operator: three menus and a panel in the sidebar."""
+"""Where users find the operators: menus and a panel in the sidebar."""
 
 import bpy
 
-from . import mesh_data, settings
-from .operators import NICMM_OT_design_curve
+from . import curve_record, mesh_data, settings
+from .operators import NICMM_OT_convert_curve, NICMM_OT_design_curve
 
 ICON = "CURVE_BEZCIRCLE"
+CONVERT_ICON = "MOD_EDGESPLIT"
 
 
 class NICMM_PT_design_curve(bpy.types.Panel):
@@ -23,6 +24,11 @@ class NICMM_PT_design_curve(bpy.types.Panel):
         operator = self.layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
         for name in settings.PROPERTY_NAMES:
             setattr(operator, name, getattr(properties, name))
+        if curve_record.has_record(context.active_object):
+            self.layout.separator()
+            convert = self.layout.operator(NICMM_OT_convert_curve.bl_idname, icon=CONVERT_ICON)
+            for name in settings.OutputProperties.__annotations__:
+                setattr(convert, name, getattr(properties, name))
 
 
 def draw_in_menu(menu, _context) -> None:
@@ -36,10 +42,22 @@ def draw_in_context_menu(menu, context) -> None:
         draw_in_menu(menu, context)
 
 
+def draw_conversions(menu, context) -> None:
+    """One entry for each output, where a designed curve is active."""
+    if not curve_record.has_record(context.active_object):
+        return
+    menu.layout.separator()
+    menu.layout.operator_menu_enum(
+        NICMM_OT_convert_curve.bl_idname, "output", text="Convert Designed Curve", icon=CONVERT_ICON
+    )
+
+
 MENUS = (
     ("VIEW3D_MT_edit_mesh_vertices", draw_in_menu),
     ("VIEW3D_MT_edit_mesh_context_menu", draw_in_context_menu),
     ("VIEW3D_MT_curve_add", draw_in_menu),
+    ("VIEW3D_MT_object_convert", draw_conversions),
+    ("VIEW3D_MT_object_context_menu", draw_conversions),
 )
 
 

@@ -20,12 +20,15 @@ class Triangles:
     """A mesh as the core takes it.
 
     `local` and `solved` hold the (V, 3) positions in the object's own space and in the space where
-    lengths are what the user sees; `faces` holds the (F, 3) vertex indices.
+    lengths are what the user sees; `faces` holds the (F, 3) vertex indices, `loops` the (F, 3)
+    indices of the mesh's corners and `polygons` the (F,) faces of the mesh that they are parts of.
     """
 
     local: np.ndarray
     solved: np.ndarray
     faces: np.ndarray
+    loops: np.ndarray
+    polygons: np.ndarray
 
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions in the object's own space of points given by face and barycentrics."""
@@ -44,7 +47,7 @@ def mesh_object(context):
     is the active object.
     """
     active = context.active_object
-    if active is not None and active.type == "CURVE":
+    if active is not None and active.type in {"CURVE", "CURVES"}:
         active = active.parent
     return active if active is not None and active.type == "MESH" else None
 
@@ -63,11 +66,16 @@ def triangles(mesh_object) -> Triangles:
     mesh.calc_loop_triangles()
     faces = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+    loops = np.empty((len(faces), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops.ravel())
+    polygons = np.empty(len(faces), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("polygon_index", polygons)
 
     local = positions.astype(np.float64)
     linear = np.array(mesh_object.matrix_world.to_3x3(), dtype=np.float64)
     solved = local if _keeps_proportions(linear) else local @ linear.T
-    return Triangles(local, solved, faces.astype(np.int64))
+    faces, loops, polygons = (found.astype(np.int64) for found in (faces, loops, polygons))
+    return Triangles(local, solved, faces, loops, polygons)
 
 
 def _keeps_proportions(linear: np.ndarray) -> bool:

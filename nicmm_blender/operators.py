@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that draws a curve through the selected vertices."""
+"""The operators: a curve through the selected vertices, and other things made from a curve."""
 
 import sys
 from contextlib import contextmanager
 
 import bpy
 
-from . import curve_object, designers, mesh_data, settings
+from . import curve_object, curve_record, designers, mesh_data, outputs, settings
 
 ORDER_NAMES = {"given": "in the order of selection", "shortest": "in the shortest order"}
 
 
-class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
+class NICMM_OT_design_curve(
+    settings.DesignProperties, settings.OutputProperties, bpy.types.Operator
+):
     """Draw a smooth curve on the surface of the mesh through its selected vertices"""
 
     bl_idname = "nicmm.design_curve"
@@ -36,42 +38,17 @@ class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
         settings.draw(self.layout, self, mesh_data.mesh_object(context))
 
     def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        from .. import nicmm_core as nicmm
+
         mesh_object = mesh_data.mesh_object(context)
-        try:
-            from .. import nicmm_core as nicmm
-
-            surface, order, design = self._design(context, mesh_object)
-        except ImportError as error:
-            self.report(
-                {"ERROR"},
-                f"A library that NICMM Curves needs cannot be loaded ({error}). "
-                "Install the zip that was made for this platform and this Blender",
-            )
-            return {"CANCELLED"}
-        except nicmm.MissingPackageError as error:
-            self.report(
-                {"ERROR"},
-                f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves that was "
-                "built with --with-torch brings PyTorch along",
-            )
-            return {"CANCELLED"}
-        except (mesh_data.InputError, nicmm.NicmmError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-
+        surface, order, design = self._design(context, mesh_object)
         if not design.curves:
-            self.report({"ERROR"}, str(design.status))
-            return {"CANCELLED"}
-        curve_object.add(
-            context,
-            mesh_object,
-            [
-                (surface.points(curve.faces, curve.barycentric), curve.closed)
-                for curve in design.curves
-            ],
-            self.thickness * surface.diagonal,
-        )
-        summary = _summary(mesh_object, design, order)
+            raise mesh_data.InputError(str(design.status))
+        made = outputs.apply(context, mesh_object, surface, design.curves, self)
+        summary = f"{_summary(mesh_object, design, order)}: {made}"
         if design.status == nicmm.Status.CONVERGED:
             self.report({"INFO"}, summary)
         else:
@@ -102,11 +79,88 @@ class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
         return surface, order, design
 
 
+class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
+    """Turn a designed curve into another one, or into edges, a region or parts of its mesh"""
+
+    bl_idname = "nicmm.convert_curve"
+    bl_label = "Convert Designed Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    keep_original: bpy.props.BoolProperty(
+        name="Keep Original",
+        description="Keep the curve object",
+        default=False,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not curve_record.has_record(context.active_object):
+            cls.poll_message_set("Make a curve active that was designed on a mesh")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Switch to Object Mode")
+            return False
+        return True
+
+    def draw(self, context):
+        settings.draw_output(self.layout, self)
+        self.layout.prop(self, "keep_original")
+
+    def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        original = context.active_object
+        name = original.name
+        mesh_object = curve_record.mesh_of(original)
+        if mesh_object is None or mesh_object.name not in context.view_layer.objects:
+            raise mesh_data.InputError(
+                f'The mesh that "{name}" was designed on is not in this scene. Bring it back, or '
+                "draw the curve again"
+            )
+        surface = mesh_data.triangles(mesh_object)
+        curves = curve_record.recall(original, surface)
+        made = outputs.apply(context, mesh_object, surface, curves, self)
+        if not self.keep_original:
+            curve_object.remove(original)
+        if self.output not in {"CURVE", "STICKY"}:
+            curve_object.select_only(context, mesh_object)
+        self.report({"INFO"}, f"{name}: {made}")
+        return {"FINISHED"}
+
+
+def reporting(operator, work):
+    """Do an operator's work; what it cannot do becomes a report that says what would mend it."""
+    try:
+        from .. import nicmm_core as nicmm
+    except ImportError as error:
+        return _cancelled(
+            operator,
+            f"A library that NICMM Curves needs cannot be loaded ({error}). "
+            "Install the zip that was made for this platform and this Blender",
+        )
+    try:
+        return work()
+    except nicmm.MissingPackageError as error:
+        return _cancelled(
+            operator,
+            f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves that was "
+            "built with --with-torch brings PyTorch along",
+        )
+    except (mesh_data.InputError, nicmm.NicmmError) as error:
+        return _cancelled(operator, str(error))
+
+
+def _cancelled(operator, message: str):
+    operator.report({"ERROR"}, message)
+    return {"CANCELLED"}
+
+
 def _summary(mesh_object, design, order: str) -> str:
     curve = design.curves[0]
     summary = (
-        f"Curve through {len(curve.control_index)} vertices {ORDER_NAMES[order]}: "
-        f"{len(curve.points)} points, {design.seconds:.1f} s"
+        f"Curve through {len(curve.control_index)} vertices {ORDER_NAMES[order]}, "
+        f"{design.seconds:.1f} s"
     )
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
         summary += ", on the mesh without its modifiers"
@@ -126,7 +180,9 @@ def _progress(context):
 
 def register() -> None:
     bpy.utils.register_class(NICMM_OT_design_curve)
+    bpy.utils.register_class(NICMM_OT_convert_curve)
 
 
 def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_convert_curve)
     bpy.utils.unregister_class(NICMM_OT_design_curve)

@@ -58,6 +58,28 @@ class DesignProperties:
         name="Alignment",
         description="Vertex group whose weights attract the curve. Leave empty for none",
     )
+
+
+class OutputProperties:
+    """What becomes of a curve; for a new one and for one that is converted."""
+
+    output: EnumProperty(
+        name="Output",
+        description="What the curve becomes",
+        items=(
+            ("CURVE", "Curve", "A curve object of polylines. The mesh stays as it is"),
+            (
+                "STICKY",
+                "Sticky Curves",
+                "A hair curves object that follows the mesh when it is deformed. "
+                "The mesh stays as it is",
+            ),
+            ("EDGES", "Cut Edges", "Cut the mesh, so that the curve becomes edges of it"),
+            ("REGION", "Region", "The part of the mesh that the curve encloses"),
+            ("PARTS", "Separate Parts", "Cut the mesh and part it along the curve"),
+        ),
+        default="CURVE",
+    )
     thickness: FloatProperty(
         name="Thickness",
         description="Radius of the drawn curve relative to the size of the mesh. Zero draws a line",
@@ -67,12 +89,77 @@ class DesignProperties:
         precision=4,
         step=0.1,
     )
+    mark_seam: BoolProperty(
+        name="Mark Seam",
+        description="Make the edges along the curve UV seams",
+        default=True,
+    )
+    mark_sharp: BoolProperty(
+        name="Mark Sharp",
+        description="Make the edges along the curve sharp",
+        default=False,
+    )
+    cut_faces: EnumProperty(
+        name="Faces",
+        description="What cut faces become",
+        items=(
+            (
+                "POLYGONS",
+                "Polygons",
+                "One polygon on either side of the curve where it is flat enough, as a knife "
+                "leaves it",
+            ),
+            ("TRIANGLES", "Triangles", "Triangles. The surface stays exactly as Blender draws it"),
+        ),
+        default="POLYGONS",
+    )
+    simplify: FloatProperty(
+        name="Simplify",
+        description="How far cut edges may run from the curve to save vertices inside faces, "
+        "relative to the mean edge length",
+        default=0.01,
+        min=0.0,
+        soft_max=0.2,
+        max=1.0,
+        precision=3,
+        step=1,
+    )
+    region_as: EnumProperty(
+        name="Region As",
+        description="How the region is marked",
+        items=(
+            ("SELECTION", "Selection", "Select its faces and nothing else"),
+            ("VERTEX_GROUP", "Vertex Group", "Put its vertices into a new vertex group"),
+            ("FACE_SET", "Face Set", "Make it a new face set for Sculpt Mode"),
+        ),
+        default="SELECTION",
+    )
+    region_cut: BoolProperty(
+        name="Cut First",
+        description="Cut the mesh along the curve, so that the region ends exactly there. "
+        "Otherwise it takes the faces that are inside by more than half",
+        default=False,
+    )
+    other_side: BoolProperty(
+        name="Other Side",
+        description="Take the side of the curve with the larger area",
+        default=False,
+    )
+    parts_as: EnumProperty(
+        name="Parts As",
+        description="Where the parts go",
+        items=(
+            ("LOOSE", "Loose Parts", "Both stay in this mesh and no longer share vertices"),
+            ("OBJECTS", "Objects", "The part that the curve encloses becomes an object of its own"),
+        ),
+        default="LOOSE",
+    )
 
 
-PROPERTY_NAMES = tuple(DesignProperties.__annotations__)
+PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotations__)
 
 
-class NICMM_PG_settings(DesignProperties, bpy.types.PropertyGroup):
+class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGroup):
     """Settings of the sidebar panel, kept with the scene."""
 
 
@@ -87,7 +174,31 @@ def draw(layout, properties, mesh_object) -> None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
         else:
             layout.prop_search(properties, name, mesh_object, "vertex_groups")
-    layout.prop(properties, "thickness")
+    draw_output(layout, properties)
+
+
+def draw_output(layout, properties) -> None:
+    """Draw what belongs to the output that is chosen."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "output")
+    output = properties.output
+    cuts = output in {"EDGES", "PARTS"} or (output == "REGION" and properties.region_cut)
+    shown = {
+        "thickness": output in {"CURVE", "STICKY"},
+        "region_as": output == "REGION",
+        "region_cut": output == "REGION",
+        "parts_as": output == "PARTS",
+        "other_side": output == "REGION"
+        or (output == "PARTS" and properties.parts_as == "OBJECTS"),
+        "mark_seam": output == "EDGES",
+        "mark_sharp": output == "EDGES",
+        "cut_faces": cuts,
+        "simplify": cuts,
+    }
+    for name, is_shown in shown.items():
+        if is_shown:
+            layout.prop(properties, name)
 
 
 def register() -> None:

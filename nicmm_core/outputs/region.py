@@ -49,6 +49,19 @@ class Region:
         """Input faces that are inside by more than half of their area, (F,)."""
         return self.share > 0.5
 
+    def complement(self, mesh: Mesh, cut: CutMesh) -> Region:
+        """The other side of the curve, on the same part of the mesh.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The mesh that was cut.
+        cut : CutMesh
+            The cut that this is a region of.
+        """
+        side = _sides(cut)
+        return _region(mesh, cut, (side != 0) & ~self.cut_faces)
+
     def vertices(self, mesh: Mesh) -> BoolArray:
         """Input vertices that are inside or on the curve, (V,).
 
@@ -95,6 +108,12 @@ def enclosed_region(
         one, other = areas[side == 1].sum(), areas[side == -1].sum()
         # All on one side: the curve runs along the boundary.
         inside = side == (1 if other == 0.0 or 0.0 < one < other else -1)
+    return _region(mesh, cut, inside)
+
+
+def _region(mesh: Mesh, cut: CutMesh, inside: BoolArray) -> Region:
+    """The region of some faces of the cut."""
+    areas = cut.mesh.face_areas
     vertices = np.zeros(len(cut.vertices), dtype=bool)
     vertices[cut.faces[inside]] = True
     n_faces = len(mesh.faces)

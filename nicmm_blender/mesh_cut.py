@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carries a cut of the core over to a Blender mesh with everything that lives on it.
+
+Faces that the curve does not touch stay as they are. New vertices, corners and edges take their
+values from those that they lie between: Blender itself interpolates every layer of a mesh, so that
+weights, shape keys, colours and each UV map come along, and corners do not mix over seams.
+"""
+
+from contextlib import contextmanager
+
+import numpy as np
+
+import bmesh
+
+from .mesh_data import InputError
+
+
+@contextmanager
+def editable(mesh_object):
+    """The mesh as a BMesh that is written back at the end, in Object Mode or Edit Mode."""
+    mesh = mesh_object.data
+    if mesh_object.mode == "EDIT":
+        edited = bmesh.from_edit_mesh(mesh)
+        yield edited
+        bmesh.update_edit_mesh(mesh)
+        return
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(mesh)
+        yield edited
+        edited.to_mesh(mesh)
+    finally:
+        edited.free()
+    mesh.update()
+
+
+def check_editable(mesh_object) -> None:
+    """Refuse a mesh that cannot be changed, or whose change would reach further than it seems."""
+    mesh = mesh_object.data
+    name = mesh_object.name
+    library = mesh.library or mesh_object.library
+    if library is not None:
+        raise InputError(
+            f'The mesh of "{name}" is linked from {library.filepath}. '
+            "Make it local (Object > Relations > Make Local) or choose an output that leaves "
+            "the mesh as it is"
+        )
+    if mesh.override_library is not None:
+        raise InputError(
+            f'The mesh of "{name}" is a library override, whose faces Blender keeps. Make it local '
+            "or choose an output that leaves the mesh as it is"
+        )
+    users = mesh.users - mesh.use_fake_user
+    if users > 1:
+        raise InputError(
+            f'The mesh of "{name}" is shared by {users} users, and all of them would change. '
+            "Make it a single user (Object > Relations > Make Single User > "
+            "Object & Data) or choose an output that leaves the mesh as it is"
+        )
+    if any(modifier.type == "MULTIRES" for modifier in mesh_object.modifiers):
+        raise InputError(
+            f'"{name}" has a Multiresolution modifier, whose details belong to the faces as they '
+            "are. Apply it first, or choose an output that does not cut"
+        )
+
+
+class CornerNormals:
+    """Custom normals of a mesh in Object Mode, to be set again after a cut.
+
+    Blender stores them relative to the faces round a vertex, so they cannot be interpolated as
+    they are. In Edit Mode they are, which is near enough where those faces are about flat.
+    """
+
+    def __init__(self, mesh_object) -> None:
+        mesh = mesh_object.data
+        self.kept = mesh.has_custom_normals and mesh_object.mode == "OBJECT"
+        if self.kept:
+            self.values = np.empty((len(mesh.loops), 3), dtype=np.float32)
+            mesh.corner_normals.foreach_get("vector", self.values.ravel())
+            self.loop_starts = _loop_starts(mesh)
+
+    def after_cut(self, surface, cut, polygons, weights) -> np.ndarray:
+        """Normals of all corners, (n, 3): old faces that stay, in order, then the new ones."""
+        counts = np.diff(self.loop_starts, append=len(self.values))
+        stays = np.ones(len(counts), dtype=bool)
+        stays[polygons.source] = False
+        old = self.values[np.repeat(stays, counts)]
+        triangles, corners = (
+            np.concatenate([np.zeros(0, dtype=np.int64), *map(_integers, found)])
+            for found in (polygons.triangles, polygons.corners)
+        )
+        place = (cut.faces[triangles] == corners[:, None]).argmax(axis=1)
+        loops = surface.loops[cut.source_face[triangles]]
+        new = np.einsum("nj,njk->nk", weights[triangles, place], self.values[loops])
+        return np.concatenate([old, new])
+
+
+def _integers(values) -> np.ndarray:
+    return np.asarray(values, dtype=np.int64)
+
+
+def _loop_starts(mesh) -> np.ndarray:
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return starts
+
+
+def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
+    """Cut a BMesh; return its vertices, and its faces: old ones that stay, then the new ones.
+
+    Vertices are numbered as in the core's cut. Parameters: the BMesh, the mesh that it was read
+    from, the `mesh_data.Triangles` that the core was given, its `CutMesh`, the `CutPolygons` made
+    from that, and the weights of the cut's corners.
+    """
+    for sequence in (edited.verts, edited.edges, edited.faces):
+        sequence.ensure_lookup_table()
+        sequence.index_update()
+    vertices = list(edited.verts)
+    faces = list(edited.faces)
+    old_faces = {index: faces[index] for index in set(polygons.source.tolist())}
+    faces = [face for index, face in enumerate(faces) if index not in old_faces]
+    vertices += _new_vertices(edited, surface, cut, vertices)
+    split_edges = _split_edges(edited, surface, cut, vertices)
+    triangles = _SourceTriangles(edited, mesh, surface, old_faces)
+
+    for corners, parts, source in zip(
+        polygons.corners, polygons.triangles, polygons.source.tolist(), strict=True
+    ):
+        face = edited.faces.new([vertices[v] for v in corners], old_faces[source])
+        for place, (vertex, part) in enumerate(zip(corners, parts, strict=True)):
+            weight = weights[part, cut.faces[part].tolist().index(vertex)]
+            triangles.interpolate(face, place, int(cut.source_face[part]), weight)
+        face.normal_update()
+        faces.append(face)
+
+    bmesh.ops.delete(edited, geom=list(old_faces.values()), context="FACES_ONLY")
+    bmesh.ops.delete(edited, geom=triangles.helper_vertices, context="VERTS")
+    for edge in split_edges:
+        edited.edges.remove(edge)
+    for sequence in (edited.verts, edited.edges, edited.faces):
+        sequence.index_update()
+        sequence.ensure_lookup_table()
+    return vertices, faces
+
+
+def _new_vertices(edited, surface, cut, vertices: list) -> list:
+    made = []
+    for face, weight in zip(cut.new_face.tolist(), cut.new_barycentric, strict=True):
+        around = [
+            (float(w), vertices[v])
+            for w, v in sorted(zip(weight, surface.faces[face].tolist(), strict=True), reverse=True)
+            if w > 0.0
+        ]
+        place = sum((vertex.co * w for w, vertex in around[1:]), around[0][1].co * around[0][0])
+        # Layers that cannot be interpolated, such as whole numbers, are those of the nearest one.
+        new = edited.verts.new(place, around[0][1])
+        (first, one), (second, other) = around[:2]
+        new.copy_from_vert_interp((one, other), second / (first + second))
+        if len(around) == 3:
+            between = edited.verts.new(place, new)
+            between.copy_from_vert_interp((one, other), second / (first + second))
+            new.copy_from_vert_interp((between, around[2][1]), around[2][0])
+            edited.verts.remove(between)
+        made.append(new)
+    return made
+
+
+def _split_edges(edited, surface, cut, vertices: list) -> list:
+    """Make the parts of cut edges, as their whole was, and return the old ones."""
+    along: dict = {}
+    n_input = len(surface.local)
+    for new, (face, weight) in enumerate(
+        zip(cut.new_face.tolist(), cut.new_barycentric.tolist(), strict=True)
+    ):
+        corners = zip(surface.faces[face].tolist(), weight, strict=True)
+        ends = sorted((v, w) for v, w in corners if w > 0.0)
+        if len(ends) == 2:
+            (low, near), (high, far) = ends
+            along.setdefault((low, high), []).append((far / (near + far), n_input + new))
+    old = []
+    for (low, high), points in along.items():
+        edge = edited.edges.get((vertices[low], vertices[high]))
+        if edge is None:  # the diagonal of a polygon
+            continue
+        old.append(edge)
+        order = [low, *(vertex for _, vertex in sorted(points)), high]
+        for one, other in zip(order[:-1], order[1:], strict=True):
+            edited.edges.new((vertices[one], vertices[other]), edge)
+    return old
+
+
+class _SourceTriangles:
+    """The triangles of polygons as faces, from which corners are interpolated."""
+
+    def __init__(self, edited, mesh, surface, old_faces: dict) -> None:
+        self.edited, self.surface, self.old_faces = edited, surface, old_faces
+        self.loop_starts = _loop_starts(mesh)
+        self.faces: dict = {}
+        self.helper_vertices: list = []
+
+    def interpolate(self, face, place: int, triangle: int, weight) -> None:
+        """Set a corner of a face from the corners of a triangle."""
+        polygon = int(self.surface.polygons[triangle])
+        source = self.old_faces[polygon]
+        places = (self.surface.loops[triangle] - self.loop_starts[polygon]).tolist()
+        face.loops[place].copy_from(source.loops[places[int(np.argmax(weight))]])
+        if np.max(weight) < 1.0:
+            # Looked up again: copying makes Blender forget the corner's Python object.
+            loop = face.loops[place]
+            loop.copy_from_face_interp(self._face(triangle, source, places), False, False)
+
+    def _face(self, triangle: int, source, places: list):
+        if len(source.loops) == 3:
+            return source
+        if triangle not in self.faces:
+            # On vertices of its own, since two faces cannot have the same ones.
+            corners = [self.edited.verts.new(source.loops[place].vert.co) for place in places]
+            helper = self.edited.faces.new(corners)
+            for corner, place in enumerate(places):
+                helper.loops[corner].copy_from(source.loops[place])
+            self.helper_vertices += corners
+            self.faces[triangle] = helper
+        return self.faces[triangle]

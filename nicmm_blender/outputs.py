@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What becomes of a curve: an object of its own, cut edges, a region or parts of the mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import bmesh
+
+from . import curve_object, curve_record, mesh_cut, sticky_curves
+from .mesh_data import InputError
+
+FACE_SETS = ".sculpt_face_set"
+DEFAULT_FACE_SET = 1
+INSIDE = ".nicmm_inside"
+REGION_NAME = "Region"
+
+
+@dataclass
+class _Cutting:
+    """A mesh object with one curve on it, cut by the core but not yet in Blender."""
+
+    mesh_object: object
+    surface: object
+    core_mesh: object
+    cut: object
+    polygons: object
+    weights: np.ndarray
+
+
+def apply(context, mesh_object, surface, curves, settings) -> str:
+    """Make the output that is chosen and return what was done, in words."""
+    if settings.output in {"CURVE", "STICKY"}:
+        return _as_object(context, mesh_object, surface, curves, settings)
+    if len(curves) != 1:
+        raise InputError(
+            f"There are {len(curves)} curves, and only one can be cut. Choose the output Curve to "
+            "look at them"
+        )
+    changes_mesh = {"EDGES": _cut_edges, "REGION": _region, "PARTS": _parts}
+    mesh_cut.check_editable(mesh_object)
+    return changes_mesh[settings.output](context, mesh_object, surface, curves[0], settings)
+
+
+def _as_object(context, mesh_object, surface, curves, settings) -> str:
+    thickness = settings.thickness * surface.diagonal
+    if settings.output == "STICKY":
+        made = sticky_curves.add(mesh_object, surface, curves, thickness)
+    else:
+        polylines = [(surface.points(c.faces, c.barycentric), c.closed) for c in curves]
+        made = curve_object.polyline_object(mesh_object, polylines, thickness)
+    curve_record.remember(made, mesh_object, surface, curves)
+    curve_object.place(context, mesh_object, made)
+    return f"{sum(len(curve.faces) for curve in curves)} points"
+
+
+def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cutting:
+    from .. import nicmm_core as nicmm
+    from ..nicmm_core.outputs.polygons import cut_polygons
+
+    core_mesh = nicmm.Mesh(surface.solved, surface.faces)
+    deviation = settings.simplify * core_mesh.mean_edge_length
+    cut = nicmm.cut_mesh(core_mesh, curve, deviation=deviation)
+    joined = joined and settings.cut_faces == "POLYGONS"
+    polygons = cut_polygons(cut, surface.polygons, joined)
+    weights = cut.corner_weights(core_mesh)
+    return _Cutting(mesh_object, surface, core_mesh, cut, polygons, weights)
+
+
+def _cut_edges(context, mesh_object, surface, curve, settings) -> str:
+    cutting = _cutting(mesh_object, surface, curve, settings)
+    normals = mesh_cut.CornerNormals(mesh_object)
+    context.tool_settings.mesh_select_mode = (False, True, False)
+    with mesh_cut.editable(mesh_object) as edited:
+        vertices, _ = _cut_in_blender(edited, cutting)
+        _select_only(edited, "EDGE", edges := _chain_edges(edited, cutting, vertices))
+        for edge in edges:
+            edge.seam = edge.seam or settings.mark_seam
+            edge.smooth = edge.smooth and not settings.mark_sharp
+    _set_normals(mesh_object, normals, cutting)
+    return f"cut, with {len(edges)} edges along the curve{_normals_in_words(mesh_object)}"
+
+
+def _region(context, mesh_object, surface, curve, settings) -> str:
+    cutting = _cutting(mesh_object, surface, curve, settings)
+    region = _enclosed(cutting, settings.other_side)
+    normals = mesh_cut.CornerNormals(mesh_object) if settings.region_cut else None
+    group = None
+    if settings.region_as == "VERTEX_GROUP":
+        group = mesh_object.vertex_groups.new(name=REGION_NAME)
+    if settings.region_as == "SELECTION":
+        context.tool_settings.mesh_select_mode = (False, False, True)
+    with mesh_cut.editable(mesh_object) as edited:
+        # New layers come first: they make Blender forget the Python objects of what has them.
+        layer = _region_layer(edited, settings.region_as)
+        if settings.region_cut:
+            vertices, faces = _cut_in_blender(edited, cutting)
+            in_region, on_vertex = _faces_inside(cutting, region), region.cut_vertices
+        else:
+            vertices, faces = list(edited.verts), list(edited.faces)
+            in_region = _mostly_inside(cutting, region)
+            on_vertex = region.vertices(cutting.core_mesh)
+        chosen = [faces[index] for index in np.flatnonzero(in_region)]
+        if settings.region_as == "SELECTION":
+            _select_only(edited, "FACE", chosen)
+        elif settings.region_as == "FACE_SET":
+            number = max(face[layer] for face in faces) + 1
+            for face in chosen:
+                face[layer] = number
+        else:
+            for index in np.flatnonzero(on_vertex).tolist():
+                vertices[index][layer][group.index] = 1.0
+    if normals is not None:
+        _set_normals(mesh_object, normals, cutting)
+    what = {"SELECTION": "selected", "FACE_SET": "now a face set"}.get(
+        settings.region_as, f'in the vertex group "{group.name}"' if group else ""
+    )
+    words = _normals_in_words(mesh_object) if settings.region_cut else ""
+    return f"{len(chosen)} faces inside the curve are {what}{words}"
+
+
+def _parts(context, mesh_object, surface, curve, settings) -> str:
+    cutting = _cutting(mesh_object, surface, curve, settings)
+    as_objects = settings.parts_as == "OBJECTS"
+    region = _enclosed(cutting, settings.other_side) if as_objects else None
+    normals = mesh_cut.CornerNormals(mesh_object)
+    other_data = mesh_object.data.copy() if as_objects else None
+    with mesh_cut.editable(mesh_object) as edited:
+        layer = edited.faces.layers.int.new(INSIDE) if as_objects else None
+        vertices, faces = _cut_in_blender(edited, cutting)
+        edges = _chain_edges(edited, cutting, vertices)
+        if as_objects:
+            inside = _faces_inside(cutting, region)
+            for index in np.flatnonzero(inside).tolist():
+                faces[index][layer] = 1
+        bmesh.ops.split_edges(edited, edges=edges)
+        if as_objects:
+            _take_inside(edited, other_data)
+    if not as_objects:
+        _set_normals(mesh_object, normals, cutting)
+        return f"parted along {len(edges)} edges{_normals_in_words(mesh_object)}"
+    other = mesh_object.copy()
+    other.data = other_data
+    curve_object.link(context, mesh_object, other)
+    if normals.kept:
+        values = normals.after_cut(surface, cutting.cut, cutting.polygons, cutting.weights)
+        sizes = _corner_counts(normals, cutting)
+        mesh_object.data.normals_split_custom_set(values[np.repeat(~inside, sizes)].tolist())
+        other_data.normals_split_custom_set(values[np.repeat(inside, sizes)].tolist())
+    return f'{int(inside.sum())} faces inside the curve are now the object "{other.name}"'
+
+
+def _take_inside(edited, other_data) -> None:
+    """Move the faces that are marked as inside to another mesh."""
+    other = edited.copy()
+    try:
+        for part, kept in ((edited, 0), (other, 1)):
+            layer = part.faces.layers.int[INSIDE]
+            gone = [face for face in part.faces if face[layer] != kept]
+            bmesh.ops.delete(part, geom=gone, context="FACES")
+            part.faces.layers.int.remove(layer)
+        loose = [vertex for vertex in other.verts if not vertex.link_faces]
+        bmesh.ops.delete(other, geom=loose, context="VERTS")
+        other.to_mesh(other_data)
+    finally:
+        other.free()
+
+
+def _cut_in_blender(edited, cutting: _Cutting) -> tuple[list, list]:
+    return mesh_cut.apply(
+        edited,
+        cutting.mesh_object.data,
+        cutting.surface,
+        cutting.cut,
+        cutting.polygons,
+        cutting.weights,
+    )
+
+
+def _chain_edges(edited, cutting: _Cutting, vertices: list) -> list:
+    pairs = cutting.cut.chain_edges.tolist()
+    return [edited.edges.get((vertices[a], vertices[b])) for a, b in pairs]
+
+
+def _enclosed(cutting: _Cutting, other_side: bool):
+    from .. import nicmm_core as nicmm
+
+    region = nicmm.enclosed_region(cutting.core_mesh, cutting.cut)
+    return region.complement(cutting.core_mesh, cutting.cut) if other_side else region
+
+
+def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
+    """Which faces of the cut Blender mesh are inside: those that stay, then the new ones."""
+    n_polygons = int(cutting.surface.polygons.max()) + 1
+    by_polygon = np.zeros(n_polygons, dtype=bool)
+    by_polygon[cutting.surface.polygons[cutting.cut.source_face]] = region.cut_faces
+    stays = np.ones(n_polygons, dtype=bool)
+    stays[cutting.polygons.source] = False
+    new = [region.cut_faces[triangles[0]] for triangles in cutting.polygons.triangles]
+    return np.concatenate([by_polygon[stays], np.array(new, dtype=bool)])
+
+
+def _mostly_inside(cutting: _Cutting, region) -> np.ndarray:
+    """Which faces of the Blender mesh as it was are inside by more than half of their area."""
+    polygons, areas = cutting.surface.polygons, cutting.core_mesh.face_areas
+    within = np.bincount(polygons, areas * region.share)
+    return within > 0.5 * np.bincount(polygons, areas)
+
+
+def _region_layer(edited, region_as: str):
+    if region_as == "VERTEX_GROUP":
+        return edited.verts.layers.deform.verify()
+    if region_as == "SELECTION":
+        return None
+    layer = edited.faces.layers.int.get(FACE_SETS)
+    if layer is None:
+        layer = edited.faces.layers.int.new(FACE_SETS)
+        for face in edited.faces:
+            face[layer] = DEFAULT_FACE_SET
+    return layer
+
+
+def _select_only(edited, mode: str, elements: list) -> None:
+    edited.select_history.clear()
+    for sequence in (edited.faces, edited.edges, edited.verts):
+        for element in sequence:
+            element.select = False
+    edited.select_mode = {mode}
+    for element in elements:
+        element.select_set(True)
+    edited.select_flush_mode()
+
+
+def _set_normals(mesh_object, normals, cutting: _Cutting) -> None:
+    if normals.kept:
+        values = normals.after_cut(cutting.surface, cutting.cut, cutting.polygons, cutting.weights)
+        mesh_object.data.normals_split_custom_set(values.tolist())
+
+
+def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
+    """Corners of each face of the cut Blender mesh."""
+    counts = np.diff(normals.loop_starts, append=len(normals.values))
+    stays = np.ones(len(counts), dtype=bool)
+    stays[cutting.polygons.source] = False
+    return np.concatenate([counts[stays], [len(c) for c in cutting.polygons.corners]]).astype(int)
+
+
+def _normals_in_words(mesh_object) -> str:
+    if mesh_object.data.has_custom_normals and mesh_object.mode == "EDIT":
+        return ". Custom normals beside it are approximate; in Object Mode they are interpolated"
+    return ""
