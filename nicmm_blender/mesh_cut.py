@@ -34,7 +34,7 @@ def editable(mesh_object):
     mesh.update()
 
 
-def check_editable(mesh_object) -> None:
+def check_editable(mesh_object, cuts: bool) -> None:
     """Refuse a mesh that cannot be changed, or whose change would reach further than it seems."""
     mesh = mesh_object.data
     name = mesh_object.name
@@ -57,7 +57,7 @@ def check_editable(mesh_object) -> None:
             "Make it a single user (Object > Relations > Make Single User > "
             "Object & Data) or choose an output that leaves the mesh as it is"
         )
-    if any(modifier.type == "MULTIRES" for modifier in mesh_object.modifiers):
+    if cuts and any(modifier.type == "MULTIRES" for modifier in mesh_object.modifiers):
         raise InputError(
             f'"{name}" has a Multiresolution modifier, whose details belong to the faces as they '
             "are. Apply it first, or choose an output that does not cut"

@@ -38,7 +38,7 @@ def apply(context, mesh_object, surface, curves, settings) -> str:
             "look at them"
         )
     changes_mesh = {"EDGES": _cut_edges, "REGION": _region, "PARTS": _parts}
-    mesh_cut.check_editable(mesh_object)
+    mesh_cut.check_editable(mesh_object, cuts=settings.output != "REGION" or settings.region_cut)
     return changes_mesh[settings.output](context, mesh_object, surface, curves[0], settings)
 
 
