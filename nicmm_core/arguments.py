@@ -16,9 +16,9 @@ SMOOTHNESS_RANGE = (1e-3, 1e3)
 
 def check_choices(order: str, method: str) -> None:
     """Raise ArgumentError unless both are known."""
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
-    if order not in ORDERS:
+    if not isinstance(order, str) or order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
 
 
