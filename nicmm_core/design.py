@@ -2,11 +2,13 @@
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
+
+On a large mesh all of that is done on a coarse mesh of the same surface, and the curve is lifted
+from there and relaxed once more (`coarsening`).
 """
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_choices, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray, IntArray
+from .coarsening.coarse_start import CoarseStarts, Solve
 from .crossings import crossing_segments
 from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status, is_one_curve
@@ -33,45 +36,43 @@ from .mesh import Mesh
 from .network.forward_pass import NetworkWeights
 from .network.single_pass import predict_once
 from .network.weights_file import load_weights
-from .path.via_points import ViaPoints, same_via_points
+from .path.via_points import ViaPoints, located_via_points
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
+from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
+from .request import Progress, Request, same_course, same_request
 from .surface_points import SurfacePoints, locate_control_points
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
 
-Progress = Callable[[float, FloatArray], object]
+LARGE = 24_000
+"""Faces of a component from which on a curve is found on a coarse mesh first."""
 
 State = TypeVar("State")
 
-Maps = tuple[FloatArray | None, FloatArray | None]
-"""Obstacles and alignment."""
-
 
 @dataclass(frozen=True)
-class _Request:
-    """What a relaxed curve was asked for, as far as it can be compared."""
+class _Start:
+    """A simple curve on the mesh from which relaxation begins."""
 
-    points: SurfacePoints
-    closed: bool
-    order: str
-    via_points: ViaPoints | None
-    maps: tuple[bytes | None, bytes | None]
-    smoothness: float
+    curve: SurfaceCurve
+    visited: IntArray  # (k,) which control points it passes, in order
+    surface: CurveSurface
+    unit: float  # square root of the surface's area
+    breaking: int = 0
+    iterations: int = 0  # until there
+    cancelled: bool = False
 
 
 @dataclass(frozen=True)
 class _Remembered:
     """The last relaxed curve."""
 
-    request: _Request
-    visited: IntArray  # (k,) order of the control points
-    surface: CurveSurface
-    unit: float
+    request: Request
+    start: _Start
     design: Design
 
 
@@ -98,6 +99,7 @@ class Designer:
         self.mesh = mesh
         self._weights: dict[int, NetworkWeights] = {}
         self._last: _Remembered | None = None
+        self._coarse_starts: CoarseStarts | None = None
 
     def forget(self) -> None:
         """Start the next design anew."""
@@ -124,62 +126,125 @@ class Designer:
         if method == "nicmm-paper":
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
-        maps = (
-            checked_map("obstacles", obstacles, self.mesh),
-            checked_map("alignment", alignment, self.mesh),
+        via = {} if via_points is None else via_points
+        request = Request(
+            points=points,
+            closed=closed,
+            order=order,
+            via_points=located_via_points(self.mesh, points, via, order, closed),
+            obstacles=checked_map("obstacles", obstacles, self.mesh),
+            alignment=checked_map("alignment", alignment, self.mesh),
+            smoothness=checked_smoothness(smoothness),
         )
-        smoothness = checked_smoothness(smoothness)
-        request = _Request(points, closed, order, via_points, _as_bytes(maps), smoothness)
         if method == "nicmm":
-            again = self._designed_again(request, progress, started)
-            if again is not None:
-                return again
-        problem = build_problem(self.mesh, points, order, *maps, smoothness, closed, via_points)
-        return self._solve(problem, method, request, maps, progress, started)
+            return self._designed(request, progress, started)
+        problem = self._problem(request)
+        solution = self._solution(problem, request, method, progress)
+        return self._from_level_set(problem, solution, started)
 
-    def _designed_again(
-        self,
-        request: _Request,
-        progress: Progress | None,
-        started: float,
-    ) -> Design | None:
-        """A design from the last curve; None where that is too different."""
+    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
+        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
         last = self._last
-        if last is None or not _is_alike(request, last.request):
-            return None
-        if _is_same(request, last.request):
+        if last is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        points = request.points[last.visited]
-        surface = last.surface
-        start = moved_along(surface, last.design.curves[0], points)
-        if start is None:
-            return None
-        relaxed = self._relaxed(surface, start, request.smoothness, WARM, progress)
-        design = self._relaxed_design(relaxed, surface, last.unit, 0, started)
-        self._remember(request, last.visited, surface, last.unit, design)
-        return design
+        start = self._start_from_last(request)
+        if start is not None:
+            return self._relaxed(request, start, WARM, progress, started)
+        start = self._start_from_coarse(request, progress)
+        if start is not None:
+            config = RelaxationConfig()
+            later = None if progress is None else _part(progress, 0.5, 1.0)
+            return self._relaxed(request, start, config, later, started)
+        problem = self._problem(request)
+        weights = self._pretrained(problem.features.shape[1])
+        solution = predict_once(weights, problem)
+        field, breaking, curves = self._curves(problem, solution.field)
+        if not self._is_one(curves, request.closed):
+            return self._from_level_set(problem, solution, started)
+        surface = self._curve_surface(request)
+        start = _Start(curves[0], problem.loop.order, surface, problem.unit, breaking)
+        return self._relaxed(request, start, RelaxationConfig(), progress, started)
 
-    def _solve(
+    def _start_from_last(self, request: Request) -> _Start | None:
+        """The last curve with its control points moved; None where the request is too different."""
+        last = self._last
+        if last is None or not same_course(request, last.request):
+            return None
+        points = request.points[last.start.visited]
+        curve = moved_along(last.start.surface, last.design.curves[0], points)
+        if curve is None:
+            return None
+        return replace(last.start, curve=curve, breaking=0, iterations=0)
+
+    def _start_from_coarse(self, request: Request, progress: Progress | None) -> _Start | None:
+        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        if np.count_nonzero(component) < LARGE:
+            return None
+        if self._coarse_starts is None:
+            self._coarse_starts = CoarseStarts(self.mesh, self._normals, _coarse_solver)
+        before = None if progress is None else _part(progress, 0.0, 0.5)
+        found = self._coarse_starts.find(request, before)
+        if found is None:
+            return None
+        return _Start(
+            curve=found.curve,
+            visited=found.visited,
+            surface=self._curve_surface(request),
+            unit=float(np.sqrt(self.mesh.face_areas[component].sum())),
+            breaking=found.design.breaking_vertices,
+            iterations=found.design.iterations,
+            cancelled=found.design.status is Status.CANCELLED,
+        )
+
+    def _problem(self, request: Request) -> Problem:
+        return build_problem(
+            self.mesh,
+            request.points,
+            request.order,
+            request.obstacles,
+            request.alignment,
+            request.smoothness,
+            request.closed,
+            request.via_points or None,
+        )
+
+    def _relaxed(
         self,
-        problem: Problem,
-        method: str,
-        request: _Request,
-        maps: Maps,
+        request: Request,
+        start: _Start,
+        config: RelaxationConfig,
         progress: Progress | None,
         started: float,
     ) -> Design:
-        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        solution = self._solution(problem, method, weights, progress)
+        """The design that relaxation makes of a curve; it is kept for the next request."""
+        watch: Callable[[float, FloatArray], bool] | None = None
+        if start.cancelled:
+            watch = _stop
+        elif progress is not None:
+            watch = _seldom(progress, lambda points: points)
+        surface, unit = start.surface, start.unit
+        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
+        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
+        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
+        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
+        design = Design(
+            status=Status.CANCELLED if start.cancelled else STATUS[relaxed.stopped],
+            curves=[relaxed.curve],
+            iterations=start.iterations + relaxed.iterations,
+            seconds=time.perf_counter() - started,
+            energy=energy,
+            breaking_vertices=start.breaking,
+            find_field=partial(curve_field, self.mesh, relaxed.curve),
+        )
+        if design.status is not Status.CANCELLED:
+            self._last = _Remembered(request, start, design)
+        return design
+
+    def _from_level_set(self, problem: Problem, solution: Solution, started: float) -> Design:
+        """The design that a level set is."""
         field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        one = is_one_curve(curves, problem.loop.closed) and not _crosses(self.mesh, curves[0])
-        if method == "nicmm" and one:
-            surface = self._curve_surface(maps, problem.unit)
-            relaxed = self._relaxed(
-                surface, curves[0], request.smoothness, RelaxationConfig(), progress
-            )
-            design = self._relaxed_design(relaxed, surface, problem.unit, breaking, started)
-            self._remember(request, problem.loop.order, surface, problem.unit, design)
-            return design
+        one = self._is_one(curves, problem.loop.closed)
         return Design(
             status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
             curves=curves,
@@ -191,68 +256,36 @@ class Designer:
         )
 
     def _solution(
-        self, problem: Problem, method: str, weights: LossWeights, progress: Progress | None
+        self, problem: Problem, request: Request, method: str, progress: Progress | None
     ) -> Solution:
-        """The level set that a method finds."""
+        """The level set that a method other than "nicmm" finds."""
         watch = None if progress is None else self._field_watcher(problem, progress)
+        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
         pretrained = self._pretrained(problem.features.shape[1])
-        if method == "nicmm":
-            return predict_once(pretrained, problem)
         # These import PyTorch, which nothing else needs.
         from .network.prediction import PredictionConfig, predict
         from .network.trainable_network import build_network
 
         return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 
-    def _relaxed(
-        self,
-        surface: CurveSurface,
-        start: SurfaceCurve,
-        smoothness: float,
-        config: RelaxationConfig,
-        progress: Progress | None,
-    ) -> Relaxed:
-        watch = None if progress is None else _seldom(progress, lambda points: points)
-        return relax(surface, start, smoothness, config, watch)
+    def _is_one(self, curves: list[SurfaceCurve], closed: bool) -> bool:
+        """Whether curves are a single one through all control points that is simple."""
+        if not is_one_curve(curves, closed):
+            return False
+        polyline = SurfacePoints(curves[0].faces, curves[0].barycentric)
+        return not len(crossing_segments(self.mesh, polyline, closed))
 
-    def _relaxed_design(
-        self, relaxed: Relaxed, surface: CurveSurface, unit: float, breaking: int, started: float
-    ) -> Design:
-        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
-        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
-        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
-        return Design(
-            status=STATUS[relaxed.stopped],
-            curves=[relaxed.curve],
-            iterations=relaxed.iterations,
-            seconds=time.perf_counter() - started,
-            energy=energy,
-            breaking_vertices=breaking,
-            find_field=partial(curve_field, self.mesh, relaxed.curve),
-        )
-
-    def _remember(
-        self,
-        request: _Request,
-        visited: IntArray,
-        surface: CurveSurface,
-        unit: float,
-        design: Design,
-    ) -> None:
-        """Keep a curve that came to rest for the next request."""
-        if design.status is not Status.CANCELLED:
-            # The caller may change what was passed.
-            request = replace(request, via_points=copy.deepcopy(request.via_points))
-            self._last = _Remembered(request, visited, surface, unit, design)
-
-    def _curve_surface(self, maps: Maps, unit: float) -> CurveSurface:
-        """The surface that curves move on; the unit is the square root of its area."""
-        if all(one is None for one in maps):
+    def _curve_surface(self, request: Request) -> CurveSurface:
+        """The surface that curves move on."""
+        if not request.has_maps:
             return CurveSurface(self.mesh, self._normals)
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        area = float(self.mesh.face_areas[component].sum())
+        maps = request.obstacles, request.alignment
         importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / unit**2)
+        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / area)
 
     @cached_property
     def _normals(self) -> FloatArray:
@@ -304,6 +337,26 @@ def _seldom(
         return progress(fraction, points(state)) is not False
 
     return watch
+
+
+def _part(progress: Progress, begin: float, end: float) -> Progress:
+    """A progress function for a part of the whole."""
+    return lambda fraction, points: progress(begin + (end - begin) * fraction, points)
+
+
+def _stop(fraction: float, points: FloatArray) -> bool:
+    return False
+
+
+def _coarse_solver(mesh: Mesh) -> Solve:
+    """What designs on a coarse mesh, each curve anew."""
+    designer = Designer(mesh)
+
+    def solve(request: Request, progress: Progress | None) -> Design:
+        designer.forget()
+        return designer._designed(request, progress, time.perf_counter())
+
+    return solve
 
 
 def design_curve(
@@ -383,38 +436,6 @@ def design_curve(
         smoothness=smoothness,
         progress=progress,
     )
-
-
-def _is_alike(one: _Request, other: _Request) -> bool:
-    """Whether two requests are for the same course of a curve."""
-    return (
-        len(one.points) == len(other.points)
-        and one.closed == other.closed
-        and one.order == other.order
-        and same_via_points(one.via_points, other.via_points)
-        and one.maps == other.maps  # the path goes round obstacles from the start
-    )
-
-
-def _is_same(one: _Request, other: _Request) -> bool:
-    """Whether two requests that are alike do not differ at all."""
-    return (
-        np.array_equal(one.points.faces, other.points.faces)
-        and np.array_equal(one.points.barycentric, other.points.barycentric)
-        and one.smoothness == other.smoothness
-    )
-
-
-def _as_bytes(maps: Maps) -> tuple[bytes | None, bytes | None]:
-    """Maps in a form that can be compared, and that the caller cannot change."""
-    obstacles, alignment = (None if one is None else one.tobytes() for one in maps)
-    return obstacles, alignment
-
-
-def _crosses(mesh: Mesh, curve: SurfaceCurve) -> bool:
-    """Whether a curve crosses or touches itself."""
-    polyline = SurfacePoints(curve.faces, curve.barycentric)
-    return len(crossing_segments(mesh, polyline, curve.closed)) > 0
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
