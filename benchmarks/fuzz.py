@@ -46,7 +46,7 @@ def run(scale: Scale) -> None:
         rows.append((kind, count, report.listed(of_kind)))
     body = (
         f"Seed {SEED}, {cases} cases of hostile input, see `hostile_input.py`. A finding is an "
-        "error that is not the package's own, anything printed, a curve that `checker.py` faults, a "
+        "error not the package's own, anything printed, a curve that `checker.py` faults, a "
         f"changed mesh, a crash, or more than {SLOW:g} s of CPU time; the slowest took "
         f"{slowest:.1f} s.\n\n**{len(findings)} findings.**\n\n"
         + "".join(f"- {finding}\n" for finding in findings[:LISTED])

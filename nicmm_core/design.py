@@ -24,7 +24,7 @@ from .coarsening.coarse_start import CoarseStarts, Solve
 from .crossings import crossing_segments
 from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status, is_one_curve
-from .errors import ArgumentError
+from .errors import ArgumentError, UnreachableError
 from .level_set import variational
 from .level_set.contour import extract_curves
 from .level_set.features import feature_map
@@ -43,7 +43,14 @@ from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
 from .request import Progress, Request, same_course, same_request
+from .sound_copy import SoundCopy, sound_copies
 from .surface_points import SurfacePoints, locate_control_points
+
+PARTS = (
+    "control_points lie on parts of the surface that no path of faces with common edges joins, "
+    "or that meet only where several share one edge; join the parts, or choose points on one of "
+    "them"
+)
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -100,10 +107,15 @@ class Designer:
         self._weights: dict[int, NetworkWeights] = {}
         self._last: _Remembered | None = None
         self._coarse_starts: CoarseStarts | None = None
+        self._copies = sound_copies(mesh)
+        self._on_copies: list[tuple[SoundCopy, Designer]] = []
 
     def forget(self) -> None:
         """Start the next design anew."""
         self._last = None
+        for copy, designer in self._on_copies:
+            if copy.differs:
+                designer.forget()
 
     def design(
         self,
@@ -136,6 +148,29 @@ class Designer:
             alignment=checked_map("alignment", alignment, self.mesh),
             smoothness=checked_smoothness(smoothness),
         )
+        copy, designer, request = self._on_sound_copy(request)
+        design = designer._answered(request, method, progress, started)
+        return copy.design(design) if copy.differs else design
+
+    def _on_sound_copy(self, request: Request) -> tuple[SoundCopy, Designer, Request]:
+        """A copy of the mesh without its defects, who designs on it, and the request there."""
+        place = 0
+        while True:
+            if place == len(self._on_copies):
+                copy = next(self._copies, None)
+                if copy is None:
+                    raise UnreachableError(PARTS)
+                self._on_copies.append((copy, Designer(copy.mesh) if copy.differs else self))
+            copy, designer = self._on_copies[place]
+            there = copy.request(request) if copy.differs else request
+            if there is not None:
+                return copy, designer, there
+            place += 1
+
+    def _answered(
+        self, request: Request, method: str, progress: Progress | None, started: float
+    ) -> Design:
+        """A design on this mesh as it is."""
         if method == "nicmm":
             return self._designed(request, progress, started)
         problem = self._problem(request)

@@ -8,6 +8,7 @@ from typing import Any
 import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
@@ -220,11 +221,15 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
     """Refuse two points that are the same."""
-    positions = points.positions(mesh)
-    separation = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-    same = np.triu(separation <= tolerances.COINCIDENT * mesh.diagonal, k=1)
+    if len(points) < 2:
+        return
+    tolerance = tolerances.COINCIDENT * mesh.diagonal
+    # Against the other of the two nearest, since every point is the nearest of its own.
+    distance, nearest = cKDTree(points.positions(mesh)).query(points.positions(mesh), k=2)
+    same = distance[:, 1] <= tolerance
     if same.any():
-        first, second = (int(i[0]) for i in np.nonzero(same))
+        first = int(same.argmax())
+        second = int(nearest[first][nearest[first] != first][0])
         raise ControlPointError(
             f"{names[first]} and {names[second]} are the same point; "
             "remove one of them (a closed curve returns to its first point by itself)"
