@@ -84,8 +84,8 @@ def run(scale: Scale) -> None:
     body = (
         f"Seed {SEED}; on each mesh {len(REQUESTS)} curves through random vertices, shortest "
         "order: 3–5 closed and 2–4 open, drawn from one part of the surface that "
-        "common edges connect, and from all of its vertices. Whether an error is due is decided from the arrays "
-        "alone.\n\n"
+        "common edges connect, and from all of its vertices. Whether an error is due is decided "
+        "from the arrays alone.\n\n"
         + report.table(("meshes", "curves", GOOD, DUE, DECLINED, WRONG, "CPU seconds"), rows)
         + "\n\n"
         + ("".join(f"- {_line(one)}\n" for one in listed[:LISTED]) or "None declined or wrong.\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .array_types import FloatArray
@@ -20,6 +21,12 @@ def check_choices(order: str, method: str) -> None:
         raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
     if not isinstance(order, str) or order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+
+
+def check_closed(closed: bool) -> None:
+    """Raise ArgumentError unless it says yes or no."""
+    if not isinstance(closed, bool | np.bool_):
+        raise ArgumentError(f"closed is {closed!r}; pass True or False")
 
 
 def check_torch() -> None:

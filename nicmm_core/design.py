@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_choices, check_torch, checked_map, checked_smoothness
+from .arguments import check_choices, check_closed, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray, IntArray
 from .coarsening.coarse_start import CoarseStarts, Solve
 from .crossings import crossing_segments
@@ -133,6 +133,7 @@ class Designer:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
         check_choices(order, method)
+        check_closed(closed)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method == "nicmm-paper":
@@ -369,7 +370,8 @@ def _seldom(
         if time.perf_counter() - last_call < PROGRESS_INTERVAL:
             return True
         last_call = time.perf_counter()
-        return progress(fraction, points(state)) is not False
+        # A copy, with which the caller may do as it likes.
+        return progress(fraction, points(state).copy()) is not False
 
     return watch
 

@@ -12,6 +12,9 @@ from scipy.sparse import csgraph
 from .array_types import BoolArray, FloatArray, IntArray
 from .errors import MeshError
 
+LARGEST, SMALLEST = 1e50, 1e-50
+"""Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
+
 
 class Mesh:
     """A triangle mesh with checked arrays and the adjacency that the pipeline asks for.
@@ -34,12 +37,17 @@ class Mesh:
     ------
     MeshError
         If an array has the wrong shape or type, a position is not finite, an index is out of
-        range, a face names one vertex twice, or there are no faces.
+        range, a face names one vertex twice, there are no faces, or they are all at one place.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         self.vertices = _checked_vertices(vertices)
         self.faces = _checked_faces(faces, len(self.vertices))
+        if self.diagonal < SMALLEST:
+            raise MeshError(
+                f"vertices of all faces lie within {self.diagonal:g}, as good as at one place; "
+                "scale the mesh"
+            )
         self.vertices.setflags(write=False)
         self.faces.setflags(write=False)
 
@@ -175,6 +183,11 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
         raise MeshError(
             f"vertices has {bad.sum()} positions that are NaN or infinite, the first at index "
             f"{bad.argmax()}; remove or repair them"
+        )
+    if checked.size and np.abs(checked).max() > LARGEST:
+        raise MeshError(
+            f"vertices has coordinates up to {np.abs(checked).max():g}, with which nothing can be "
+            f"computed; remove them, or scale the mesh to less than {LARGEST:g}"
         )
     return checked
 

@@ -37,6 +37,9 @@ MOVED = 1e-3
 ATTEMPTS = 4
 """Of moving vertices, until every face has an area."""
 
+ROUNDS = 8
+"""Of cutting one edge further where a cut does not come apart."""
+
 SEED = 0
 """Of the ways in which vertices are moved; the same mesh has the same copy."""
 
@@ -166,7 +169,8 @@ def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
     kept = _without_twins(mesh.faces)
     faces = mesh.faces[kept]
     sides = _Sides(faces)
-    for pairs in (sides.straight_on(mesh.vertices), sides.linked(mesh.vertices)):
+    for joined in (sides.straight_on, sides.linked):
+        pairs = joined(mesh.vertices)
         yield _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
 
 
@@ -298,7 +302,40 @@ class _Sides:
         number[first] = source[first]
         new = np.flatnonzero(number < 0)
         number[new] = n_vertices + np.arange(len(new))
-        return number[label].reshape(-1, 3), np.concatenate([np.arange(n_vertices), source[new]])
+        corners = number[label]
+        vertex = np.concatenate([np.arange(n_vertices), source[new]])
+        for _ in range(ROUNDS):
+            corners, vertex, changed = self._slit(pairs, corners, vertex)
+            if not changed:
+                break
+        return corners.reshape(-1, 3), vertex
+
+    def _slit(
+        self, pairs: IntArray, corners: IntArray, vertex: IntArray
+    ) -> tuple[IntArray, IntArray, bool]:
+        """Give corners a vertex of their own where a cut ends at both ends of an edge.
+
+        Then the faces on both sides of the cut still have both vertices in common. A further edge
+        is cut for it. Gives the corners, the vertices, and whether anything had to be done.
+        """
+        partner = np.arange(len(corners))
+        partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+        own = []
+        for sides in self._branching:
+            ends = np.sort(corners[np.stack([self._low[sides], self._high[sides]])], axis=0)
+            for edge in np.unique(ends, axis=1).T:
+                here = sides[(ends == edge[:, None]).all(axis=0)]
+                groups = {tuple(sorted({int(side), int(partner[side])})) for side in here}
+                # What is joined stays where it is before what is cut off.
+                own += sorted(groups, key=lambda group: (-len(group), group))[1:]
+        corners = corners.copy()
+        added = []
+        for group in own:
+            added.append(vertex[corners[self._low[group[0]]]])
+            corners[self._low[list(group)]] = len(vertex) + len(added) - 1
+        if not added:
+            return corners, vertex, False
+        return corners, np.concatenate([vertex, added]), True
 
 
 def _with_areas(
