@@ -263,60 +263,6 @@ _KINDS: tuple[tuple[str, Callable[[np.random.Generator, Answer], None]], ...] = 
 )
 """One after the other; what takes long comes seldom."""
 
-_COMPRESSIONS)) as archive:
-            for member, content in members.items():
-                archive.writestr(member, content)
-        data = buffer.getvalue()
-    if generator.random() < 0.5:
-        data = _mutated(generator, data)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "weights.npz"
-        path.write_bytes(data)
-        weights = load_weights(path)
-    result.outcome = "read"
-    if not isinstance(weights.config, NetworkConfig) or not all(
-        np.isfinite(array).all() for array in weights.parameters.values()
-    ):
-        result.faults.append("weights that are not finite")
-
-
-def _output(generator: np.random.Generator, result: Answer) -> None:
-    """Paths that cannot be written or read."""
-    paths = (
-        "", ".", "/", "/nowhere/x.obj", "/proc/x.txt", "\0.obj", "x" * 300 + ".obj", "/dev/full",
-        "/proc/x.json", "~/x.csv", "ü/x.obj",
-    )  # fmt: skip
-    path = _chosen(generator, (*paths, *OBJECTS[:20]))
-    if isinstance(path, str) and path in ("/", "."):
-        path += _chosen(generator, ("", *MESH_FORMATS, *CURVE_FORMATS))
-    mesh = _sound_mesh(generator)
-    match generator.integers(3):
-        case 0:
-            read_mesh(path)
-        case 1:
-            write_mesh(path, mesh)
-        case 2:
-            write_curve(path, _a_curve())
-    result.faults.append(f"{path!r} was read or written")
-
-
-_KINDS: tuple[tuple[str, Callable[[np.random.Generator, Answer], None]], ...] = (
-    ("arrays", _arrays),
-    ("geometry", _geometry),
-    ("control points", _control_points),
-    ("arguments", _arguments),
-    ("mesh file", _mesh_file),
-    ("arrays", _arrays),
-    ("sequence", _sequence),
-    ("control points", _control_points),
-    ("mesh file", _mesh_file),
-    ("weights file", _weights_file),
-    ("geometry", _geometry),
-    ("arguments", _arguments),
-    ("mesh file", _mesh_file),
-    ("output", _output),
-)
-
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 
 
