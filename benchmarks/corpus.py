@@ -71,7 +71,7 @@ def run(scale: Scale) -> None:
     """Ask for curves on all meshes and sort what comes."""
     items = _items(scale)
     done: list[Isolated[Item, Outcome]] = []
-    for one in isolated(_outcome, items, PATIENCE):
+    for one in isolated(outcome, items, PATIENCE):
         done.append(one)
         if _verdict(one) in (DECLINED, WRONG):
             print(f"  {_line(one)}", flush=True)
@@ -119,7 +119,8 @@ def _generated_requests(scale: Scale) -> list[tuple[str, int]]:
     return [(name, request) for name in names for request in range(len(REQUESTS))]
 
 
-def _outcome(item: Item) -> Outcome:
+def outcome(item: Item) -> Outcome:
+    """Ask for the curve and judge what comes."""
     try:
         mesh, designer = _prepared(item.name, item.path)
     # Every file in the collections holds a mesh.
