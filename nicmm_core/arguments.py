@@ -63,7 +63,7 @@ def checked_smoothness(smoothness: float) -> float:
     """A number in `SMOOTHNESS_RANGE`, or an ArgumentError."""
     try:
         value = float(smoothness)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
     low, high = SMOOTHNESS_RANGE
     if not low <= value <= high:

@@ -133,7 +133,10 @@ def real_array(values: ArrayLike) -> FloatArray:
     given = np.array(values)
     if np.iscomplexobj(given):
         raise TypeError("they are complex")
-    return given.astype(np.float64)
+    try:
+        return given.astype(np.float64)
+    except OverflowError as error:  # whole numbers of hundreds of digits
+        raise ValueError(str(error)) from error
 
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
