@@ -7,8 +7,8 @@ is there. Three things may differ:
 - Of faces with the same three corners only the first is there.
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
   off. Vertices there are doubled.
-- Vertices of faces without area are moved by a thousandth of their shortest edge, each its own way,
-  so that every face has an area.
+- Vertices of faces without area are moved by a thousandth of their shortest edge that has a length,
+  each its own way, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -22,14 +22,18 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
+from .crossings import crossing_segments
 from .curve import SurfaceCurve, curve_on_mesh
-from .design_result import Design
+from .design_result import Design, Status
 from .mesh import Mesh, unique_edges
 from .request import Request
 from .surface_points import SurfacePoints
 
 FLAT = 1e-10
 """Sine between the longest and the shortest edge of a face below which it has no area."""
+
+SHORT = 1e-12
+"""Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
 
 MOVED = 1e-3
 """How far vertices of faces without area are moved, in lengths of their shortest edge."""
@@ -90,11 +94,18 @@ class SoundCopy:
 
     def design(self, design: Design) -> Design:
         """A design on the copy as one on the mesh."""
+        curves = [self._curve(curve) for curve in design.curves]
+        status = design.status
+        # Strands that pass different copies of one vertex touch there.
+        if len(self.vertex) > len(self.original.vertices) and not all(map(self._is_simple, curves)):
+            status = Status.NOT_ONE_CURVE
         return replace(
-            design,
-            curves=[self._curve(curve) for curve in design.curves],
-            find_field=partial(self._field, design),
+            design, status=status, curves=curves, find_field=partial(self._field, design)
         )
+
+    def _is_simple(self, curve: SurfaceCurve) -> bool:
+        polyline = SurfacePoints(curve.faces, curve.barycentric)
+        return not len(crossing_segments(self.original, polyline, curve.closed))
 
     def _curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         faces = self.face[curve.faces]
@@ -344,27 +355,28 @@ def _with_areas(
     """A copy with these faces, in which every face has an area where that is possible."""
     face = np.arange(len(mesh.faces)) if kept is None else kept
     vertices = mesh.vertices[vertex]
-    flat = _flat(vertices, faces)
+    short = SHORT * mesh.diagonal
+    flat = _flat(vertices, faces, short)
     if kept is None and not flat.any():
         return SoundCopy(mesh, mesh, vertex, face)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
         vertices = vertices - vertices[faces[0, 0]]
         start, still = vertices, flat
-        reach = MOVED * _shortest_edges(vertices, faces)
+        reach = MOVED * _shortest_edges(vertices, faces, short)
         generator = np.random.default_rng(SEED)
         for _ in range(ATTEMPTS):
             moving = np.zeros(len(vertices), dtype=bool)
             moving[faces[still]] = True
             moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
             vertices = np.where(moving[:, None], start + moves, vertices)
-            still = _flat(vertices, faces)
+            still = _flat(vertices, faces, short)
             if not still.any():
                 break
     return SoundCopy(mesh, Mesh(vertices, faces), vertex, face)
 
 
-def _flat(vertices: FloatArray, faces: IntArray) -> BoolArray:
+def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
     """Which faces have no area, shape (f,): a corner on another, or on the opposite edge.
 
     Needles have an area, however thin: their shortest edge stands across the longest.
@@ -373,19 +385,21 @@ def _flat(vertices: FloatArray, faces: IntArray) -> BoolArray:
     sides = np.roll(corner, -1, axis=1) - corner
     lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return twice_area <= FLAT * lengths[:, 0] * lengths[:, 2]
+    return (lengths[:, 0] <= short) | (twice_area <= FLAT * lengths[:, 0] * lengths[:, 2])
 
 
-def _shortest_edges(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Length of the shortest edge that is none of length zero, at each vertex or at its place.
+def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
+    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
 
-    Zero at vertices whose edges have no length.
+    Shorter ones join vertices to one place. Zero where no edge is longer.
     """
     edges, _ = unique_edges(faces)
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    edges, lengths = edges[lengths > 0.0], lengths[lengths > 0.0]
-    place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    shortest = np.full(int(place.max()) + 1, np.inf)
-    for end in edges.T:
-        np.minimum.at(shortest, place[end], lengths)
+    at_one_place = edges[lengths <= short].T
+    shape = (len(vertices), len(vertices))
+    graph = sparse.coo_array((np.ones(at_one_place.shape[1]), at_one_place), shape=shape)
+    n_places, place = csgraph.connected_components(graph, directed=False)
+    shortest = np.full(n_places, np.inf)
+    for end in edges[lengths > short].T:
+        np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]
