@@ -47,9 +47,8 @@ from .sound_copy import SoundCopy, sound_copies
 from .surface_points import SurfacePoints, locate_control_points
 
 PARTS = (
-    "control_points lie on parts of the surface that no path of faces with common edges joins, "
-    "or that meet only where several share one edge; join the parts, or choose points on one of "
-    "them"
+    "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
+    "only, across which no curve is led; join the parts, or choose points on one of them"
 )
 
 PROGRESS_INTERVAL = 0.25

@@ -6,7 +6,8 @@ is there. Three things may differ:
 
 - Of faces with the same three corners only the first is there.
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
-  off. Vertices there are doubled.
+  off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
+  there are doubled.
 - Vertices of faces without area are moved by a thousandth of their shortest edge that has a length,
   each its own way, so that every face has an area.
 """
@@ -173,16 +174,15 @@ def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
     The first goes straight on where more than two faces share an edge. The second joins as many
     parts of the surface as it can.
     """
-    edges, count = unique_edges(mesh.faces)
-    if (count <= 2).all():
-        yield _with_areas(mesh, mesh.faces, np.arange(len(mesh.vertices)))
-        return
-    kept = _without_twins(mesh.faces)
-    faces = mesh.faces[kept]
-    sides = _Sides(faces)
-    for joined in (sides.straight_on, sides.linked):
-        pairs = joined(mesh.vertices)
-        yield _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
+    sides = _Sides(mesh.faces)
+    if sides.branch:
+        kept = _without_twins(mesh.faces)
+        sides = _Sides(mesh.faces[kept])
+        for joined in (sides.straight_on, sides.linked):
+            yield _with_areas(mesh, *sides.cut(joined(mesh.vertices), len(mesh.vertices)), kept)
+    else:
+        every = np.arange(len(mesh.faces))
+        yield _with_areas(mesh, *sides.cut(sides.plain_pairs, len(mesh.vertices)), every)
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -213,8 +213,13 @@ class _Sides:
         corner = np.arange(self._faces.size)
         return corner - corner % 3 + (corner + step) % 3
 
+    @property
+    def branch(self) -> bool:
+        """Whether an edge has more than two faces."""
+        return bool((self._count > 2).any())
+
     @cached_property
-    def _plain_pairs(self) -> IntArray:
+    def plain_pairs(self) -> IntArray:
         """Sides of edges that two faces have, shape (p, 2)."""
         first = self._first[self._count == 2]
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
@@ -222,15 +227,15 @@ class _Sides:
     @cached_property
     def _branching(self) -> list[IntArray]:
         """Sides of each edge that more faces have."""
+        several = self._count > 2
         return [
             self._order[first : first + count]
-            for first, count in zip(self._first, self._count, strict=True)
-            if count > 2
+            for first, count in zip(self._first[several], self._count[several], strict=True)
         ]
 
     def straight_on(self, vertices: FloatArray) -> IntArray:
         """Pairs of sides that are joined, shape (p, 2): those that go on most straightly."""
-        pairs = [self._plain_pairs]
+        pairs = [self.plain_pairs]
         for sides in self._branching:
             pairs.append(self._straightest(sides, vertices))
         return np.concatenate(pairs)
@@ -241,14 +246,14 @@ class _Sides:
         Edges where the same parts meet share the work: on each run of them two parts are joined.
         """
         n_faces = len(self._faces)
-        faces = self._plain_pairs // 3
+        faces = self.plain_pairs // 3
         graph = sparse.coo_array((np.ones(len(faces)), faces.T), shape=(n_faces, n_faces))
         part = csgraph.connected_components(graph, directed=False)[1]
         groups: dict[tuple[int, ...], list[IntArray]] = {}
         for sides in self._branching:
             parts = tuple(np.unique(part[sides // 3]).tolist())
             groups.setdefault(parts, []).append(sides)
-        pairs = [self._plain_pairs]
+        pairs = [self.plain_pairs]
         for parts, edges in groups.items():
             if len(parts) == 1:
                 pairs += [self._straightest(sides, vertices) for sides in edges]
@@ -285,8 +290,6 @@ class _Sides:
     def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
         """Faces whose corners are one vertex only where pairs of sides join them.
 
-        Vertices that no branching edge has stay whole.
-
         Returns
         -------
         (f, 3) int array
@@ -295,14 +298,9 @@ class _Sides:
             The vertex that each vertex was.
         """
         corner = self._faces.ravel()
-        branching = np.zeros(n_vertices, dtype=bool)
-        for sides in self._branching:
-            branching[corner[[self._low[sides[0]], self._high[sides[0]]]]] = True
-        by_vertex = np.argsort(corner, kind="stable")
-        same = (corner[by_vertex[1:]] == corner[by_vertex[:-1]]) & ~branching[corner[by_vertex[1:]]]
         one, other = pairs.T
-        rows = np.concatenate([self._low[one], self._high[one], by_vertex[1:][same]])
-        columns = np.concatenate([self._low[other], self._high[other], by_vertex[:-1][same]])
+        rows = np.concatenate([self._low[one], self._high[one]])
+        columns = np.concatenate([self._low[other], self._high[other]])
         graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
         n_labels, label = csgraph.connected_components(graph, directed=False)
         source = np.zeros(n_labels, dtype=np.int64)
@@ -349,15 +347,12 @@ class _Sides:
         return corners, np.concatenate([vertex, added]), True
 
 
-def _with_areas(
-    mesh: Mesh, faces: IntArray, vertex: IntArray, kept: IntArray | None = None
-) -> SoundCopy:
+def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> SoundCopy:
     """A copy with these faces, in which every face has an area where that is possible."""
-    face = np.arange(len(mesh.faces)) if kept is None else kept
     vertices = mesh.vertices[vertex]
     short = SHORT * mesh.diagonal
     flat = _flat(vertices, faces, short)
-    if kept is None and not flat.any():
+    if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
         return SoundCopy(mesh, mesh, vertex, face)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
