@@ -71,6 +71,8 @@ class SoundCopy:
 
     def request(self, request: Request) -> Request | None:
         """The same request on the copy; None where cuts separate its points."""
+        if not self.differs:
+            return request
         sets = [request.points, *request.via_points.values()]
         candidates = [self._candidates(points) for points in sets]
         common = self._common_component([each for of_set in candidates for each in of_set])
@@ -90,6 +92,8 @@ class SoundCopy:
 
     def design(self, design: Design) -> Design:
         """A design on the copy as one on the mesh."""
+        if not self.differs:
+            return design
         return replace(
             design,
             curves=[self._curve(curve) for curve in design.curves],
@@ -162,8 +166,7 @@ def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
     The first goes straight on where more than two faces share an edge. The second joins as many
     parts of the surface as it can.
     """
-    edges, count = unique_edges(mesh.faces)
-    if (count <= 2).all():
+    if not mesh.branches:
         yield _with_areas(mesh, mesh.faces, np.arange(len(mesh.vertices)))
         return
     kept = _without_twins(mesh.faces)
