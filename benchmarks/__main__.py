@@ -25,6 +25,7 @@ MEASUREMENTS = (
     "curvature",
     "runtime",
     "dragging",
+    "stages",
     "peers",
     "degraded",
     "resolution",

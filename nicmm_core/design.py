@@ -1,85 +1,35 @@
-"""The main path: from a mesh and control points to a curve. Read this file first.
+"""The front door: a mesh and control points go in, a curve comes out. Read this file first.
+
+A request is checked, brought to a copy of the mesh without defects where it has some
+(`sound_copy`), and answered there (`surface_designer`):
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
 
-On a large mesh all of that is done on a coarse mesh of the same surface, and the curve is lifted
-from there and relaxed once more (`coarsening`).
+On all but small meshes all but the last is done on a coarse mesh of the same surface, and the
+curve is lifted from there (`coarsening`).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import check_choices, check_closed, check_torch, checked_map, checked_smoothness
-from .array_types import FloatArray, IntArray
-from .coarsening.coarse_start import CoarseStarts, Solve
-from .crossings import crossing_segments
-from .curve import SurfaceCurve
-from .design_result import STATUS, Design, Status, is_one_curve
+from .design_result import Design
 from .errors import ArgumentError, UnreachableError
-from .level_set import variational
-from .level_set.contour import extract_curves
-from .level_set.features import feature_map
-from .level_set.losses import LossWeights, balanced
-from .level_set.problem import Problem, build_problem
-from .level_set.solution import Solution
-from .level_set.topology import keep_topology
 from .mesh import Mesh
-from .network.forward_pass import NetworkWeights
-from .network.single_pass import predict_once
-from .network.weights_file import load_weights
 from .path.via_points import ViaPoints, located_via_points
-from .relaxation.curve_field import curve_field
-from .relaxation.curve_nodes import CurveSurface, unsigned_normals
-from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.relaxing import RelaxationConfig, relax
-from .relaxation.warm_start import WARM, moved_along
-from .request import Progress, Request, same_course, same_request
+from .request import Progress, Request
 from .sound_copy import SoundCopy, sound_copies
+from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, locate_control_points
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
     "only, across which no curve is led; join the parts, or choose points on one of them"
 )
-
-PROGRESS_INTERVAL = 0.25
-"""Least seconds between two calls of a caller's progress function."""
-
-LARGE = 24_000
-"""Faces of a component from which on a curve is found on a coarse mesh first."""
-
-State = TypeVar("State")
-
-
-@dataclass(frozen=True)
-class _Start:
-    """A simple curve on the mesh from which relaxation begins."""
-
-    curve: SurfaceCurve
-    visited: IntArray  # (k,) which control points it passes, in order
-    surface: CurveSurface
-    unit: float  # square root of the surface's area
-    breaking: int = 0
-    iterations: int = 0  # until there
-    cancelled: bool = False
-
-
-@dataclass(frozen=True)
-class _Remembered:
-    """The last relaxed curve."""
-
-    request: Request
-    start: _Start
-    design: Design
 
 
 class Designer:
@@ -103,18 +53,13 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._weights: dict[int, NetworkWeights] = {}
-        self._last: _Remembered | None = None
-        self._coarse_starts: CoarseStarts | None = None
         self._copies = sound_copies(mesh)
-        self._on_copies: list[tuple[SoundCopy, Designer]] = []
+        self._designers: list[tuple[SoundCopy, SurfaceDesigner]] = []
 
     def forget(self) -> None:
         """Start the next design anew."""
-        self._last = None
-        for copy, designer in self._on_copies:
-            if copy.differs:
-                designer.forget()
+        for _, designer in self._designers:
+            designer.forget()
 
     def design(
         self,
@@ -149,250 +94,22 @@ class Designer:
             smoothness=checked_smoothness(smoothness),
         )
         copy, designer, request = self._on_sound_copy(request)
-        design = designer._answered(request, method, progress, started)
-        return copy.design(design) if copy.differs else design
+        return copy.design(designer.design(request, method, progress, started))
 
-    def _on_sound_copy(self, request: Request) -> tuple[SoundCopy, Designer, Request]:
+    def _on_sound_copy(self, request: Request) -> tuple[SoundCopy, SurfaceDesigner, Request]:
         """A copy of the mesh without its defects, who designs on it, and the request there."""
         place = 0
         while True:
-            if place == len(self._on_copies):
+            if place == len(self._designers):
                 copy = next(self._copies, None)
                 if copy is None:
                     raise UnreachableError(PARTS)
-                self._on_copies.append((copy, Designer(copy.mesh) if copy.differs else self))
-            copy, designer = self._on_copies[place]
-            there = copy.request(request) if copy.differs else request
+                self._designers.append((copy, SurfaceDesigner(copy.mesh)))
+            copy, designer = self._designers[place]
+            there = copy.request(request)
             if there is not None:
                 return copy, designer, there
             place += 1
-
-    def _answered(
-        self, request: Request, method: str, progress: Progress | None, started: float
-    ) -> Design:
-        """A design on this mesh as it is."""
-        if method == "nicmm":
-            return self._designed(request, progress, started)
-        problem = self._problem(request)
-        solution = self._solution(problem, request, method, progress)
-        return self._from_level_set(problem, solution, started)
-
-    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
-        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
-        last = self._last
-        if last is not None and same_request(request, last.request):
-            return replace(last.design, seconds=time.perf_counter() - started)
-        start = self._start_from_last(request)
-        if start is not None:
-            return self._relaxed(request, start, WARM, progress, started)
-        start = self._start_from_coarse(request, progress)
-        if start is not None:
-            config = RelaxationConfig()
-            later = None if progress is None else _part(progress, 0.5, 1.0)
-            return self._relaxed(request, start, config, later, started)
-        problem = self._problem(request)
-        weights = self._pretrained(problem.features.shape[1])
-        solution = predict_once(weights, problem)
-        field, breaking, curves = self._curves(problem, solution.field)
-        if not self._is_one(curves, request.closed):
-            return self._from_level_set(problem, solution, started)
-        surface = self._curve_surface(request)
-        start = _Start(curves[0], problem.loop.order, surface, problem.unit, breaking)
-        return self._relaxed(request, start, RelaxationConfig(), progress, started)
-
-    def _start_from_last(self, request: Request) -> _Start | None:
-        """The last curve with its control points moved; None where the request is too different."""
-        last = self._last
-        if last is None or not same_course(request, last.request):
-            return None
-        points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.design.curves[0], points)
-        if curve is None:
-            return None
-        return replace(last.start, curve=curve, breaking=0, iterations=0)
-
-    def _start_from_coarse(self, request: Request, progress: Progress | None) -> _Start | None:
-        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        if np.count_nonzero(component) < LARGE:
-            return None
-        if self._coarse_starts is None:
-            self._coarse_starts = CoarseStarts(self.mesh, self._normals, _coarse_solver)
-        before = None if progress is None else _part(progress, 0.0, 0.5)
-        found = self._coarse_starts.find(request, before)
-        if found is None:
-            return None
-        return _Start(
-            curve=found.curve,
-            visited=found.visited,
-            surface=self._curve_surface(request),
-            unit=float(np.sqrt(self.mesh.face_areas[component].sum())),
-            breaking=found.design.breaking_vertices,
-            iterations=found.design.iterations,
-            cancelled=found.design.status is Status.CANCELLED,
-        )
-
-    def _problem(self, request: Request) -> Problem:
-        return build_problem(
-            self.mesh,
-            request.points,
-            request.order,
-            request.obstacles,
-            request.alignment,
-            request.smoothness,
-            request.closed,
-            request.via_points or None,
-        )
-
-    def _relaxed(
-        self,
-        request: Request,
-        start: _Start,
-        config: RelaxationConfig,
-        progress: Progress | None,
-        started: float,
-    ) -> Design:
-        """The design that relaxation makes of a curve; it is kept for the next request."""
-        watch: Callable[[float, FloatArray], bool] | None = None
-        if start.cancelled:
-            watch = _stop
-        elif progress is not None:
-            watch = _seldom(progress, lambda points: points)
-        surface, unit = start.surface, start.unit
-        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
-        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
-        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
-        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
-        design = Design(
-            status=Status.CANCELLED if start.cancelled else STATUS[relaxed.stopped],
-            curves=[relaxed.curve],
-            iterations=start.iterations + relaxed.iterations,
-            seconds=time.perf_counter() - started,
-            energy=energy,
-            breaking_vertices=start.breaking,
-            find_field=partial(curve_field, self.mesh, relaxed.curve),
-        )
-        if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, design)
-        return design
-
-    def _from_level_set(self, problem: Problem, solution: Solution, started: float) -> Design:
-        """The design that a level set is."""
-        field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        one = self._is_one(curves, problem.loop.closed)
-        return Design(
-            status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
-            curves=curves,
-            iterations=solution.iterations,
-            seconds=time.perf_counter() - started,
-            energy=solution.terms,
-            breaking_vertices=breaking,
-            find_field=partial(_at_input_vertices, self.mesh, problem, field),
-        )
-
-    def _solution(
-        self, problem: Problem, request: Request, method: str, progress: Progress | None
-    ) -> Solution:
-        """The level set that a method other than "nicmm" finds."""
-        watch = None if progress is None else self._field_watcher(problem, progress)
-        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        if method == "variational":
-            return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        pretrained = self._pretrained(problem.features.shape[1])
-        # These import PyTorch, which nothing else needs.
-        from .network.prediction import PredictionConfig, predict
-        from .network.trainable_network import build_network
-
-        return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
-
-    def _is_one(self, curves: list[SurfaceCurve], closed: bool) -> bool:
-        """Whether curves are a single one through all control points that is simple."""
-        if not is_one_curve(curves, closed):
-            return False
-        polyline = SurfacePoints(curves[0].faces, curves[0].barycentric)
-        return not len(crossing_segments(self.mesh, polyline, closed))
-
-    def _curve_surface(self, request: Request) -> CurveSurface:
-        """The surface that curves move on."""
-        if not request.has_maps:
-            return CurveSurface(self.mesh, self._normals)
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        area = float(self.mesh.face_areas[component].sum())
-        maps = request.obstacles, request.alignment
-        importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / area)
-
-    @cached_property
-    def _normals(self) -> FloatArray:
-        return unsigned_normals(self.mesh)
-
-    def _pretrained(self, channels: int) -> NetworkWeights:
-        if channels not in self._weights:
-            self._weights[channels] = load_weights(channels=channels)
-        return self._weights[channels]
-
-    def _curves(
-        self, problem: Problem, field: FloatArray, keeps_topology: bool = False
-    ) -> tuple[FloatArray, int, list[SurfaceCurve]]:
-        """Make φ exactly zero at the control points and one loop, and take its contour."""
-        breaking = 0
-        if not keeps_topology:
-            field, breaking = keep_topology(
-                problem.working,
-                problem.loop,
-                problem.initial_distance,
-                problem.smoother.interpolating(field),
-                problem.bundle,
-            )
-        controls = problem.loop.control_vertices
-        curves = extract_curves(self.mesh, problem.working, field, controls, problem.bundle)
-        return field, breaking, curves
-
-    def _field_watcher(
-        self, problem: Problem, progress: Progress
-    ) -> Callable[[float, FloatArray], bool]:
-        def points(field: FloatArray) -> FloatArray:
-            curves = self._curves(problem, field)[2]
-            return curves[0].points if curves else np.zeros((0, 3))
-
-        return _seldom(progress, points)
-
-
-def _seldom(
-    progress: Progress, points: Callable[[State], FloatArray]
-) -> Callable[[float, State], bool]:
-    """Call a progress function with the points of a state, but not too often."""
-    last_call = -np.inf
-
-    def watch(fraction: float, state: State) -> bool:
-        nonlocal last_call
-        if time.perf_counter() - last_call < PROGRESS_INTERVAL:
-            return True
-        last_call = time.perf_counter()
-        # A copy, with which the caller may do as it likes.
-        return progress(fraction, points(state).copy()) is not False
-
-    return watch
-
-
-def _part(progress: Progress, begin: float, end: float) -> Progress:
-    """A progress function for a part of the whole."""
-    return lambda fraction, points: progress(begin + (end - begin) * fraction, points)
-
-
-def _stop(fraction: float, points: FloatArray) -> bool:
-    return False
-
-
-def _coarse_solver(mesh: Mesh) -> Solve:
-    """What designs on a coarse mesh, each curve anew."""
-    designer = Designer(mesh)
-
-    def solve(request: Request, progress: Progress | None) -> Design:
-        designer.forget()
-        return designer._designed(request, progress, time.perf_counter())
-
-    return solve
 
 
 def design_curve(
@@ -472,13 +189,3 @@ def design_curve(
         smoothness=smoothness,
         progress=progress,
     )
-
-
-def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
-    """φ in mesh units at the input vertices."""
-    if problem.bundle is not None:
-        field = np.abs(field)
-    inputs = problem.working.input_vertex
-    values = np.full(len(mesh.vertices), field.max() * problem.unit)
-    values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit
-    return values

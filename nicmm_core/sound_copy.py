@@ -76,6 +76,8 @@ class SoundCopy:
 
     def request(self, request: Request) -> Request | None:
         """The same request on the copy; None where cuts separate its points."""
+        if not self.differs:
+            return request
         sets = [request.points, *request.via_points.values()]
         candidates = [self._candidates(points) for points in sets]
         common = self._common_component([each for of_set in candidates for each in of_set])
@@ -95,6 +97,8 @@ class SoundCopy:
 
     def design(self, design: Design) -> Design:
         """A design on the copy as one on the mesh."""
+        if not self.differs:
+            return design
         curves = [self._curve(curve) for curve in design.curves]
         status = design.status
         # Strands that pass different copies of one vertex touch there.
@@ -175,7 +179,7 @@ def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
     parts of the surface as it can.
     """
     sides = _Sides(mesh.faces)
-    if sides.branch:
+    if mesh.branches:
         kept = _without_twins(mesh.faces)
         sides = _Sides(mesh.faces[kept])
         for joined in (sides.straight_on, sides.linked):
@@ -212,11 +216,6 @@ class _Sides:
     def _corners(self, step: int) -> IntArray:
         corner = np.arange(self._faces.size)
         return corner - corner % 3 + (corner + step) % 3
-
-    @property
-    def branch(self) -> bool:
-        """Whether an edge has more than two faces."""
-        return bool((self._count > 2).any())
 
     @cached_property
     def plain_pairs(self) -> IntArray:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -19,8 +18,8 @@ from scipy.spatial import cKDTree
 
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
-from ..mesh import Mesh, unique_edges
-from ..surface_points import SurfacePoints
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints, nearest_points
 
 CANDIDATES = 8
 """Vertices that seeds are chosen from, for each seed."""
@@ -64,11 +63,11 @@ class CoarseMesh:
         """Fine faces at the fine vertices of some cells, ascending."""
         order, begin = self._by_cell
         parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
-        return np.unique(fine.vertex_faces[np.concatenate(parts)].indices)
+        return fine.faces_at(np.concatenate(parts))
 
     def cells_around(self, vertices: IntArray) -> IntArray:
         """Some cells and their neighbours, ascending."""
-        return np.unique(self.mesh.faces[self.mesh.vertex_faces[vertices].indices])
+        return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
 
     def greatest_in_cells(self, values: FloatArray) -> FloatArray:
         """The greatest of the values at fine vertices, (V,), in each cell, shape (n,)."""
@@ -88,20 +87,12 @@ class CoarseMesh:
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
         positions = points.positions(fine)
         faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-        incidence = self.mesh.vertex_faces
-        for number, (vertex, position) in enumerate(
-            zip(self.cell[corner].tolist(), positions, strict=True)
-        ):
-            ring = np.unique(self.mesh.faces[incidence[[vertex]].indices])
-            around = np.unique(incidence[ring].indices)
+        for number, vertex in enumerate(self.cell[corner]):
+            around = self.mesh.faces_at(self.cells_around(vertex[None]))
             if not len(around):
                 raise UnreachableError("a cell of the coarse mesh has no face")
-            _, nearest, place = igl.point_mesh_squared_distance(
-                position[None], self.mesh.vertices, self.mesh.faces[around]
-            )
-            faces[number] = around[int(nearest[0])]
-            a, b, c = self.mesh.vertices[self.mesh.faces[faces[number]]][:, None]
-            barycentric[number] = igl.barycentric_coordinates(place.reshape(1, 3), a, b, c)
+            found, _ = nearest_points(self.mesh, positions[number : number + 1], around)
+            faces[number], barycentric[number] = found.faces[0], found.barycentric[0]
         return SurfacePoints(faces, barycentric)
 
 
@@ -128,9 +119,8 @@ def build_coarse_mesh(
     areas = np.zeros(len(mesh.vertices))
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
     seed = _seeds(mesh, vertex_normals, areas, count)
-    graph = _edge_graph(mesh, faces)
     _, _, nearest = csgraph.dijkstra(
-        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
+        _edge_graph(mesh), directed=False, indices=seed, min_only=True, return_predecessors=True
     )
     cell_of = np.full(len(mesh.vertices), -1)
     cell_of[seed] = np.arange(len(seed))
@@ -144,10 +134,9 @@ def build_coarse_mesh(
     return CoarseMesh(Mesh(mesh.vertices[seed], corners[np.sort(first)]), seed, cell)
 
 
-def _edge_graph(mesh: Mesh, faces: IntArray) -> sparse.csr_array:
-    """Lengths of the edges of some faces as a triangular matrix, shape (V, V)."""
-    edges, _ = unique_edges(faces)
-    start, end = edges.T
+def _edge_graph(mesh: Mesh) -> sparse.csr_array:
+    """Lengths of the edges, each in one place, shape (V, V)."""
+    start, end = mesh.edges.T
     length = np.linalg.norm(mesh.vertices[start] - mesh.vertices[end], axis=1)
     size = len(mesh.vertices)
     return sparse.csr_array((length, (start, end)), shape=(size, size))

@@ -1,34 +1,33 @@
-"""Where a curve on a large mesh begins: designed on a coarse mesh of the surface, then lifted."""
+"""Where a curve on a large mesh begins: predicted on a coarse mesh of the surface, then lifted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve
-from ..design_result import Design, Status
 from ..errors import NicmmError
 from ..mesh import Mesh
+from ..network.single_pass import predicted
 from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
-from ..request import Progress, Request
+from ..request import Request
 from ..surface_points import SurfacePoints, locate_control_points
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .lifting import lifted
 
-COARSE = (4_000, 16_000, 64_000)
-"""Cells of the coarse meshes that are tried one after the other.
+CELLS = 4_000
+"""Cells of the first coarse mesh, about as many vertices as the network was trained on."""
 
-The first is about as fine as the meshes that the network was trained on.
-"""
+REDUCTION = 2
+"""Vertices of the mesh for each cell at least."""
 
-LEAST_REDUCTION = 3.0
-"""Vertices of the mesh for each cell, below which a coarse mesh saves nothing."""
+SMALL = 3_000
+"""Vertices up to which a mesh is its own coarse mesh."""
 
-Solve = Callable[[Request, Progress | None], Design]
-"""How a curve on a coarse mesh is designed."""
+GROWTH = 4
+"""Growth of the number of cells from one coarse mesh that gives no curve to the next."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +40,19 @@ class CoarseStart:
         Simple.
     visited : (k,) int array
         Which of the control points it passes, in order.
-    design : Design
-        On the coarse mesh.
+    breaking_vertices : int
+        Of the level set on the coarse mesh.
     """
 
     curve: SurfaceCurve
     visited: IntArray
-    design: Design
+    breaking_vertices: int
 
 
 @dataclass(frozen=True)
 class _CoarseSurface:
     coarse: CoarseMesh
     surface: CurveSurface
-    solve: Solve
 
 
 class CoarseStarts:
@@ -64,56 +62,58 @@ class CoarseStarts:
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-    solver : callable
-        Gives for a coarse mesh what designs on it.
     """
 
-    def __init__(
-        self, mesh: Mesh, vertex_normals: FloatArray, solver: Callable[[Mesh], Solve]
-    ) -> None:
-        self._mesh, self._vertex_normals, self._solver = mesh, vertex_normals, solver
+    def __init__(self, mesh: Mesh, vertex_normals: FloatArray) -> None:
+        self._mesh, self._vertex_normals = mesh, vertex_normals
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
+        self._sizes: dict[int, int] = {}
 
-    def find(self, request: Request, progress: Progress | None) -> CoarseStart | None:
+    def find(self, request: Request) -> CoarseStart | None:
         """The curve of the first coarse mesh that gives one; None where none does.
 
-        That may be so for points too close to one another, or strands: the fine mesh decides.
+        That is so on a small mesh, and may be so for points or strands that are close to one
+        another: then the mesh itself decides.
         """
         component = int(self._mesh.face_component[request.points.faces[0]])
-        inside = self._mesh.faces[self._mesh.face_component == component]
-        n_vertices = np.count_nonzero(np.bincount(inside.ravel()))
-        for count in COARSE:
-            if LEAST_REDUCTION * count > n_vertices:
-                break
+        most = self._n_vertices(component) // REDUCTION
+        if most * REDUCTION <= SMALL:
+            return None
+        count = min(CELLS, most)
+        while count <= most:
             try:
-                start = self._lifted(self._surface(component, count), request, progress)
+                start = self._lifted(self._surface(component, count), request)
             except NicmmError:
-                continue
+                start = None
             if start is not None:
                 return start
+            count *= GROWTH
         return None
 
-    def _lifted(
-        self, level: _CoarseSurface, request: Request, progress: Progress | None
-    ) -> CoarseStart | None:
+    def _n_vertices(self, component: int) -> int:
+        if component not in self._sizes:
+            inside = self._mesh.faces[self._mesh.face_component == component]
+            self._sizes[component] = np.count_nonzero(np.bincount(inside.ravel()))
+        return self._sizes[component]
+
+    def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        design = level.solve(on_coarse, progress)
-        usable = design.status not in (Status.NOT_ONE_CURVE, Status.DIVERGED) and design.curves
-        if not usable:
+        zeros = predicted(coarse.mesh, on_coarse).zeros
+        if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None
-        curve = design.curves[0]
+        curve = zeros.curves[0]
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
         surface = CurveSurface(self._mesh, self._vertex_normals)
         result = lifted(surface, coarse, level.surface, curve, request.points[visited])
-        return None if result is None else CoarseStart(result, visited, design)
+        return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._vertex_normals, component, count)
             surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-            self._made[key] = _CoarseSurface(coarse, surface, self._solver(coarse.mesh))
+            self._made[key] = _CoarseSurface(coarse, surface)
         return self._made[key]
 
 

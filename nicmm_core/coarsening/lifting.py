@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -21,11 +20,15 @@ from ..mesh import Mesh, unique_edges
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
 from ..relaxation.face_walks import strictly_inside
-from ..surface_points import SurfacePoints
+from ..surface_points import SurfacePoints, nearest_points
 from .coarse_mesh import CoarseMesh
 
-NODES = 256
-"""Nodes that are lifted. What is finer on a coarse curve is its mesh's and not the surface's."""
+NODES = (256, 512, 128)
+"""Nodes that are lifted, the numbers that are tried one after the other.
+
+What is finer on a coarse curve is its mesh's and not the surface's; but where strands are close to
+one another, ways between other nodes may pass beside each other.
+"""
 
 
 def lifted(
@@ -52,13 +55,24 @@ def lifted(
     SurfaceCurve or None
         Simple and exactly through its control points; None where that does not come out.
     """
+    for count in NODES:
+        exact = exact_curve(coarse_surface, curve, count)
+        result = _lifted_nodes(surface, coarse, exact, controls)
+        if result is not None and is_simple(surface, result):
+            return result.surface_curve(surface.mesh)
+    return None
+
+
+def _lifted_nodes(
+    surface: CurveSurface, coarse: CoarseMesh, exact: ExactCurve, controls: SurfacePoints
+) -> ExactCurve | None:
+    """The curve through the nodes of a coarse one, simple or not."""
     fine = surface.mesh
-    exact = exact_curve(coarse_surface, curve, NODES)
     places, cell = _nearest_points(fine, coarse, exact.nodes.places)
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[exact.control_nodes] = controls.faces
     barycentric[exact.control_nodes] = controls.barycentric
-    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), curve.closed)
+    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
     # The coarse mesh's normals do not follow every dent that a way has to pass.
     smooth = replace(nodes, normals=exact.nodes.normals)
     polyline, node_place, lost = straight_ways(fine, exact, smooth)
@@ -70,10 +84,7 @@ def lifted(
         if bridge is None:
             return None
         bridges[node] = bridge
-    result = _with_bridges(exact, nodes, polyline, node_place, bridges)
-    if not is_simple(surface, result):
-        return None
-    return result.surface_curve(fine)
+    return _with_bridges(exact, nodes, polyline, node_place, bridges)
 
 
 def _nearest_points(
@@ -85,13 +96,10 @@ def _nearest_points(
     faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
     for one in np.unique(cell).tolist():
         here = np.flatnonzero(cell == one)
-        inside = coarse.faces_of_cells(fine, np.array([one]))
-        _, nearest, places = igl.point_mesh_squared_distance(
-            positions[here], fine.vertices, fine.faces[inside]
+        found, _ = nearest_points(
+            fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))
         )
-        faces[here] = inside[nearest]
-        a, b, c = fine.vertices[fine.faces[faces[here]]].transpose(1, 0, 2)
-        barycentric[here] = igl.barycentric_coordinates(places.reshape(-1, 3), a, b, c)
+        faces[here], barycentric[here] = found.faces, found.barycentric
     return SurfacePoints(faces, strictly_inside(barycentric)), cell
 
 
@@ -160,8 +168,7 @@ def _support(mesh: Mesh, points: SurfacePoints, number: int) -> list[int]:
 
 def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
     """The first face that has all of some vertices."""
-    incidence = mesh.vertex_faces
-    around = [incidence[[vertex]].indices for vertex in sorted(vertices)]
+    around = [mesh.faces_at(np.array([vertex])) for vertex in sorted(vertices)]
     common = around[0]
     for faces in around[1:]:
         common = np.intersect1d(common, faces)

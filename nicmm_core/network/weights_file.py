@@ -10,6 +10,7 @@ import warnings
 import zipfile
 import zlib
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,12 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
                 name = member.filename.removesuffix(".npy")
                 arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
         return arrays
+
+
+@cache
+def shipped_weights(channels: int) -> NetworkWeights:
+    """The weights that come with the package, read once; nobody may change them."""
+    return load_weights(SHIPPED, channels)
 
 
 # What a missing file, another kind of file and weights of another network raise.

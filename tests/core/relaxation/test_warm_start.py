@@ -5,23 +5,28 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
+from nicmm_core import surface_designer
 from tests.core.checks import apart, assert_valid_design, circle, nearest_vertices
 
 CHOSEN = [12, 80, 41, 150]
+
+
+def _counted(function, calls):
+    def counted(*arguments):
+        calls.append(arguments)
+        return function(*arguments)
+
+    return counted
 
 
 @pytest.fixture
 def problems(monkeypatch):
     """How often a design has started anew."""
     built = []
-    build = design_module.build_problem
-
-    def spy(*arguments, **named):
-        built.append(arguments)
-        return build(*arguments, **named)
-
-    monkeypatch.setattr(design_module, "build_problem", spy)
+    for name in ("predicted", "requested_problem"):
+        monkeypatch.setattr(
+            surface_designer, name, _counted(getattr(surface_designer, name), built)
+        )
     return built
 
 
