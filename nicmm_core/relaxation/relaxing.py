@@ -26,14 +26,16 @@ from ..curve import SurfaceCurve
 from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
     Balance,
+    ElasticSystem,
     balance,
     bending_energy,
     damped_step,
     elastic_energy,
     elastic_system,
     feature_energy,
+    predicted_fall,
 )
-from .exact_curve import ExactCurve, drawn, exact_curve, is_simple, redrawn, respaced, sideways
+from .exact_curve import ExactCurve, bent, drawn, exact_curve, is_simple, redrawn, respaced
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,9 @@ class RelaxationConfig:
 
 DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
+
+HOLDING_LEVELS = 2
+"""Last levels that do without an early end."""
 
 HELD_TRIES = 3
 """Steps that are tried without the nodes that could not follow the one before."""
@@ -140,7 +145,7 @@ def relax(
     curve = None
     for place in range(len(config.levels)):
         levels = config.levels[place:]
-        drawing = _Drawing.HOLD if len(levels) == 1 else _Drawing.END
+        drawing = _Drawing.HOLD if len(levels) <= HOLDING_LEVELS else _Drawing.END
         curve = relaxation.run(first, levels, drawing)
         if curve is not None:
             break
@@ -214,8 +219,10 @@ class _Relaxation:
                 if level == levels[-1]:
                     least = self.config.least_decrease
                 curve = self._level(curve, level, least, last_iteration, drawing)
-                if self.stopped != "converged":
-                    break
+                if self.stopped != "converged" or (
+                    drawing is not _Drawing.SIMPLE and not is_simple(self.surface, curve)
+                ):
+                    break  # what crosses with few nodes does so with more
         except _LostError:
             return None
         return curve
@@ -234,19 +241,26 @@ class _Relaxation:
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
         released = False
-        while self.iterations < last_iteration:
-            self.iterations += 1
+        while True:
             apart = drawing is _Drawing.SIMPLE
             weights = balance(self.surface, nodes, self.smoothness, apart)
             before = elastic_energy(nodes, weights)
-            step = self._step(curve, nodes, held, weights, damping, drawing)
+            system = elastic_system(self.surface, nodes, weights)
+            scale = max(bending_energy(nodes), STRAIGHT * before)
+            step = None
+            if self._may_fall(curve, system, held) > least * scale:
+                if self.iterations == last_iteration:
+                    self.stopped = "cap"
+                    break
+                self.iterations += 1
+                step = self._step(curve, nodes, held, system, weights, damping, drawing)
             if step is not None:
                 curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
                 done = 1.0 - (last_iteration - self.iterations) / config.iterations
                 if self.watch is not None and not self.watch(done, nodes.positions):
                     self.stopped = "cancelled"
                     break
-            scale = max(bending_energy(nodes), STRAIGHT * before)
+                scale = max(bending_energy(nodes), STRAIGHT * before)
             if step is not None and before - elastic_energy(nodes, weights) > least * scale:
                 released = False
             elif released or not held.any():
@@ -260,15 +274,26 @@ class _Relaxation:
                 curve = self._respaced(self._drawn(curve, nodes), level, drawing)
                 nodes = curve.nodes
                 held = np.zeros(len(nodes.positions), dtype=bool)
-        else:
-            self.stopped = "cap"
         return self._drawn(curve, nodes)
+
+    def _may_fall(self, curve: ExactCurve, system: ElasticSystem, held: BoolArray) -> float:
+        """By how much the least damped step is going to lower the energy."""
+        free = self._free(curve, held)
+        if not free.any():
+            return 0.0
+        return predicted_fall(system, damped_step(system, free, self.config.damping))
+
+    def _free(self, curve: ExactCurve, held: BoolArray) -> BoolArray:
+        free = ~held
+        free[curve.control_nodes] = False
+        return free
 
     def _step(
         self,
         curve: ExactCurve,
         nodes: Nodes,
         held: BoolArray,
+        system: ElasticSystem,
         weights: Balance,
         damping: float,
         drawing: _Drawing,
@@ -276,10 +301,8 @@ class _Relaxation:
         """The least damped step that lowers the energy; None when there is none."""
         config, surface = self.config, self.surface
         energy = elastic_energy(nodes, weights)
-        system = elastic_system(surface, nodes, weights)
         spacing = float(nodes.lengths.mean())
-        free = ~held
-        free[curve.control_nodes] = False
+        free = self._free(curve, held)
         tries = 0
         while damping <= config.most_damping and free.any():
             move = damped_step(system, free, damping)
@@ -288,7 +311,7 @@ class _Relaxation:
                 return None
             if farthest > config.longest_move:
                 move *= config.longest_move / farthest
-            moved, stayed = sideways(surface, nodes, move)
+            moved, stayed = bent(surface, nodes, move, free)
             lowered = elastic_energy(moved, weights) < energy
             if lowered and drawing is not _Drawing.END:
                 drawn_curve, kept = redrawn(surface, curve, moved, drawing is _Drawing.SIMPLE)
