@@ -37,6 +37,7 @@ from .path.via_points import ViaPoints, same_via_points
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
+from .relaxation.exact_curve import ExactCurve
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, moved_along
 from .surface_points import SurfacePoints, locate_control_points
@@ -72,6 +73,7 @@ class _Remembered:
     visited: IntArray  # (k,) order of the control points
     surface: CurveSurface
     unit: float
+    exact: ExactCurve
     design: Design
 
 
@@ -151,12 +153,12 @@ class Designer:
             return replace(last.design, seconds=time.perf_counter() - started)
         points = request.points[last.visited]
         surface = last.surface
-        start = moved_along(surface, last.design.curves[0], points)
+        start = moved_along(surface, last.exact, points)
         if start is None:
             return None
         relaxed = self._relaxed(surface, start, request.smoothness, WARM, progress)
         design = self._relaxed_design(relaxed, surface, last.unit, 0, started)
-        self._remember(request, last.visited, surface, last.unit, design)
+        self._remember(request, last.visited, surface, last.unit, relaxed.exact, design)
         return design
 
     def _solve(
@@ -178,7 +180,8 @@ class Designer:
                 surface, curves[0], request.smoothness, RelaxationConfig(), progress
             )
             design = self._relaxed_design(relaxed, surface, problem.unit, breaking, started)
-            self._remember(request, problem.loop.order, surface, problem.unit, design)
+            visited = problem.loop.order
+            self._remember(request, visited, surface, problem.unit, relaxed.exact, design)
             return design
         return Design(
             status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
@@ -209,7 +212,7 @@ class Designer:
     def _relaxed(
         self,
         surface: CurveSurface,
-        start: SurfaceCurve,
+        start: SurfaceCurve | ExactCurve,
         smoothness: float,
         config: RelaxationConfig,
         progress: Progress | None,
@@ -239,13 +242,14 @@ class Designer:
         visited: IntArray,
         surface: CurveSurface,
         unit: float,
+        exact: ExactCurve,
         design: Design,
     ) -> None:
         """Keep a curve that came to rest for the next request."""
         if design.status is not Status.CANCELLED:
             # The caller may change what was passed.
             request = replace(request, via_points=copy.deepcopy(request.via_points))
-            self._last = _Remembered(request, visited, surface, unit, design)
+            self._last = _Remembered(request, visited, surface, unit, exact, design)
 
     def _curve_surface(self, maps: Maps, unit: float) -> CurveSurface:
         """The surface that curves move on; the unit is the square root of its area."""

@@ -211,13 +211,10 @@ def _linearised(
     after = nodes.steps.T
     before = before_each(after)
     # How the steps before and after change with the moves of their two ends.
-    before_by, after_by = (-before_each(here), here), (-here, after_each(here))
+    before_by, after_by = np.stack([-before_each(here), here]), np.stack([-here, after_each(here)])
     if not nodes.closed:
-        before_by, after_by = ([by.copy() for by in pair] for pair in (before_by, after_by))
-        for by in before_by:
-            by[:, 0] = 0.0
-        for by in after_by:
-            by[:, -1] = 0.0
+        before_by[:, :, 0] = 0.0
+        after_by[:, :, -1] = 0.0
     out_before, out_after = dot(before, normal), dot(after, normal)
     flat_before, flat_after = before - out_before * normal, after - out_after * normal
     squared_before = np.maximum(dot(flat_before, flat_before), tolerances.TINY)

@@ -19,7 +19,7 @@ from ..crossings import crossing_segments
 from ..curve import SurfaceCurve, curve_on_mesh
 from ..mesh import Mesh
 from ..surface_points import SurfacePoints
-from .curve_nodes import CurveSurface, Nodes, after_each, cross, dot, nodes_at
+from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .face_walks import join, moved, strictly_inside
 
 DETOUR = 1.5
@@ -27,12 +27,6 @@ DETOUR = 1.5
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, at which an old point gives way to a new node."""
-
-MOST_TURN = 0.7
-"""Greatest angle by which a move turns a step between nodes."""
-
-LEAST_STRETCH = 0.3
-"""Least length of such a step after a move, relative to that before."""
 
 FEWEST_OF_A_LEG = 6
 """Nodes of a leg at least, with the control point at its start."""
@@ -94,23 +88,8 @@ def respaced(surface: CurveSurface, curve: ExactCurve, count: int) -> ExactCurve
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
 
-def bent(
-    surface: CurveSurface, nodes: Nodes, step: FloatArray, free: BoolArray
-) -> tuple[Nodes, BoolArray]:
-    """Nodes moved across the curve so that its steps turn and keep their lengths.
-
-    What sideways moves would do to first order is taken for angles by which the steps turn and
-    shares by which they stretch. So the curve bends as far moves say, where straight ones would
-    draw out the steps that they turn.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-    step : (n,) float array
-        Lengths along `Nodes.sideways`, zero for nodes that are not free.
-    free : (n,) bool array
-        Control points are not.
+def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
+    """Nodes moved across the curve by lengths along `Nodes.sideways`, (n,).
 
     Returns
     -------
@@ -118,37 +97,7 @@ def bent(
     (n,) bool array
         Which came to a boundary and stayed beside it.
     """
-    n = len(step)
-    segments, normals = nodes.steps.T, nodes.normals.T
-    lengths = np.maximum(np.sqrt(dot(segments, segments)), tolerances.TINY)
-    away = step * nodes.sideways.T
-    change = after_each(away) - away
-    if not nodes.closed:
-        change[:, -1] = 0.0
-    along = segments / lengths
-    # A mesh need not be oriented: both normals count as pointing to the same side.
-    following = after_each(normals)
-    across = cross(normals + np.where(dot(normals, following) < 0.0, -1.0, 1.0) * following, along)
-    across /= np.maximum(np.sqrt(dot(across, across)), tolerances.TINY)
-    angle, stretch = dot(change, across) / lengths, dot(change, along) / lengths
-    share = min(1.0, MOST_TURN / max(float(np.abs(angle).max()), tolerances.TINY))
-    angle, stretch, change = share * angle, share * stretch, share * change
-    size = np.maximum(1.0 + stretch, LEAST_STRETCH)
-    drift = change + lengths * (
-        (size * np.cos(angle) - 1.0 - stretch) * along + (size * np.sin(angle) - angle) * across
-    )
-    # Each stretch between nodes that stay begins and ends where it did.
-    bounds = np.flatnonzero(~free)
-    ends = np.append(bounds, n) if nodes.closed else bounds
-    stretch_of = np.minimum(np.searchsorted(bounds, np.arange(n), side="right"), len(ends) - 1)
-    first, last = ends[stretch_of - 1], ends[stretch_of]
-    sums = np.concatenate([np.zeros((3, 1)), np.cumsum(drift, axis=1)], axis=1)
-    arc = np.concatenate([[0.0], np.cumsum(size * lengths)])
-    part = (arc[:n] - arc[first]) / (arc[last] - arc[first])
-    moves = sums[:, :n] - sums[:, first] - part * (sums[:, last] - sums[:, first])
-    moves = np.where(free, moves - dot(moves, normals) * normals, 0.0)
-    distance = np.sqrt(dot(moves, moves))
-    return shifted(surface, nodes, (moves / np.maximum(distance, tolerances.TINY)).T, distance)
+    return shifted(surface, nodes, nodes.sideways * np.sign(step)[:, None], np.abs(step))
 
 
 def shifted(

@@ -35,7 +35,7 @@ from .elastic_energy import (
     feature_energy,
     predicted_fall,
 )
-from .exact_curve import ExactCurve, bent, drawn, exact_curve, is_simple, redrawn, respaced
+from .exact_curve import ExactCurve, drawn, exact_curve, is_simple, redrawn, respaced, sideways
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,6 @@ class RelaxationConfig:
 DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
 
-HOLDING_LEVELS = 2
-"""Last levels that do without an early end."""
-
 HELD_TRIES = 3
 """Steps that are tried without the nodes that could not follow the one before."""
 
@@ -98,6 +95,8 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         Simple.
+    exact : ExactCurve
+        The same with the nodes that it came to rest with.
     bending : float
         ∮ κ_g² ds, in 1/length.
     feature : float
@@ -110,6 +109,7 @@ class Relaxed:
     """
 
     curve: SurfaceCurve
+    exact: ExactCurve
     bending: float
     feature: float
     iterations: int
@@ -121,7 +121,7 @@ Watch = Callable[[float, FloatArray], bool]
 
 def relax(
     surface: CurveSurface,
-    start: SurfaceCurve,
+    start: SurfaceCurve | ExactCurve,
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
@@ -131,7 +131,7 @@ def relax(
     Parameters
     ----------
     surface : CurveSurface
-    start : SurfaceCurve
+    start : SurfaceCurve or ExactCurve
         Simple, and through its control points in order.
     smoothness : float
         Divides the tension.
@@ -141,25 +141,36 @@ def relax(
         after every iteration; relaxation stops when it returns False.
     """
     relaxation = _Relaxation(surface, smoothness, config, watch)
-    first = exact_curve(surface, start, config.levels[0])
-    curve = None
-    for place in range(len(config.levels)):
-        levels = config.levels[place:]
-        drawing = _Drawing.HOLD if len(levels) <= HOLDING_LEVELS else _Drawing.END
+    if isinstance(start, ExactCurve):
+        first, start = start, start.surface_curve(surface.mesh)
+    else:
+        first = exact_curve(surface, start, config.levels[0])
+    # Each level may lose a way between its nodes; the last one holds what it would lose.
+    attempts = [(config.levels[place:], _Drawing.END) for place in range(len(config.levels) - 1)]
+    attempts = attempts or [(config.levels, _Drawing.END)]
+    attempts.append((config.levels[-1:], _Drawing.HOLD))
+    for levels, drawing in attempts:
         curve = relaxation.run(first, levels, drawing)
         if curve is not None:
             break
-    if relaxation.stopped != "cancelled" and not (curve and is_simple(surface, curve)):
+    simple = curve is not None and is_simple(surface, curve)
+    if not simple and relaxation.stopped != "cancelled":
         # Strands that cross here would do so with more nodes too.
         curve = relaxation.run(first, config.levels[1:] or config.levels, _Drawing.SIMPLE)
-    if curve and is_simple(surface, curve):
+        simple = curve is not None and is_simple(surface, curve)
+    if curve is not None and simple:
         result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
     else:
         curve, result = first, start
         stopped = "cancelled" if relaxation.stopped == "cancelled" else "unrelaxed"
     nodes = curve.nodes
     return Relaxed(
-        result, bending_energy(nodes), feature_energy(nodes), relaxation.iterations, stopped
+        result,
+        curve,
+        bending_energy(nodes),
+        feature_energy(nodes),
+        relaxation.iterations,
+        stopped,
     )
 
 
@@ -219,10 +230,11 @@ class _Relaxation:
                 if level == levels[-1]:
                     least = self.config.least_decrease
                 curve = self._level(curve, level, least, last_iteration, drawing)
-                if self.stopped != "converged" or (
-                    drawing is not _Drawing.SIMPLE and not is_simple(self.surface, curve)
-                ):
-                    break  # what crosses with few nodes does so with more
+                if self.stopped != "converged":
+                    break
+                if drawing is _Drawing.END and level != levels[-1]:
+                    if not is_simple(self.surface, curve):
+                        break  # strands that cross here would do so with more nodes too
         except _LostError:
             return None
         return curve
@@ -311,7 +323,7 @@ class _Relaxation:
                 return None
             if farthest > config.longest_move:
                 move *= config.longest_move / farthest
-            moved, stayed = bent(surface, nodes, move, free)
+            moved, stayed = sideways(surface, nodes, move)
             lowered = elastic_energy(moved, weights) < energy
             if lowered and drawing is not _Drawing.END:
                 drawn_curve, kept = redrawn(surface, curve, moved, drawing is _Drawing.SIMPLE)
@@ -337,7 +349,10 @@ class _Relaxation:
         return changed
 
     def _respaced(self, curve: ExactCurve, level: int, drawing: _Drawing) -> ExactCurve:
-        """Nodes at equal distances; where they would make strands touch, the ones it has."""
+        """Nodes at about equal distances; where they would make strands touch, those it has."""
+        alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
+        if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
+            return curve
         changed = respaced(self.surface, curve, level)
         if drawing is _Drawing.SIMPLE and not is_simple(self.surface, changed):
             return curve
