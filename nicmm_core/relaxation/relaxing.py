@@ -77,8 +77,14 @@ class RelaxationConfig:
 DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
 
+RELEASES = 2
+"""Times in a level that nodes which could not follow are tried again when the others rest."""
+
 HELD_TRIES = 3
 """Steps that are tried without the nodes that could not follow the one before."""
+
+SURELY = 0.1
+"""Share of the least decrease below which a step is not tried: damping makes forecasts small."""
 
 STRAIGHT = 1e-2
 """Share of bending in the energy below which a curve is straight enough not to go on for it."""
@@ -252,7 +258,7 @@ class _Relaxation:
         curve = self._respaced(curve, level, drawing)
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
-        released = False
+        releases = 0
         while True:
             apart = drawing is _Drawing.SIMPLE
             weights = balance(self.surface, nodes, self.smoothness, apart)
@@ -260,7 +266,7 @@ class _Relaxation:
             system = elastic_system(self.surface, nodes, weights)
             scale = max(bending_energy(nodes), STRAIGHT * before)
             step = None
-            if self._may_fall(curve, system, held) > least * scale:
+            if self._may_fall(curve, system, held) > SURELY * least * scale:
                 if self.iterations == last_iteration:
                     self.stopped = "cap"
                     break
@@ -273,13 +279,11 @@ class _Relaxation:
                     self.stopped = "cancelled"
                     break
                 scale = max(bending_energy(nodes), STRAIGHT * before)
-            if step is not None and before - elastic_energy(nodes, weights) > least * scale:
-                released = False
-            elif released or not held.any():
-                break
-            else:
+            if step is None or before - elastic_energy(nodes, weights) <= least * scale:
+                if releases == RELEASES or not held.any():
+                    break
                 # At rest with nodes that once could not follow: perhaps they can now.
-                released, damping = True, config.damping
+                releases, damping = releases + 1, config.damping
                 held = np.zeros(len(held), dtype=bool)
             moved = step is not None and step.farthest > SMALL_MOVE
             if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
