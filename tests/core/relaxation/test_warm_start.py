@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
-from nicmm_core import shapes
+from nicmm_core import shapes, surface_designer
 from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
 from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
 from nicmm_core.relaxation.warm_start import WARM, moved_along
@@ -16,17 +15,22 @@ from tests.core.checks import apart, assert_valid_design, circle, nearest_vertic
 CHOSEN = [12, 80, 41, 150]
 
 
+def _counted(function, calls):
+    def counted(*arguments):
+        calls.append(arguments)
+        return function(*arguments)
+
+    return counted
+
+
 @pytest.fixture
 def problems(monkeypatch):
     """How often a design has started anew."""
     built = []
-    build = design_module.build_problem
-
-    def spy(*arguments, **named):
-        built.append(arguments)
-        return build(*arguments, **named)
-
-    monkeypatch.setattr(design_module, "build_problem", spy)
+    for name in ("predicted", "requested_problem"):
+        monkeypatch.setattr(
+            surface_designer, name, _counted(getattr(surface_designer, name), built)
+        )
     return built
 
 
