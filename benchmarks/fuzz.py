@@ -24,6 +24,9 @@ MEMORY = 8 * 2**30
 
 LISTED = 40
 
+TOLD = 500
+"""Cases after which a run says how far it is."""
+
 
 def run(scale: Scale) -> None:
     """Ask, and list what is wrong."""
@@ -37,6 +40,8 @@ def run(scale: Scale) -> None:
         kinds[kind] += 1
         outcomes[kind, done.result.outcome if done.result else "lost"] += 1
         slowest = max(slowest, done.seconds)
+        if done.item and done.item % TOLD == 0:
+            print(f"  {done.item} cases, {len(findings)} findings", flush=True)
         for fault in _faults(done):
             findings.append(f"{done.item} ({kind}): {fault}")
             print(f"  {findings[-1]}", flush=True)

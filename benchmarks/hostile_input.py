@@ -241,12 +241,12 @@ def _output(generator: np.random.Generator, result: Answer) -> None:
 
 
 _KINDS: tuple[tuple[str, Callable[[np.random.Generator, Answer], None]], ...] = (
-    *[("mesh file", _mesh_file)] * 14,
-    *[("arrays", _arrays)] * 6,
-    *[("control points", _control_points)] * 6,
-    *[("arguments", _arguments)] * 5,
-    *[("weights file", _weights_file)] * 4,
-    *[("output", _output)] * 3,
+    *[("mesh file", _mesh_file)] * 34,
+    *[("arrays", _arrays)] * 12,
+    *[("control points", _control_points)] * 12,
+    *[("arguments", _arguments)] * 8,
+    *[("weights file", _weights_file)] * 8,
+    *[("output", _output)] * 4,
     ("geometry", _geometry),
     ("sequence", _sequence),
 )

@@ -6,9 +6,10 @@ is there. Three things may differ:
 
 - Of faces with the same three corners only the first is there.
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
-  off. Vertices there are doubled.
-- Vertices of faces without area are moved by a thousandth of their shortest edge, each its own way,
-  so that every face has an area.
+  off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
+  there are doubled.
+- Vertices of faces without area are moved by a thousandth of their shortest edge that has a length,
+  each its own way, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -22,14 +23,18 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
+from .crossings import crossing_segments
 from .curve import SurfaceCurve, curve_on_mesh
-from .design_result import Design
+from .design_result import Design, Status
 from .mesh import Mesh, unique_edges
 from .request import Request
 from .surface_points import SurfacePoints
 
 FLAT = 1e-10
 """Sine between the longest and the shortest edge of a face below which it has no area."""
+
+SHORT = 1e-12
+"""Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
 
 MOVED = 1e-3
 """How far vertices of faces without area are moved, in lengths of their shortest edge."""
@@ -74,7 +79,7 @@ class SoundCopy:
         if not self.differs:
             return request
         sets = [request.points, *request.via_points.values()]
-        candidates = [self._candidates(points) for points in sets]
+        candidates = [self.candidates(points) for points in sets]
         common = self._common_component([each for of_set in candidates for each in of_set])
         if common is None:
             return None
@@ -94,11 +99,18 @@ class SoundCopy:
         """A design on the copy as one on the mesh."""
         if not self.differs:
             return design
+        curves = [self._curve(curve) for curve in design.curves]
+        status = design.status
+        # Strands that pass different copies of one vertex touch there.
+        if len(self.vertex) > len(self.original.vertices) and not all(map(self._is_simple, curves)):
+            status = Status.NOT_ONE_CURVE
         return replace(
-            design,
-            curves=[self._curve(curve) for curve in design.curves],
-            find_field=partial(self._field, design),
+            design, status=status, curves=curves, find_field=partial(self._field, design)
         )
+
+    def _is_simple(self, curve: SurfaceCurve) -> bool:
+        polyline = SurfacePoints(curve.faces, curve.barycentric)
+        return not len(crossing_segments(self.original, polyline, curve.closed))
 
     def _curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         faces = self.face[curve.faces]
@@ -110,6 +122,8 @@ class SoundCopy:
         field = np.full(len(self.original.vertices), np.inf)
         order = np.argsort(-np.abs(design.field), kind="stable")
         field[self.vertex[order]] = design.field[order]
+        # What the copy does not have is outside.
+        field[np.isinf(field)] = design.field.max()
         return field
 
     @cached_property
@@ -119,7 +133,7 @@ class SoundCopy:
         copies[self.face] = np.arange(len(self.face))
         return copies
 
-    def _candidates(self, points: SurfacePoints) -> list[IntArray]:
+    def candidates(self, points: SurfacePoints) -> list[IntArray]:
         """Faces of the copy that each point lies in, its own first."""
         around = self.original.vertex_faces
         found = []
@@ -166,15 +180,15 @@ def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
     The first goes straight on where more than two faces share an edge. The second joins as many
     parts of the surface as it can.
     """
-    if not mesh.branches:
-        yield _with_areas(mesh, mesh.faces, np.arange(len(mesh.vertices)))
-        return
-    kept = _without_twins(mesh.faces)
-    faces = mesh.faces[kept]
-    sides = _Sides(faces)
-    for joined in (sides.straight_on, sides.linked):
-        pairs = joined(mesh.vertices)
-        yield _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
+    sides = _Sides(mesh.faces)
+    if mesh.branches:
+        kept = _without_twins(mesh.faces)
+        sides = _Sides(mesh.faces[kept])
+        for joined in (sides.straight_on, sides.linked):
+            yield _with_areas(mesh, *sides.cut(joined(mesh.vertices), len(mesh.vertices)), kept)
+    else:
+        every = np.arange(len(mesh.faces))
+        yield _with_areas(mesh, *sides.cut(sides.plain_pairs, len(mesh.vertices)), every)
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -206,7 +220,7 @@ class _Sides:
         return corner - corner % 3 + (corner + step) % 3
 
     @cached_property
-    def _plain_pairs(self) -> IntArray:
+    def plain_pairs(self) -> IntArray:
         """Sides of edges that two faces have, shape (p, 2)."""
         first = self._first[self._count == 2]
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
@@ -214,15 +228,15 @@ class _Sides:
     @cached_property
     def _branching(self) -> list[IntArray]:
         """Sides of each edge that more faces have."""
+        several = self._count > 2
         return [
             self._order[first : first + count]
-            for first, count in zip(self._first, self._count, strict=True)
-            if count > 2
+            for first, count in zip(self._first[several], self._count[several], strict=True)
         ]
 
     def straight_on(self, vertices: FloatArray) -> IntArray:
         """Pairs of sides that are joined, shape (p, 2): those that go on most straightly."""
-        pairs = [self._plain_pairs]
+        pairs = [self.plain_pairs]
         for sides in self._branching:
             pairs.append(self._straightest(sides, vertices))
         return np.concatenate(pairs)
@@ -233,14 +247,14 @@ class _Sides:
         Edges where the same parts meet share the work: on each run of them two parts are joined.
         """
         n_faces = len(self._faces)
-        faces = self._plain_pairs // 3
+        faces = self.plain_pairs // 3
         graph = sparse.coo_array((np.ones(len(faces)), faces.T), shape=(n_faces, n_faces))
         part = csgraph.connected_components(graph, directed=False)[1]
         groups: dict[tuple[int, ...], list[IntArray]] = {}
         for sides in self._branching:
             parts = tuple(np.unique(part[sides // 3]).tolist())
             groups.setdefault(parts, []).append(sides)
-        pairs = [self._plain_pairs]
+        pairs = [self.plain_pairs]
         for parts, edges in groups.items():
             if len(parts) == 1:
                 pairs += [self._straightest(sides, vertices) for sides in edges]
@@ -277,8 +291,6 @@ class _Sides:
     def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
         """Faces whose corners are one vertex only where pairs of sides join them.
 
-        Vertices that no branching edge has stay whole.
-
         Returns
         -------
         (f, 3) int array
@@ -287,14 +299,9 @@ class _Sides:
             The vertex that each vertex was.
         """
         corner = self._faces.ravel()
-        branching = np.zeros(n_vertices, dtype=bool)
-        for sides in self._branching:
-            branching[corner[[self._low[sides[0]], self._high[sides[0]]]]] = True
-        by_vertex = np.argsort(corner, kind="stable")
-        same = (corner[by_vertex[1:]] == corner[by_vertex[:-1]]) & ~branching[corner[by_vertex[1:]]]
         one, other = pairs.T
-        rows = np.concatenate([self._low[one], self._high[one], by_vertex[1:][same]])
-        columns = np.concatenate([self._low[other], self._high[other], by_vertex[:-1][same]])
+        rows = np.concatenate([self._low[one], self._high[one]])
+        columns = np.concatenate([self._low[other], self._high[other]])
         graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
         n_labels, label = csgraph.connected_components(graph, directed=False)
         source = np.zeros(n_labels, dtype=np.int64)
@@ -341,33 +348,31 @@ class _Sides:
         return corners, np.concatenate([vertex, added]), True
 
 
-def _with_areas(
-    mesh: Mesh, faces: IntArray, vertex: IntArray, kept: IntArray | None = None
-) -> SoundCopy:
+def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> SoundCopy:
     """A copy with these faces, in which every face has an area where that is possible."""
-    face = np.arange(len(mesh.faces)) if kept is None else kept
     vertices = mesh.vertices[vertex]
-    flat = _flat(vertices, faces)
-    if kept is None and not flat.any():
+    short = SHORT * mesh.diagonal
+    flat = _flat(vertices, faces, short)
+    if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
         return SoundCopy(mesh, mesh, vertex, face)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
         vertices = vertices - vertices[faces[0, 0]]
         start, still = vertices, flat
-        reach = MOVED * _shortest_edges(vertices, faces)
+        reach = MOVED * _shortest_edges(vertices, faces, short)
         generator = np.random.default_rng(SEED)
         for _ in range(ATTEMPTS):
             moving = np.zeros(len(vertices), dtype=bool)
             moving[faces[still]] = True
             moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
             vertices = np.where(moving[:, None], start + moves, vertices)
-            still = _flat(vertices, faces)
+            still = _flat(vertices, faces, short)
             if not still.any():
                 break
     return SoundCopy(mesh, Mesh(vertices, faces), vertex, face)
 
 
-def _flat(vertices: FloatArray, faces: IntArray) -> BoolArray:
+def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
     """Which faces have no area, shape (f,): a corner on another, or on the opposite edge.
 
     Needles have an area, however thin: their shortest edge stands across the longest.
@@ -376,19 +381,21 @@ def _flat(vertices: FloatArray, faces: IntArray) -> BoolArray:
     sides = np.roll(corner, -1, axis=1) - corner
     lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return twice_area <= FLAT * lengths[:, 0] * lengths[:, 2]
+    return (lengths[:, 0] <= short) | (twice_area <= FLAT * lengths[:, 0] * lengths[:, 2])
 
 
-def _shortest_edges(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Length of the shortest edge that is none of length zero, at each vertex or at its place.
+def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
+    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
 
-    Zero at vertices whose edges have no length.
+    Shorter ones join vertices to one place. Zero where no edge is longer.
     """
     edges, _ = unique_edges(faces)
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    edges, lengths = edges[lengths > 0.0], lengths[lengths > 0.0]
-    place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    shortest = np.full(int(place.max()) + 1, np.inf)
-    for end in edges.T:
-        np.minimum.at(shortest, place[end], lengths)
+    at_one_place = edges[lengths <= short].T
+    shape = (len(vertices), len(vertices))
+    graph = sparse.coo_array((np.ones(at_one_place.shape[1]), at_one_place), shape=shape)
+    n_places, place = csgraph.connected_components(graph, directed=False)
+    shortest = np.full(n_places, np.inf)
+    for end in edges[lengths > short].T:
+        np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]

@@ -181,13 +181,25 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
             f"{name}[{first}] is off the surface by {distance[first]:.3g}, more than "
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
         )
-    degenerate = ~np.isfinite(points.barycentric).all(axis=1)
-    if degenerate.any():
-        raise ControlPointError(
-            f"{name}[{int(degenerate.argmax())}] lies in a face without area "
-            f"({int(points.faces[degenerate][0])}); remove such faces or choose another point"
-        )
+    flat = ~np.isfinite(points.barycentric).all(axis=1)
+    for place in np.flatnonzero(flat):
+        corners = mesh.vertices[mesh.faces[points.faces[place]]]
+        points.barycentric[place] = _on_longest_edge(corners, positions[place])
     return points
+
+
+def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
+    """Barycentrics of the nearest point of a triangle without area, which is its longest edge."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    start = int(lengths.argmax())
+    end = (start + 1) % 3
+    along = 0.0
+    if lengths[start] > 0.0:
+        side = (corners[end] - corners[start]) / lengths[start]
+        along = float(np.clip((position - corners[start]) @ side / lengths[start], 0.0, 1.0))
+    barycentric = np.zeros(3)
+    barycentric[start], barycentric[end] = 1.0 - along, along
+    return barycentric
 
 
 def nearest_points(

@@ -10,6 +10,7 @@ from benchmarks.defects import defective_meshes
 from nicmm_core import shapes
 from nicmm_core.mesh import unique_edges
 from nicmm_core.sound_copy import FLAT, sound_copies
+from nicmm_core.surface_points import locate_points
 from tests.core.checks import grid, joined
 
 MESHES = dict(defective_meshes())
@@ -137,14 +138,15 @@ def test_points_of_a_twin_face_and_of_a_cut_edge():
     assert not judge(mesh, design, points).faults
 
 
-def test_position_in_a_face_without_area():
-    mesh = MESHES["caps"]
-    flat = int(mesh.face_areas.argmin())
-    middle = mesh.vertices[mesh.faces[flat, 0]] * 0.75 + mesh.vertices[mesh.faces[flat, 1]] * 0.25
-    places = np.array([middle, [0, 0, 1.0], [0, -1.0, 0]])
-    design = nicmm.design_curve(mesh, places)
-    error = np.linalg.norm(design.curves[0].points[design.curves[0].control_index] - places, axis=1)
-    assert error.max() < 1e-2
+@pytest.mark.parametrize("along", [0.0, 0.25, 1.0])
+def test_position_in_a_face_without_area(along):
+    """Of a mesh that has no other face there."""
+    mesh = joined(nicmm.Mesh([[2, 0, 0], [3, 0, 0], [5, 0, 0]], [[0, 1, 2]]), shapes.sphere(1))
+    place = np.array([[2 + 3 * along, 0, 0]])
+    located = locate_points(mesh, place, "here")
+    assert located.faces.tolist() == [0]
+    np.testing.assert_allclose(located.positions(mesh), place, atol=1e-12)
+    assert (located.barycentric >= 0.0).all()
 
 
 def test_parts_that_meet_in_one_vertex_are_refused():
