@@ -44,7 +44,12 @@ class NICMM_OT_design_curve(
         from .. import nicmm_core as nicmm
 
         mesh_object = mesh_data.mesh_object(context)
-        surface, order, design = self._design(context, mesh_object)
+        try:
+            surface, order, design = self._design(context, mesh_object)
+        except nicmm.UnreachableError as error:
+            group = f' (obstacles: the vertex group "{self.obstacle_group}")'
+            message = f"{error}{group if self.obstacle_group else ''}"
+            raise mesh_data.InputError(message) from error
         if not design.curves:
             raise mesh_data.InputError(str(design.status))
         made = outputs.apply(context, mesh_object, surface, design.curves, self)
@@ -73,6 +78,7 @@ class NICMM_OT_design_curve(
                 method=self.method.lower().replace("_", "-"),
                 obstacles=obstacles,
                 alignment=alignment,
+                clearance=0.0 if obstacles is None else self.clearance,
                 smoothness=self.smoothness,
                 progress=progress,
             )
