@@ -16,6 +16,7 @@ MEASUREMENTS = (
     "guarantee",
     "corpus",
     "fuzz",
+    "cuts",
     "pretraining",
     "transfer",
     "convergence",
