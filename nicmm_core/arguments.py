@@ -59,6 +59,19 @@ def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray 
     return checked
 
 
+def checked_clearance(clearance: float, obstacles: FloatArray | None) -> float:
+    """A length that is not negative, or an ArgumentError."""
+    try:
+        value = float(clearance)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(f"clearance is {clearance!r}; pass a length") from error
+    if not 0.0 <= value < np.inf:
+        raise ArgumentError(f"clearance is {clearance!r}; pass a length that is not negative")
+    if value > 0.0 and obstacles is None:
+        raise ArgumentError(f"clearance is {clearance!r} without obstacles to keep it from")
+    return value
+
+
 def checked_smoothness(smoothness: float) -> float:
     """A number in `SMOOTHNESS_RANGE`, or an ArgumentError."""
     try:

@@ -16,7 +16,14 @@ import time
 
 from numpy.typing import ArrayLike
 
-from .arguments import check_choices, check_closed, check_torch, checked_map, checked_smoothness
+from .arguments import (
+    check_choices,
+    check_closed,
+    check_torch,
+    checked_clearance,
+    checked_map,
+    checked_smoothness,
+)
 from .design_result import Design
 from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
@@ -71,6 +78,7 @@ class Designer:
         method: str = "nicmm",
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
+        clearance: float = 0.0,
         smoothness: float = 1.0,
         progress: Progress | None = None,
     ) -> Design:
@@ -84,13 +92,15 @@ class Designer:
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         via = {} if via_points is None else via_points
+        avoided = checked_map("obstacles", obstacles, self.mesh)
         request = Request(
             points=points,
             closed=closed,
             order=order,
             via_points=located_via_points(self.mesh, points, via, order, closed),
-            obstacles=checked_map("obstacles", obstacles, self.mesh),
+            obstacles=avoided,
             alignment=checked_map("alignment", alignment, self.mesh),
+            clearance=checked_clearance(clearance, avoided),
             smoothness=checked_smoothness(smoothness),
         )
         copy, designer, request = self._on_sound_copy(request)
@@ -122,6 +132,7 @@ def design_curve(
     method: str = "nicmm",
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
+    clearance: float = 0.0,
     smoothness: float = 1.0,
     progress: Progress | None = None,
 ) -> Design:
@@ -147,7 +158,10 @@ def design_curve(
         method, which trains the network on for every curve; or the same energy minimised without
         a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
-        What the curve shall avoid and what it shall follow.
+        What the curve shall avoid and what it shall follow. No curve enters a face whose three
+        corners are obstacles of weight 1; lower weights cost in proportion.
+    clearance : float, default 0
+        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger gives a fairer curve that follows the shortest way less closely.
     progress : callable, optional
@@ -163,7 +177,8 @@ def design_curve(
     ControlPointError
         If there are too few points, or one is repeated, out of range or off the surface.
     UnreachableError
-        If no such curve exists on the surface, or only one that winds round itself too often.
+        If no such curve exists on the surface, or only one that winds round itself too often; also
+        where obstacles of weight 1 leave no way.
     ArgumentError
         If another argument cannot be used.
     MissingPackageError
@@ -186,6 +201,7 @@ def design_curve(
         method=method,
         obstacles=obstacles,
         alignment=alignment,
+        clearance=clearance,
         smoothness=smoothness,
         progress=progress,
     )

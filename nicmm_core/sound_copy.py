@@ -79,7 +79,7 @@ class SoundCopy:
         if not self.differs:
             return request
         sets = [request.points, *request.via_points.values()]
-        candidates = [self._candidates(points) for points in sets]
+        candidates = [self.candidates(points) for points in sets]
         common = self._common_component([each for of_set in candidates for each in of_set])
         if common is None:
             return None
@@ -122,6 +122,8 @@ class SoundCopy:
         field = np.full(len(self.original.vertices), np.inf)
         order = np.argsort(-np.abs(design.field), kind="stable")
         field[self.vertex[order]] = design.field[order]
+        # What the copy does not have is outside.
+        field[np.isinf(field)] = design.field.max()
         return field
 
     @cached_property
@@ -131,7 +133,7 @@ class SoundCopy:
         copies[self.face] = np.arange(len(self.face))
         return copies
 
-    def _candidates(self, points: SurfacePoints) -> list[IntArray]:
+    def candidates(self, points: SurfacePoints) -> list[IntArray]:
         """Faces of the copy that each point lies in, its own first."""
         around = self.original.vertex_faces
         found = []

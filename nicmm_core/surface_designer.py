@@ -17,6 +17,7 @@ from .array_types import FloatArray, IntArray
 from .coarsening.coarse_start import CoarseStarts
 from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status
+from .free_surface import check_reachable, free_surface
 from .level_set import variational
 from .level_set.features import feature_map
 from .level_set.losses import LossWeights, balanced
@@ -29,9 +30,11 @@ from .network.weights_file import shipped_weights
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
+from .relaxation.exact_curve import ExactCurve
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
 from .request import Progress, Request, same_course, same_request
+from .sound_copy import SoundCopy
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -43,11 +46,21 @@ State = TypeVar("State")
 class _Start:
     """A simple curve on the mesh from which relaxation begins."""
 
-    curve: SurfaceCurve
+    curve: SurfaceCurve | ExactCurve
     visited: IntArray  # (k,) which control points it passes, in order
     surface: CurveSurface
     unit: float  # square root of the surface's area
     breaking: int = 0
+
+
+@dataclass(frozen=True)
+class _Free:
+    """What obstacles leave of the surface, and who designs there; no copy if it is all of it."""
+
+    obstacles: FloatArray
+    clearance: float
+    copy: SoundCopy | None
+    designer: SurfaceDesigner
 
 
 @dataclass(frozen=True)
@@ -56,6 +69,7 @@ class _Remembered:
 
     request: Request
     start: _Start
+    exact: ExactCurve  # the design's curve with its nodes
     design: Design
 
 
@@ -71,10 +85,13 @@ class SurfaceDesigner:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._last: _Remembered | None = None
+        self._free: _Free | None = None
 
     def forget(self) -> None:
         """Start the next design anew."""
         self._last = None
+        if self._free is not None and self._free.copy is not None:
+            self._free.designer.forget()
 
     def design(
         self, request: Request, method: str, progress: Progress | None, started: float
@@ -92,14 +109,32 @@ class SurfaceDesigner:
         Raises
         ------
         UnreachableError
-            If no simple curve passes the points in this order.
+            If no simple curve passes the points in this order, or obstacles leave no way.
         """
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            check_reachable(free.copy, request)
+            there = free.copy.request(replace(request, clearance=0.0))
+            assert there is not None  # as it has just been checked
+            return free.copy.design(free.designer.design(there, method, progress, started))
         if method == "nicmm":
             return self._designed(request, progress, started)
         problem = requested_problem(self.mesh, request)
         solution = self._solution(problem, request, method, progress)
         zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
         return self._level_set_design(problem, solution, zeros, started)
+
+    def _without_obstacles(self, request: Request) -> _Free | None:
+        """The surface that obstacles leave, the one of the last request if they are the same."""
+        if request.obstacles is None:
+            return None
+        last = self._free
+        same = last is not None and last.clearance == request.clearance
+        if last is None or not (same and np.array_equal(last.obstacles, request.obstacles)):
+            copy = free_surface(self.mesh, request.obstacles, request.clearance)
+            designer = self if copy is None else SurfaceDesigner(copy.mesh)
+            last = self._free = _Free(request.obstacles, request.clearance, copy, designer)
+        return last
 
     def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
@@ -130,7 +165,7 @@ class SurfaceDesigner:
         if last is None or not same_course(request, last.request):
             return None
         points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.design.curves[0], points)
+        curve = moved_along(last.start.surface, last.exact, points)
         if curve is None:
             return None
         return replace(last.start, curve=curve, breaking=0)
@@ -173,7 +208,7 @@ class SurfaceDesigner:
             find_field=partial(curve_field, self.mesh, relaxed.curve),
         )
         if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, design)
+            self._last = _Remembered(request, start, relaxed.exact, design)
         return design
 
     def _level_set_design(
