@@ -16,6 +16,7 @@ MEASUREMENTS = (
     "guarantee",
     "pretraining",
     "transfer",
+    "pretrained_start",
     "convergence",
     "ablation",
     "parameters",
