@@ -1,7 +1,8 @@
 """Stage 1 (section 4.1): train one network on random control points of one or more meshes.
 
 Every set has the λ_smooth that a design takes for it (`losses.balanced`): with one value for all,
-the least energy of most sets would be a flat φ.
+the least energy of most sets would be a flat φ. In every epoch every set is turned at random, since
+a few bodies stand in few ways about their axes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,13 @@ from ..level_set.losses import EnergySurface, LossWeights, balanced, loss_terms,
 from ..level_set.problem import Problem, build_problem
 from ..mesh import Mesh
 from ..surface_points import locate_control_points
-from .forward_pass import NetworkConfig, NetworkInput
+from .forward_pass import (
+    DISTANCE_CHANNEL,
+    NORMAL_CHANNELS,
+    POSITION_CHANNELS,
+    NetworkConfig,
+    NetworkInput,
+)
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .trainable_network import CurveNetwork, network_weights
@@ -105,9 +112,15 @@ def pretrain(
     report = progress or (lambda stage, done, total, loss: None)
     if not meshes:
         raise ArgumentError("meshes is empty; name at least one mesh to train on")
-    for name in ("sets", "epochs"):
+    for name in ("sets", "batch", "epochs"):
         if getattr(config, name) < 1:
             raise ArgumentError(f"{name} is {getattr(config, name)}; at least 1 is needed")
+    shares = (config.open_share, config.given_share)
+    if min(shares) < 0.0 or sum(shares) > 1.0:
+        raise ArgumentError(
+            f"open_share and given_share are {shares[0]} and {shares[1]}; they are shares of all "
+            "sets, so neither may be negative nor both together more than 1"
+        )
     if not Path(output).resolve().parent.is_dir():
         raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
@@ -128,7 +141,8 @@ def pretrain(
         for problem in _random_problems(meshes, config, report)
     ]
     for epoch in range(len(losses), config.epochs):
-        order = np.random.default_rng([config.seed, epoch]).permutation(len(prepared))
+        generator = np.random.default_rng([config.seed, epoch])
+        order = generator.permutation(len(prepared))
         total = 0.0
         for group in optimiser.param_groups:
             group["lr"] = _learning_rate(config, epoch)
@@ -138,7 +152,8 @@ def pretrain(
             optimiser.zero_grad()
             for index in chosen:
                 one = prepared[index]
-                loss = total_loss(loss_terms(one.surface, network(one.given)), one.weights)
+                phi = network(turned(one.given, generator))
+                loss = total_loss(loss_terms(one.surface, phi), one.weights)
                 (loss / len(chosen)).backward()
                 total += loss.item()
                 done += 1
@@ -169,6 +184,20 @@ class _Prepared:
     surface: EnergySurface
     given: NetworkInput
     weights: LossWeights
+
+
+def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
+    """The same set with its axes exchanged or reversed at random, and perhaps the sign of φ₀.
+
+    The energy of Eq. 2 knows neither axes nor the sign of φ.
+    """
+    axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
+    side = float(generator.choice([-1.0, 1.0]))
+    features = given.features.clone()
+    for channels in (POSITION_CHANNELS, NORMAL_CHANNELS):
+        features[:, channels] = given.features[:, channels][:, axes] * features.new_tensor(signs)
+    features[:, DISTANCE_CHANNEL] *= side
+    return given._replace(features=features, initial_distance=side * given.initial_distance)
 
 
 def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
