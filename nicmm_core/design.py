@@ -2,11 +2,13 @@
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
+
+On a large mesh all but the last is done on a coarse mesh of the same surface, and the curve is
+lifted from there (`coarsening`).
 """
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,60 +20,54 @@ from numpy.typing import ArrayLike
 
 from .arguments import check_choices, check_torch, checked_map, checked_smoothness
 from .array_types import FloatArray, IntArray
-from .crossings import crossing_segments
+from .coarsening.coarse_start import CoarseStarts
 from .curve import SurfaceCurve
-from .design_result import STATUS, Design, Status, is_one_curve
+from .design_result import STATUS, Design, Status
 from .errors import ArgumentError
 from .level_set import variational
-from .level_set.contour import extract_curves
 from .level_set.features import feature_map
 from .level_set.losses import LossWeights, balanced
-from .level_set.problem import Problem, build_problem
+from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
-from .level_set.topology import keep_topology
+from .level_set.zero_set import ZeroSet, zero_set
 from .mesh import Mesh
-from .network.forward_pass import NetworkWeights
-from .network.single_pass import predict_once
-from .network.weights_file import load_weights
-from .path.via_points import ViaPoints, same_via_points
+from .network.single_pass import predicted
+from .network.weights_file import shipped_weights
+from .path.via_points import ViaPoints, located_via_points
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
+from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
+from .request import Progress, Request, same_course, same_request
 from .surface_points import SurfacePoints, locate_control_points
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
 
-Progress = Callable[[float, FloatArray], object]
+LARGE = 24_000
+"""Faces of a component from which on a curve is found on a coarse mesh first."""
 
 State = TypeVar("State")
 
-Maps = tuple[FloatArray | None, FloatArray | None]
-"""Obstacles and alignment."""
-
 
 @dataclass(frozen=True)
-class _Request:
-    """What a relaxed curve was asked for, as far as it can be compared."""
+class _Start:
+    """A simple curve on the mesh from which relaxation begins."""
 
-    points: SurfacePoints
-    closed: bool
-    order: str
-    via_points: ViaPoints | None
-    maps: tuple[bytes | None, bytes | None]
-    smoothness: float
+    curve: SurfaceCurve
+    visited: IntArray  # (k,) which control points it passes, in order
+    surface: CurveSurface
+    unit: float  # square root of the surface's area
+    breaking: int = 0
 
 
 @dataclass(frozen=True)
 class _Remembered:
     """The last relaxed curve."""
 
-    request: _Request
-    visited: IntArray  # (k,) order of the control points
-    surface: CurveSurface
-    unit: float
+    request: Request
+    start: _Start
     design: Design
 
 
@@ -96,7 +92,6 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._weights: dict[int, NetworkWeights] = {}
         self._last: _Remembered | None = None
 
     def forget(self) -> None:
@@ -124,167 +119,154 @@ class Designer:
         if method == "nicmm-paper":
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
-        maps = (
-            checked_map("obstacles", obstacles, self.mesh),
-            checked_map("alignment", alignment, self.mesh),
+        via = {} if via_points is None else via_points
+        request = Request(
+            points=points,
+            closed=closed,
+            order=order,
+            via_points=located_via_points(self.mesh, points, via, order, closed),
+            obstacles=checked_map("obstacles", obstacles, self.mesh),
+            alignment=checked_map("alignment", alignment, self.mesh),
+            smoothness=checked_smoothness(smoothness),
         )
-        smoothness = checked_smoothness(smoothness)
-        request = _Request(points, closed, order, via_points, _as_bytes(maps), smoothness)
         if method == "nicmm":
-            again = self._designed_again(request, progress, started)
-            if again is not None:
-                return again
-        problem = build_problem(self.mesh, points, order, *maps, smoothness, closed, via_points)
-        return self._solve(problem, method, request, maps, progress, started)
+            return self._designed(request, progress, started)
+        problem = requested_problem(self.mesh, request)
+        solution = self._solution(problem, request, method, progress)
+        zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
+        return self._level_set_design(problem, solution, zeros, started)
 
-    def _designed_again(
-        self,
-        request: _Request,
-        progress: Progress | None,
-        started: float,
-    ) -> Design | None:
-        """A design from the last curve; None where that is too different."""
+    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
+        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
         last = self._last
-        if last is None or not _is_alike(request, last.request):
-            return None
-        if _is_same(request, last.request):
+        if last is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        points = request.points[last.visited]
-        surface = last.surface
-        start = moved_along(surface, last.design.curves[0], points)
+        start = self._start_from_last(request)
+        if start is not None:
+            return self._relaxed(request, start, WARM, progress, started)
+        start = self._start_from_coarse(request)
         if start is None:
-            return None
-        relaxed = self._relaxed(surface, start, request.smoothness, WARM, progress)
-        design = self._relaxed_design(relaxed, surface, last.unit, 0, started)
-        self._remember(request, last.visited, surface, last.unit, design)
-        return design
+            found = predicted(self.mesh, request)
+            problem, zeros = found.problem, found.zeros
+            if not zeros.is_simple_curve(self.mesh, request.closed):
+                return self._level_set_design(problem, found.solution, zeros, started)
+            start = _Start(
+                curve=zeros.curves[0],
+                visited=problem.loop.order,
+                surface=self._curve_surface(request),
+                unit=problem.unit,
+                breaking=zeros.breaking_vertices,
+            )
+        return self._relaxed(request, start, RelaxationConfig(), progress, started)
 
-    def _solve(
+    def _start_from_last(self, request: Request) -> _Start | None:
+        """The last curve with its control points moved; None where the request is too different."""
+        last = self._last
+        if last is None or not same_course(request, last.request):
+            return None
+        points = request.points[last.start.visited]
+        curve = moved_along(last.start.surface, last.design.curves[0], points)
+        if curve is None:
+            return None
+        return replace(last.start, curve=curve, breaking=0)
+
+    def _start_from_coarse(self, request: Request) -> _Start | None:
+        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        if np.count_nonzero(component) < LARGE:
+            return None
+        found = self._coarse_starts.find(request)
+        if found is None:
+            return None
+        return _Start(
+            curve=found.curve,
+            visited=found.visited,
+            surface=self._curve_surface(request),
+            unit=float(np.sqrt(self.mesh.face_areas[component].sum())),
+            breaking=found.breaking_vertices,
+        )
+
+    def _relaxed(
         self,
-        problem: Problem,
-        method: str,
-        request: _Request,
-        maps: Maps,
+        request: Request,
+        start: _Start,
+        config: RelaxationConfig,
         progress: Progress | None,
         started: float,
     ) -> Design:
-        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        solution = self._solution(problem, method, weights, progress)
-        field, breaking, curves = self._curves(problem, solution.field, solution.keeps_topology)
-        one = is_one_curve(curves, problem.loop.closed) and not _crosses(self.mesh, curves[0])
-        if method == "nicmm" and one:
-            surface = self._curve_surface(maps, problem.unit)
-            relaxed = self._relaxed(
-                surface, curves[0], request.smoothness, RelaxationConfig(), progress
-            )
-            design = self._relaxed_design(relaxed, surface, problem.unit, breaking, started)
-            self._remember(request, problem.loop.order, surface, problem.unit, design)
-            return design
+        """The design that relaxation makes of a curve; it is kept for the next request."""
+        watch = None if progress is None else _seldom(progress, lambda points: points)
+        surface, unit = start.surface, start.unit
+        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
+        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
+        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
+        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
+        design = Design(
+            status=STATUS[relaxed.stopped],
+            curves=[relaxed.curve],
+            iterations=relaxed.iterations,
+            seconds=time.perf_counter() - started,
+            energy=energy,
+            breaking_vertices=start.breaking,
+            find_field=partial(curve_field, self.mesh, relaxed.curve),
+        )
+        if design.status is not Status.CANCELLED:
+            self._last = _Remembered(request, start, design)
+        return design
+
+    def _level_set_design(
+        self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
+    ) -> Design:
+        """The design that a level set is."""
+        one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
         return Design(
             status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
-            curves=curves,
+            curves=zeros.curves,
             iterations=solution.iterations,
             seconds=time.perf_counter() - started,
             energy=solution.terms,
-            breaking_vertices=breaking,
-            find_field=partial(_at_input_vertices, self.mesh, problem, field),
+            breaking_vertices=zeros.breaking_vertices,
+            find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
         )
 
     def _solution(
-        self, problem: Problem, method: str, weights: LossWeights, progress: Progress | None
+        self, problem: Problem, request: Request, method: str, progress: Progress | None
     ) -> Solution:
-        """The level set that a method finds."""
+        """The level set that a method other than "nicmm" finds."""
         watch = None if progress is None else self._field_watcher(problem, progress)
+        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        pretrained = self._pretrained(problem.features.shape[1])
-        if method == "nicmm":
-            return predict_once(pretrained, problem)
+        pretrained = shipped_weights(problem.features.shape[1])
         # These import PyTorch, which nothing else needs.
         from .network.prediction import PredictionConfig, predict
         from .network.trainable_network import build_network
 
         return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
 
-    def _relaxed(
-        self,
-        surface: CurveSurface,
-        start: SurfaceCurve,
-        smoothness: float,
-        config: RelaxationConfig,
-        progress: Progress | None,
-    ) -> Relaxed:
-        watch = None if progress is None else _seldom(progress, lambda points: points)
-        return relax(surface, start, smoothness, config, watch)
-
-    def _relaxed_design(
-        self, relaxed: Relaxed, surface: CurveSurface, unit: float, breaking: int, started: float
-    ) -> Design:
-        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
-        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
-        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
-        return Design(
-            status=STATUS[relaxed.stopped],
-            curves=[relaxed.curve],
-            iterations=relaxed.iterations,
-            seconds=time.perf_counter() - started,
-            energy=energy,
-            breaking_vertices=breaking,
-            find_field=partial(curve_field, self.mesh, relaxed.curve),
-        )
-
-    def _remember(
-        self,
-        request: _Request,
-        visited: IntArray,
-        surface: CurveSurface,
-        unit: float,
-        design: Design,
-    ) -> None:
-        """Keep a curve that came to rest for the next request."""
-        if design.status is not Status.CANCELLED:
-            # The caller may change what was passed.
-            request = replace(request, via_points=copy.deepcopy(request.via_points))
-            self._last = _Remembered(request, visited, surface, unit, design)
-
-    def _curve_surface(self, maps: Maps, unit: float) -> CurveSurface:
-        """The surface that curves move on; the unit is the square root of its area."""
-        if all(one is None for one in maps):
+    def _curve_surface(self, request: Request) -> CurveSurface:
+        """The surface that curves move on."""
+        if not request.has_maps:
             return CurveSurface(self.mesh, self._normals)
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        area = float(self.mesh.face_areas[component].sum())
+        maps = request.obstacles, request.alignment
         importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / unit**2)
+        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / area)
 
     @cached_property
     def _normals(self) -> FloatArray:
         return unsigned_normals(self.mesh)
 
-    def _pretrained(self, channels: int) -> NetworkWeights:
-        if channels not in self._weights:
-            self._weights[channels] = load_weights(channels=channels)
-        return self._weights[channels]
-
-    def _curves(
-        self, problem: Problem, field: FloatArray, keeps_topology: bool = False
-    ) -> tuple[FloatArray, int, list[SurfaceCurve]]:
-        """Make φ exactly zero at the control points and one loop, and take its contour."""
-        breaking = 0
-        if not keeps_topology:
-            field, breaking = keep_topology(
-                problem.working,
-                problem.loop,
-                problem.initial_distance,
-                problem.smoother.interpolating(field),
-                problem.bundle,
-            )
-        controls = problem.loop.control_vertices
-        curves = extract_curves(self.mesh, problem.working, field, controls, problem.bundle)
-        return field, breaking, curves
+    @cached_property
+    def _coarse_starts(self) -> CoarseStarts:
+        return CoarseStarts(self.mesh, self._normals)
 
     def _field_watcher(
         self, problem: Problem, progress: Progress
     ) -> Callable[[float, FloatArray], bool]:
         def points(field: FloatArray) -> FloatArray:
-            curves = self._curves(problem, field)[2]
+            curves = zero_set(self.mesh, problem, field).curves
             return curves[0].points if curves else np.zeros((0, 3))
 
         return _seldom(progress, points)
@@ -383,38 +365,6 @@ def design_curve(
         smoothness=smoothness,
         progress=progress,
     )
-
-
-def _is_alike(one: _Request, other: _Request) -> bool:
-    """Whether two requests are for the same course of a curve."""
-    return (
-        len(one.points) == len(other.points)
-        and one.closed == other.closed
-        and one.order == other.order
-        and same_via_points(one.via_points, other.via_points)
-        and one.maps == other.maps  # the path goes round obstacles from the start
-    )
-
-
-def _is_same(one: _Request, other: _Request) -> bool:
-    """Whether two requests that are alike do not differ at all."""
-    return (
-        np.array_equal(one.points.faces, other.points.faces)
-        and np.array_equal(one.points.barycentric, other.points.barycentric)
-        and one.smoothness == other.smoothness
-    )
-
-
-def _as_bytes(maps: Maps) -> tuple[bytes | None, bytes | None]:
-    """Maps in a form that can be compared, and that the caller cannot change."""
-    obstacles, alignment = (None if one is None else one.tobytes() for one in maps)
-    return obstacles, alignment
-
-
-def _crosses(mesh: Mesh, curve: SurfaceCurve) -> bool:
-    """Whether a curve crosses or touches itself."""
-    polyline = SurfacePoints(curve.faces, curve.barycentric)
-    return len(crossing_segments(mesh, polyline, curve.closed)) > 0
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
+import igl
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -79,9 +80,25 @@ class Mesh:
         return neighbours.reshape(n_faces, 3)
 
     @cached_property
+    def edges(self) -> IntArray:
+        """Undirected edges, shape (E, 2), in no particular order."""
+        sides = self.faces[:, [[1, 2], [2, 0], [0, 1]]]  # (F, 3, 2), opposite each corner
+        across = self.face_neighbours
+        of_two = sides[across > np.arange(len(self.faces))[:, None]]
+        others = np.unique(np.sort(sides[across < 0], axis=1), axis=0)
+        return np.concatenate([of_two, others])
+
+    @cached_property
+    def face_tree(self) -> igl.AABB:
+        """A tree of boxes round the faces, to find the nearest one."""
+        tree = igl.AABB()
+        tree.init(self.vertices, self.faces)
+        return tree
+
+    @cached_property
     def mean_edge_length(self) -> float:
         """Mean length of the edges, in mesh units."""
-        start, end = unique_edges(self.faces)[0].T
+        start, end = self.edges.T
         return float(np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1).mean())
 
     @cached_property

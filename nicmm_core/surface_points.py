@@ -172,8 +172,7 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
         raise ControlPointError(
             f"{name}[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
         )
-    squared, faces, nearest = igl.point_mesh_squared_distance(positions, mesh.vertices, mesh.faces)
-    distance = np.sqrt(np.atleast_1d(squared))
+    points, distance = nearest_points(mesh, positions)
     off = distance > tolerances.ON_SURFACE * mesh.diagonal
     if off.any():
         first = int(off.argmax())
@@ -181,17 +180,46 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
             f"{name}[{first}] is off the surface by {distance[first]:.3g}, more than "
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
         )
-    faces = np.atleast_1d(faces).astype(np.int64)
-    corners = np.ascontiguousarray(mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2))
-    barycentric = igl.barycentric_coordinates(np.atleast_2d(nearest), *corners)
-    degenerate = ~np.isfinite(barycentric).all(axis=1)
+    degenerate = ~np.isfinite(points.barycentric).all(axis=1)
     if degenerate.any():
         raise ControlPointError(
             f"{name}[{int(degenerate.argmax())}] lies in a face without area "
-            f"({int(faces[degenerate][0])}); remove such faces or choose another point"
+            f"({int(points.faces[degenerate][0])}); remove such faces or choose another point"
         )
+    return points
+
+
+def nearest_points(
+    mesh: Mesh, positions: FloatArray, among: IntArray | None = None
+) -> tuple[SurfacePoints, FloatArray]:
+    """The points of a mesh nearest to positions.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    positions : (k, 3) float array
+    among : (q,) int array, optional
+        The faces to look in, by default all.
+
+    Returns
+    -------
+    SurfacePoints
+        With coordinates that are NaN in a face without area.
+    (k,) float array
+        Distances.
+    """
+    faces = mesh.faces if among is None else mesh.faces[among]
+    if among is None:
+        squared, nearest, places = mesh.face_tree.squared_distance(mesh.vertices, faces, positions)
+    else:
+        squared, nearest, places = igl.point_mesh_squared_distance(positions, mesh.vertices, faces)
+    chosen = np.atleast_1d(nearest).astype(np.int64)
+    corners = np.ascontiguousarray(mesh.vertices[faces[chosen]].transpose(1, 0, 2))
+    barycentric = igl.barycentric_coordinates(np.atleast_2d(places), *corners)
     barycentric = np.clip(barycentric, 0.0, None)
-    return SurfacePoints(faces, barycentric / barycentric.sum(axis=1, keepdims=True))
+    barycentric /= barycentric.sum(axis=1, keepdims=True)
+    found = chosen if among is None else among[chosen]
+    return SurfacePoints(found, barycentric), np.sqrt(np.atleast_1d(squared))
 
 
 def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:

@@ -14,9 +14,11 @@ from scipy.sparse import csgraph
 from ..array_types import BoolArray, FloatArray
 from ..errors import MeshError
 from ..mesh import Mesh
+from ..path.band_refinement import PIECES
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
+from ..request import Request
 from ..surface_points import SurfacePoints
 from .features import (
     control_indicator,
@@ -101,6 +103,7 @@ def build_problem(
     smoothness: float = 1.0,
     closed: bool = True,
     via_points: ViaPoints | None = None,
+    pieces: int = PIECES,
 ) -> Problem:
     """Everything that comes before the network.
 
@@ -118,6 +121,8 @@ def build_problem(
         Whether the curve returns from the last point to the first.
     via_points : mapping, optional
         From the index of a control point to points that steer the initial path from there.
+    pieces : int
+        How finely the mesh is refined along the path, see `path.band_refinement`.
 
     Raises
     ------
@@ -132,7 +137,7 @@ def build_problem(
     importance = None
     if obstacles is not None or alignment is not None:
         importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
-    working, loop = build_initial_loop(mesh, points, order, importance, closed, via_points)
+    working, loop = build_initial_loop(mesh, points, order, importance, closed, via_points, pieces)
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
     edge_length = loop.edge_length / unit
@@ -173,6 +178,21 @@ def build_problem(
         initial_distance=initial_distance,
         feature_map=importance,
         features=features,
+    )
+
+
+def requested_problem(mesh: Mesh, request: Request, pieces: int = PIECES) -> Problem:
+    """The problem of a request; see `build_problem`."""
+    return build_problem(
+        mesh,
+        request.points,
+        request.order,
+        request.obstacles,
+        request.alignment,
+        request.smoothness,
+        request.closed,
+        request.via_points or None,
+        pieces,
     )
 
 

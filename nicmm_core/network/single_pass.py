@@ -2,15 +2,51 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..level_set.losses import energy_surface, loss_terms
-from ..level_set.problem import Problem
+from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
+from ..level_set.zero_set import ZeroSet, zero_set
+from ..mesh import Mesh
+from ..path.band_refinement import PIECES_TO_START
+from ..request import Request
 from .forward_pass import NetworkInput, NetworkWeights, Operations, level_set
+from .weights_file import shipped_weights
 
 SingleArray = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What the network says to a request on a mesh."""
+
+    problem: Problem
+    solution: Solution
+    zeros: ZeroSet
+
+
+def predicted(mesh: Mesh, request: Request) -> Predicted:
+    """Where a curve runs by the network.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    request : Request
+
+    Raises
+    ------
+    MeshError
+        If faces have no area.
+    UnreachableError
+        If no simple path passes the points in this order.
+    """
+    problem = requested_problem(mesh, request, PIECES_TO_START)
+    solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
+    return Predicted(problem, solution, zero_set(mesh, problem, solution.field))
 
 
 def predict_once(weights: NetworkWeights, problem: Problem) -> Solution:

@@ -6,6 +6,7 @@ import json
 import zipfile
 import zlib
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,12 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
             "'python -m nicmm_core pretrain'"
         ) from error
     return NetworkWeights(config, parameters)
+
+
+@cache
+def shipped_weights(channels: int) -> NetworkWeights:
+    """The weights that come with the package, read once; nobody may change them."""
+    return load_weights(SHIPPED, channels)
 
 
 # What a missing file, another kind of file and weights of another network raise.

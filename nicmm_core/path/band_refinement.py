@@ -16,7 +16,10 @@ from ..array_types import BoolArray, FloatArray
 from .virtual_splits import SplitMesh
 
 PIECES = 64
-"""Edges near the loop are at most the loop's length over this number."""
+"""Edges near the loop are at most its length over this number, for a level set that is the curve."""
+
+PIECES_TO_START = 32
+"""The same for a level set from which a relaxed curve only starts."""
 
 BAND_SHARE = 0.05
 """Half width of the refined band, relative to the loop's length.
@@ -32,7 +35,7 @@ The longest edges come first, so that stopping leaves the band evenly coarser.
 
 
 def refine_along(
-    split: SplitMesh, component: int, loop: list[int], closed: bool = True
+    split: SplitMesh, component: int, loop: list[int], closed: bool = True, pieces: int = PIECES
 ) -> tuple[list[int], float]:
     """Halve long edges near a path of edges.
 
@@ -46,6 +49,8 @@ def refine_along(
         Vertices of the path, the first not repeated.
     closed : bool
         Whether the last vertex is joined to the first.
+    pieces : int
+        Into how many the edges near the path divide its length at least.
 
     Returns
     -------
@@ -60,7 +65,7 @@ def refine_along(
         points = np.concatenate([points, points[:1]])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(lengths.sum())
-    longest, half_width = length / PIECES, BAND_SHARE * length
+    longest, half_width = length / pieces, BAND_SHARE * length
     tree = cKDTree(_samples(points, longest))
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:

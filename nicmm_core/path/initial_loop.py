@@ -16,7 +16,7 @@ from ..array_types import FloatArray, IntArray
 from ..errors import ArgumentError, UnreachableError
 from ..mesh import Mesh
 from ..surface_points import SurfacePoints
-from .band_refinement import refine_along
+from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
 from .simple_path import lay_path
 from .via_points import ViaPoints, Waypoints, names_of, with_via_points
@@ -68,6 +68,7 @@ def build_initial_loop(
     importance: FloatArray | None = None,
     closed: bool = True,
     via_points: ViaPoints | None = None,
+    pieces: int = PIECES,
 ) -> tuple[WorkingMesh, InitialLoop]:
     """Insert the control points and join them by edge paths that do not touch one another.
 
@@ -85,6 +86,8 @@ def build_initial_loop(
         Whether the path returns from the last point to the first.
     via_points : mapping, optional
         From the index of a control point to points that the path passes on its way to the next.
+    pieces : int
+        How finely the mesh is refined along the path, see `refine_along`.
 
     Returns
     -------
@@ -121,7 +124,7 @@ def build_initial_loop(
         raise UnreachableError(f"{what}; {advice}") from error
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
-    loop, zigzag = refine_along(split, component, path.vertices, closed)
+    loop, zigzag = refine_along(split, component, path.vertices, closed, pieces)
     _separate_strands(split, loop, closed)
     working, renumbered = split.assemble(component)
     vertices, controls = renumbered[loop], renumbered[path.waypoints[way.is_control]]

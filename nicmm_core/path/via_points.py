@@ -20,6 +20,9 @@ from ..surface_points import SurfacePoints, check_distinct, check_one_component,
 ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
 """From the index of a control point to the points on the way from there to the next one."""
 
+LocatedViaPoints = dict[int, SurfacePoints]
+"""The same, checked and as faces and barycentrics."""
+
 
 @dataclass(frozen=True)
 class Waypoints:
@@ -43,10 +46,10 @@ def names_of(controls: IntArray) -> list[str]:
     return [f"control_points[{index}]" for index in controls]
 
 
-def with_via_points(
+def located_via_points(
     mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
-) -> Waypoints:
-    """Put via points between control points, and check them.
+) -> LocatedViaPoints:
+    """Via points as faces and barycentrics, by the index of the control point before them.
 
     Parameters
     ----------
@@ -65,9 +68,7 @@ def with_via_points(
     ArgumentError
         If ``via_points`` is no mapping from indices of legs, or the order is not the given one.
     ControlPointError
-        If a via point is out of range, off the surface, or the same as another point.
-    UnreachableError
-        If a via point lies on another component.
+        If a via point is out of range or off the surface.
     """
     if not isinstance(via_points, Mapping):
         raise ArgumentError(
@@ -86,10 +87,27 @@ def with_via_points(
                 f"via_points[{key!r}] belongs to no leg; keys are indices of the control points "
                 f"that a leg starts from, 0 … {last}"
             )
-    located = {
+    return {
         int(key): locate_points(mesh, value, f"via_points[{key}]")
         for key, value in via_points.items()
     }
+
+
+def with_via_points(
+    mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
+) -> Waypoints:
+    """Put via points between control points, and check them.
+
+    Arguments and errors are those of `located_via_points`, and
+
+    Raises
+    ------
+    ControlPointError
+        If a via point is the same as another point.
+    UnreachableError
+        If a via point lies on another component.
+    """
+    located = located_via_points(mesh, points, via_points, order, closed)
     controls = names_of(np.arange(len(points)))
     faces, barycentric, is_control, names = [], [], [], []
     for index, control in enumerate(controls):
@@ -102,24 +120,6 @@ def with_via_points(
     check_distinct(mesh, together, names)
     check_one_component(mesh, together, names)
     return Waypoints(together, np.array(is_control), names)
-
-
-def same_via_points(one: ViaPoints | None, other: ViaPoints | None) -> bool:
-    """Whether both steer a path in the same way; False where one of them is no mapping."""
-    if one is None or other is None:
-        return one is other
-    if not (isinstance(one, Mapping) and isinstance(other, Mapping)) or set(one) != set(other):
-        return False
-    return all(_same_points(one[key], other[key]) for key in one)
-
-
-def _same_points(one: ArrayLike | SurfacePoints, other: ArrayLike | SurfacePoints) -> bool:
-    if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
-        faces = np.array_equal(one.faces, other.faces)
-        return faces and np.array_equal(one.barycentric, other.barycentric)
-    if isinstance(one, SurfacePoints) or isinstance(other, SurfacePoints):
-        return False
-    return np.array_equal(one, other)
 
 
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:

@@ -143,6 +143,22 @@ def drawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> ExactCurve 
     return ExactCurve(nodes, curve.control_nodes, polyline, node_place)
 
 
+def straight_ways(
+    mesh: Mesh, curve: ExactCurve, nodes: Nodes
+) -> tuple[SurfacePoints, IntArray, BoolArray]:
+    """The polyline of straight ways between nodes at new places.
+
+    Returns
+    -------
+    SurfacePoints
+    (n,) int array
+        Where in it each node is.
+    (n,) bool array
+        Nodes after which no way to the next one was found; there is nothing between them.
+    """
+    return _drawn(mesh, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
+
+
 def redrawn(
     surface: CurveSurface, curve: ExactCurve, nodes: Nodes, simple: bool
 ) -> tuple[ExactCurve, BoolArray]:

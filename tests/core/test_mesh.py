@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.mesh import unoriented_vertices
+from nicmm_core.mesh import unique_edges, unoriented_vertices
 from tests.core.checks import flipped, joined
 
 CORNERS = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]]
@@ -164,3 +164,15 @@ def test_a_moebius_strip_is_unoriented_across_its_seam_and_nowhere_else():
     strip = shapes.moebius_strip(12, 3)
     # The first ring, where the last one is joined to it turned over.
     np.testing.assert_array_equal(unoriented_vertices(strip.faces), np.arange(4))
+
+
+def test_edges_are_those_of_the_faces_once_each(surface):
+    expected, _ = unique_edges(surface.faces)
+    found = np.sort(surface.edges, axis=1)
+    assert len(found) == len(expected)
+    assert np.array_equal(np.unique(found, axis=0), expected)
+
+
+def test_an_edge_of_three_faces_is_one_edge():
+    fan = nicmm.Mesh(np.eye(5, 3), [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    assert len(fan.edges) == len(unique_edges(fan.faces)[0])

@@ -11,17 +11,20 @@ from tests.core.checks import apart, assert_valid_design, circle, nearest_vertic
 CHOSEN = [12, 80, 41, 150]
 
 
+def _counted(function, calls):
+    def counted(*arguments):
+        calls.append(arguments)
+        return function(*arguments)
+
+    return counted
+
+
 @pytest.fixture
 def problems(monkeypatch):
     """How often a design has started anew."""
     built = []
-    build = design_module.build_problem
-
-    def spy(*arguments, **named):
-        built.append(arguments)
-        return build(*arguments, **named)
-
-    monkeypatch.setattr(design_module, "build_problem", spy)
+    for name in ("predicted", "requested_problem"):
+        monkeypatch.setattr(design_module, name, _counted(getattr(design_module, name), built))
     return built
 
 

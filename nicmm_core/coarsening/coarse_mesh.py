@@ -1,0 +1,168 @@
+"""A coarse mesh of the same surface: the dual of geodesic Voronoi cells.
+
+Some vertices of the fine mesh are chosen as seeds, about evenly spread. Every vertex belongs to the
+seed that it is nearest to along edges, and three seeds whose cells meet in a face make a coarse
+face. Distances run along the surface, so two sheets that come close stay apart, and nothing is
+asked of the mesh but that it is connected. One run of Dijkstra's algorithm does it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from ..array_types import FloatArray, IntArray
+from ..errors import MeshError, UnreachableError
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints, nearest_points
+
+CANDIDATES = 8
+"""Vertices that seeds are chosen from, for each seed."""
+
+PACKING = 0.84
+"""Least distance of two seeds, relative to the side of a square of the area that one has."""
+
+NORMAL_WEIGHT = 0.6
+"""Distance that the difference of two unit normals counts for, in least distances of seeds.
+
+Twice that, for opposite normals, is more than one: the two sides of a plate and of a thin limb have
+seeds of their own.
+"""
+
+
+@dataclass(frozen=True)
+class CoarseMesh:
+    """A coarse mesh of one component and where its vertices are on the fine one.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        n vertices.
+    seed : (n,) int array
+        The fine vertex that each vertex is.
+    cell : (V,) int array
+        The coarse vertex that each fine one is nearest to, -1 on other components.
+    """
+
+    mesh: Mesh
+    seed: IntArray
+    cell: IntArray
+
+    @cached_property
+    def _by_cell(self) -> tuple[IntArray, IntArray]:
+        """Fine vertices in the order of their cells, and where each cell begins."""
+        order = np.argsort(self.cell, kind="stable")
+        return order, np.searchsorted(self.cell[order], np.arange(len(self.seed) + 1))
+
+    def faces_of_cells(self, fine: Mesh, vertices: IntArray) -> IntArray:
+        """Fine faces at the fine vertices of some cells, ascending."""
+        order, begin = self._by_cell
+        parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
+        return np.unique(fine.vertex_faces[np.concatenate(parts)].indices)
+
+    def cells_around(self, vertices: IntArray) -> IntArray:
+        """Some cells and their neighbours, ascending."""
+        return np.unique(self.mesh.faces[self.mesh.vertex_faces[vertices].indices])
+
+    def greatest_in_cells(self, values: FloatArray) -> FloatArray:
+        """The greatest of the values at fine vertices, (V,), in each cell, shape (n,)."""
+        greatest = np.full(len(self.seed), -np.inf)
+        inside = self.cell >= 0
+        np.maximum.at(greatest, self.cell[inside], values[inside])
+        return greatest
+
+    def nearest_points(self, fine: Mesh, points: SurfacePoints) -> SurfacePoints:
+        """The points nearest to points of the fine mesh, in the cells that those lie in.
+
+        Raises
+        ------
+        UnreachableError
+            If a cell meets too few others to have a face.
+        """
+        corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
+        positions = points.positions(fine)
+        faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
+        incidence = self.mesh.vertex_faces
+        for number, vertex in enumerate(self.cell[corner].tolist()):
+            ring = np.unique(self.mesh.faces[incidence[[vertex]].indices])
+            around = np.unique(incidence[ring].indices)
+            if not len(around):
+                raise UnreachableError("a cell of the coarse mesh has no face")
+            found, _ = nearest_points(self.mesh, positions[number : number + 1], around)
+            faces[number], barycentric[number] = found.faces[0], found.barycentric[0]
+        return SurfacePoints(faces, barycentric)
+
+
+def build_coarse_mesh(
+    mesh: Mesh, vertex_normals: FloatArray, component: int, count: int
+) -> CoarseMesh:
+    """The dual of about ``count`` Voronoi cells of one component.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    vertex_normals : (V, 3) float array
+        Unit vectors.
+    component : int
+    count : int
+        More cells come where the surface is strongly curved.
+
+    Raises
+    ------
+    MeshError
+        If the cells meet in no face.
+    """
+    faces = mesh.faces[mesh.face_component == component]
+    areas = np.zeros(len(mesh.vertices))
+    np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
+    seed = _seeds(mesh, vertex_normals, areas, count)
+    _, _, nearest = csgraph.dijkstra(
+        _edge_graph(mesh), directed=False, indices=seed, min_only=True, return_predecessors=True
+    )
+    cell_of = np.full(len(mesh.vertices), -1)
+    cell_of[seed] = np.arange(len(seed))
+    cell = np.where(nearest >= 0, cell_of[np.maximum(nearest, 0)], -1)
+    corners = cell[faces]
+    apart = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    corners = corners[apart]
+    _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
+    if not len(first):
+        raise MeshError("the cells of the coarse mesh meet in no face")
+    return CoarseMesh(Mesh(mesh.vertices[seed], corners[np.sort(first)]), seed, cell)
+
+
+def _edge_graph(mesh: Mesh) -> sparse.csr_array:
+    """Lengths of the edges, each in one place, shape (V, V)."""
+    start, end = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[start] - mesh.vertices[end], axis=1)
+    size = len(mesh.vertices)
+    return sparse.csr_array((length, (start, end)), shape=(size, size))
+
+
+def _seeds(mesh: Mesh, normals: FloatArray, areas: FloatArray, count: int) -> IntArray:
+    """Vertices that keep a distance from one another, ascending."""
+    generator = np.random.default_rng(0)
+    there = np.flatnonzero(areas > 0.0)
+    # The smallest of exponential times by area: a draw by area, without replacement.
+    times = generator.exponential(size=len(there)) / areas[there]
+    candidates = there[np.argsort(times)[: CANDIDATES * count]]
+    distance = PACKING * np.sqrt(areas.sum() / count)
+    scaled = np.concatenate(
+        [mesh.vertices[candidates] / distance, NORMAL_WEIGHT * normals[candidates]], axis=1
+    )
+    near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")
+    size = len(candidates)
+    graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))
+    graph = sparse.csr_array(graph + graph.T)
+    free = np.ones(size, dtype=bool)
+    chosen = []
+    for place in range(size):
+        if free[place]:
+            chosen.append(place)
+            free[graph.indices[graph.indptr[place] : graph.indptr[place + 1]]] = False
+    return np.sort(candidates[chosen])

@@ -1,0 +1,137 @@
+"""Where a curve on a large mesh begins: predicted on a coarse mesh of the surface, then lifted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..curve import SurfaceCurve
+from ..errors import NicmmError
+from ..mesh import Mesh
+from ..network.single_pass import predicted
+from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
+from ..request import Request
+from ..surface_points import SurfacePoints, locate_control_points
+from .coarse_mesh import CoarseMesh, build_coarse_mesh
+from .lifting import lifted
+
+COARSE = (4_000, 16_000, 64_000)
+"""Cells of the coarse meshes that are tried one after the other.
+
+The first is about as fine as the meshes that the network was trained on.
+"""
+
+LEAST_REDUCTION = 3.0
+"""Vertices of the mesh for each cell, below which a coarse mesh saves nothing."""
+
+
+@dataclass(frozen=True)
+class CoarseStart:
+    """A curve from which relaxation on the fine mesh begins.
+
+    Attributes
+    ----------
+    curve : SurfaceCurve
+        Simple.
+    visited : (k,) int array
+        Which of the control points it passes, in order.
+    breaking_vertices : int
+        Of the level set on the coarse mesh.
+    """
+
+    curve: SurfaceCurve
+    visited: IntArray
+    breaking_vertices: int
+
+
+@dataclass(frozen=True)
+class _CoarseSurface:
+    coarse: CoarseMesh
+    surface: CurveSurface
+
+
+class CoarseStarts:
+    """The coarse meshes of one mesh, each made when it is first needed and kept.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    vertex_normals : (V, 3) float array
+    """
+
+    def __init__(self, mesh: Mesh, vertex_normals: FloatArray) -> None:
+        self._mesh, self._vertex_normals = mesh, vertex_normals
+        self._made: dict[tuple[int, int], _CoarseSurface] = {}
+
+    def find(self, request: Request) -> CoarseStart | None:
+        """The curve of the first coarse mesh that gives one; None where none does.
+
+        That may be so for points too close to one another, or strands: the fine mesh decides.
+        """
+        component = int(self._mesh.face_component[request.points.faces[0]])
+        inside = self._mesh.faces[self._mesh.face_component == component]
+        n_vertices = np.count_nonzero(np.bincount(inside.ravel()))
+        for count in COARSE:
+            if LEAST_REDUCTION * count > n_vertices:
+                break
+            try:
+                start = self._lifted(self._surface(component, count), request)
+            except NicmmError:
+                continue
+            if start is not None:
+                return start
+        return None
+
+    def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
+        coarse = level.coarse
+        on_coarse = _on_coarse(self._mesh, coarse, request)
+        zeros = predicted(coarse.mesh, on_coarse).zeros
+        if not zeros.is_simple_curve(coarse.mesh, request.closed):
+            return None
+        curve = zeros.curves[0]
+        visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
+        surface = CurveSurface(self._mesh, self._vertex_normals)
+        result = lifted(surface, coarse, level.surface, curve, request.points[visited])
+        return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
+
+    def _surface(self, component: int, count: int) -> _CoarseSurface:
+        key = component, count
+        if key not in self._made:
+            coarse = build_coarse_mesh(self._mesh, self._vertex_normals, component, count)
+            surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
+            self._made[key] = _CoarseSurface(coarse, surface)
+        return self._made[key]
+
+
+def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
+    """The request in terms of the coarse mesh.
+
+    Raises
+    ------
+    ControlPointError, UnreachableError
+        If control points are the same there, or apart.
+    """
+
+    def nearest(points: SurfacePoints) -> SurfacePoints:
+        return coarse.nearest_points(fine, points)
+
+    return replace(
+        request,
+        points=locate_control_points(coarse.mesh, nearest(request.points), request.closed),
+        via_points={key: nearest(points) for key, points in request.via_points.items()},
+        obstacles=_in_cells(coarse, request.obstacles),
+        alignment=_in_cells(coarse, request.alignment),
+    )
+
+
+def _in_cells(coarse: CoarseMesh, weights: FloatArray | None) -> FloatArray | None:
+    """The greatest weight in each cell: no wall and no lane is lost."""
+    return None if weights is None else coarse.greatest_in_cells(weights)
+
+
+def _visited(curve: SurfaceCurve, positions: FloatArray) -> IntArray:
+    """Which of the control points, (k, 3), a curve passes, in order."""
+    passed = curve.points[curve.control_index]
+    return np.linalg.norm(passed[:, None] - positions, axis=2).argmin(axis=1)

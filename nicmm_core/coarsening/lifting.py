@@ -1,0 +1,185 @@
+"""Bring a curve from the coarse mesh back to the fine one.
+
+Nodes of the coarse curve are found again in the cells that they lie in and joined by straight ways
+over the faces, as in the relaxation. Where the fine surface is too rough for that, the shortest way
+along its edges joins them. Cells and ways stay on the surface, so a curve on one side of a thin
+limb is lifted to that side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import IntArray
+from ..curve import SurfaceCurve
+from ..mesh import Mesh, unique_edges
+from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
+from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
+from ..relaxation.face_walks import strictly_inside
+from ..surface_points import SurfacePoints, nearest_points
+from .coarse_mesh import CoarseMesh
+
+NODES = 256
+"""Nodes that are lifted. What is finer on a coarse curve is its mesh's and not the surface's."""
+
+
+def lifted(
+    surface: CurveSurface,
+    coarse: CoarseMesh,
+    coarse_surface: CurveSurface,
+    curve: SurfaceCurve,
+    controls: SurfacePoints,
+) -> SurfaceCurve | None:
+    """The curve on the fine mesh near one on the coarse mesh.
+
+    Parameters
+    ----------
+    surface, coarse_surface : CurveSurface
+        Of the fine mesh and of ``coarse.mesh``.
+    coarse : CoarseMesh
+    curve : SurfaceCurve
+        Simple, on the coarse mesh.
+    controls : SurfacePoints
+        k points of the fine mesh, in the order in which the curve visits them.
+
+    Returns
+    -------
+    SurfaceCurve or None
+        Simple and exactly through its control points; None where that does not come out.
+    """
+    fine = surface.mesh
+    exact = exact_curve(coarse_surface, curve, NODES)
+    places, cell = _nearest_points(fine, coarse, exact.nodes.places)
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    faces[exact.control_nodes] = controls.faces
+    barycentric[exact.control_nodes] = controls.barycentric
+    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), curve.closed)
+    # The coarse mesh's normals do not follow every dent that a way has to pass.
+    smooth = replace(nodes, normals=exact.nodes.normals)
+    polyline, node_place, lost = straight_ways(fine, exact, smooth)
+    bridges: dict[int, SurfacePoints] = {}
+    for node in np.flatnonzero(lost).tolist():
+        following = (node + 1) % len(cell)
+        around = coarse.cells_around(np.unique(cell[[node, following]]))
+        bridge = _way_along_edges(fine, coarse.faces_of_cells(fine, around), nodes, node, following)
+        if bridge is None:
+            return None
+        bridges[node] = bridge
+    result = _with_bridges(exact, nodes, polyline, node_place, bridges)
+    if not is_simple(surface, result):
+        return None
+    return result.surface_curve(fine)
+
+
+def _nearest_points(
+    fine: Mesh, coarse: CoarseMesh, points: SurfacePoints
+) -> tuple[SurfacePoints, IntArray]:
+    """Points of the coarse mesh on the fine one, strictly inside faces, and their cells, (p,)."""
+    positions = points.positions(coarse.mesh)
+    cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
+    faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
+    for one in np.unique(cell).tolist():
+        here = np.flatnonzero(cell == one)
+        found, _ = nearest_points(
+            fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))
+        )
+        faces[here], barycentric[here] = found.faces, found.barycentric
+    return SurfacePoints(faces, strictly_inside(barycentric)), cell
+
+
+def _way_along_edges(
+    mesh: Mesh, inside: IntArray, nodes: Nodes, start: int, end: int
+) -> SurfacePoints | None:
+    """The shortest way along edges of some faces from one node to another, without the latter."""
+    vertices, faces = np.unique(mesh.faces[inside], return_inverse=True)
+    edges, _ = unique_edges(faces.reshape(-1, 3))
+    ends = nodes.places[np.array([start, end])]
+    place = {vertex: number for number, vertex in enumerate(vertices.tolist())}
+    here, there = len(vertices), len(vertices) + 1
+    links = [
+        (node, place[vertex], ends.faces[number], weight)
+        for number, node in enumerate((here, there))
+        for vertex, weight in zip(
+            mesh.faces[ends.faces[number]].tolist(), ends.barycentric[number], strict=True
+        )
+        if vertex in place
+    ]
+    positions = np.concatenate([mesh.vertices[vertices], nodes.positions[[start, end]]])
+    arcs = np.concatenate([edges, np.array([link[:2] for link in links]).reshape(-1, 2)])
+    length = np.linalg.norm(positions[arcs[:, 0]] - positions[arcs[:, 1]], axis=1)
+    size = len(positions)
+    # A zero would not be an arc.
+    length = np.maximum(length, np.finfo(float).tiny)
+    graph = sparse.csr_array((length, (arcs[:, 0], arcs[:, 1])), shape=(size, size))
+    _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
+    if previous[there] < 0:
+        return None
+    way = [int(previous[there])]
+    while way[-1] != here:
+        way.append(int(previous[way[-1]]))
+    way = vertices[way[-2::-1]].tolist()
+    return _points_of_way(mesh, ends, way)
+
+
+def _points_of_way(mesh: Mesh, ends: SurfacePoints, way: list[int]) -> SurfacePoints | None:
+    """A way over vertices as points, each in the face of the segment after it, with its start."""
+    start, end = ({*_support(mesh, ends, number)} for number in range(2))
+    # An end that is a vertex itself is not passed twice.
+    if start == {way[0]}:
+        way = way[1:]
+    if way and end == {way[-1]}:
+        way = way[:-1]
+    stops = [start, *({vertex} for vertex in way), end]
+    faces, barycentric = [], []
+    for number, (one, other) in enumerate(zip(stops[:-1], stops[1:], strict=True)):
+        face = _common_face(mesh, one | other)
+        if face is None:
+            return None
+        corners = mesh.faces[face].tolist()
+        faces.append(face)
+        weight = dict.fromkeys(one, 1.0)
+        if number == 0:
+            own = mesh.faces[ends.faces[0]].tolist()
+            weight = dict(zip(own, ends.barycentric[0].tolist(), strict=True))
+        barycentric.append([weight.get(corner, 0.0) for corner in corners])
+    return SurfacePoints(np.array(faces, dtype=np.int64), np.array(barycentric))
+
+
+def _support(mesh: Mesh, points: SurfacePoints, number: int) -> list[int]:
+    """The vertices that a point is a mixture of."""
+    return mesh.faces[points.faces[number]][points.barycentric[number] > 0.0].tolist()
+
+
+def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
+    """The first face that has all of some vertices."""
+    incidence = mesh.vertex_faces
+    around = [incidence[[vertex]].indices for vertex in sorted(vertices)]
+    common = around[0]
+    for faces in around[1:]:
+        common = np.intersect1d(common, faces)
+    return int(common.min()) if len(common) else None
+
+
+def _with_bridges(
+    curve: ExactCurve,
+    nodes: Nodes,
+    polyline: SurfacePoints,
+    node_place: IntArray,
+    bridges: dict[int, SurfacePoints],
+) -> ExactCurve:
+    """The polyline with the ways that replace single stretches between nodes."""
+    bounds = np.append(node_place, len(polyline))
+    parts = [
+        bridges.get(node, polyline[np.arange(bounds[node], bounds[node + 1])])
+        for node in range(len(node_place))
+    ]
+    lengths = np.array([len(part) for part in parts])
+    joined = SurfacePoints(
+        np.concatenate([part.faces for part in parts]),
+        np.concatenate([part.barycentric for part in parts]),
+    )
+    return ExactCurve(nodes, curve.control_nodes, joined, np.cumsum(lengths) - lengths)

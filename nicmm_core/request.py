@@ -1,0 +1,79 @@
+"""What a curve is asked for, checked and in one form, so that requests can be compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .array_types import FloatArray
+from .path.via_points import LocatedViaPoints
+from .surface_points import SurfacePoints
+
+Progress = Callable[[float, FloatArray], object]
+"""Called with the fraction done and the points of the curve so far, (n, 3); False stops."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A curve on a mesh; nothing in it belongs to the caller.
+
+    Attributes
+    ----------
+    points : SurfacePoints
+        Control points.
+    closed : bool
+    order : {"given", "shortest"}
+    via_points : dict
+        From the index of a control point to points on the way to the next one.
+    obstacles, alignment : (V,) float array or None
+    smoothness : float
+    """
+
+    points: SurfacePoints
+    closed: bool
+    order: str
+    via_points: LocatedViaPoints
+    obstacles: FloatArray | None
+    alignment: FloatArray | None
+    smoothness: float
+
+    @property
+    def has_maps(self) -> bool:
+        """Whether there is something to avoid or to follow."""
+        return self.obstacles is not None or self.alignment is not None
+
+
+def same_course(one: Request, other: Request) -> bool:
+    """Whether requests differ at most in where the control points are, and in smoothness."""
+    return (
+        len(one.points) == len(other.points)
+        and one.closed == other.closed
+        and one.order == other.order
+        and one.via_points.keys() == other.via_points.keys()
+        and all(_same_points(one.via_points[key], other.via_points[key]) for key in one.via_points)
+        # The path goes round obstacles from the start.
+        and _same_map(one.obstacles, other.obstacles)
+        and _same_map(one.alignment, other.alignment)
+    )
+
+
+def same_request(one: Request, other: Request) -> bool:
+    """Whether requests do not differ at all."""
+    return (
+        same_course(one, other)
+        and _same_points(one.points, other.points)
+        and one.smoothness == other.smoothness
+    )
+
+
+def _same_points(one: SurfacePoints, other: SurfacePoints) -> bool:
+    faces = np.array_equal(one.faces, other.faces)
+    return faces and np.array_equal(one.barycentric, other.barycentric)
+
+
+def _same_map(one: FloatArray | None, other: FloatArray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)

@@ -1,0 +1,104 @@
+"""On a large mesh nothing but the relaxation and single passes over its arrays is done."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import nicmm_core as nicmm
+from nicmm_core import design as design_module
+from nicmm_core import shapes
+from nicmm_core.coarsening import coarse_start
+from nicmm_core.level_set import sparse_solver
+from tests.core.checks import assert_valid_design
+
+
+@pytest.fixture(scope="module")
+def large():
+    """A body with limbs of 51,202 vertices."""
+    return shapes.creature(5, faces=400, subdivisions=4)
+
+
+@pytest.fixture
+def unknowns(monkeypatch):
+    """Sizes of all systems that are factorised."""
+    sizes = []
+    plain = sparse_solver.linalg.splu
+
+    def counted(matrix, *arguments, **named):
+        sizes.append(matrix.shape[0])
+        return plain(matrix, *arguments, **named)
+
+    monkeypatch.setattr(sparse_solver.linalg, "splu", counted)
+    return sizes
+
+
+def chosen_on(mesh, count, seed=0):
+    return np.random.default_rng(seed).choice(len(mesh.vertices), size=count, replace=False)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, closed):
+    design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
+    assert_valid_design(large, design, closed=closed)
+    assert max(unknowns) < 2 * coarse_start.COARSE[0]
+
+
+def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
+    made = []
+    build = coarse_start.build_coarse_mesh
+    monkeypatch.setattr(
+        coarse_start, "build_coarse_mesh", lambda *given: made.append(given) or build(*given)
+    )
+    designer = nicmm.Designer(large)
+    for seed in range(3):
+        designer.forget()
+        assert_valid_design(large, designer.design(chosen_on(large, 4, seed), order="shortest"))
+    assert len(made) == 1
+
+
+def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
+    mesh = shapes.sphere(6)
+    chosen = chosen_on(mesh, 4)
+    by_cells = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
+    monkeypatch.setattr(design_module, "LARGE", 10**9)
+    directly = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
+    apart, _ = cKDTree(directly.points).query(by_cells.points)
+    assert apart.max() < 0.02
+    assert by_cells.length == pytest.approx(directly.length, rel=1e-3)
+
+
+def test_points_in_one_cell_are_told_apart(large):
+    # A vertex and its neighbours: the cells are far larger than that.
+    around = np.unique(large.faces[large.vertex_faces[[1000]].indices])
+    design = nicmm.design_curve(large, around[:3])
+    assert_valid_design(large, design)
+
+
+def test_given_order_and_via_points_hold_on_large_meshes():
+    ring = shapes.torus(around=240, across=120)
+    # Three points on the outside, joined the long way round the axis by via points or the short.
+    angle = np.arctan2(ring.vertices[:, 1], ring.vertices[:, 0])
+    outside = np.linalg.norm(ring.vertices[:, :2], axis=1) > 1.39
+    at = [int(np.flatnonzero(outside)[np.abs(angle[outside] - a).argmin()]) for a in (0, 0.5, 1.0)]
+    back = int(np.flatnonzero(outside)[np.abs(angle[outside] - 4.0 + 2 * np.pi).argmin()])
+    short = nicmm.design_curve(ring, at)
+    long = nicmm.design_curve(ring, at, via_points={2: [back]})
+    assert_valid_design(ring, long)
+    assert long.curves[0].length > 2.0 * short.curves[0].length
+
+
+def test_maps_reach_the_coarse_mesh(large):
+    chosen = chosen_on(large, 4, seed=3)
+    free = nicmm.design_curve(large, chosen, order="shortest")
+    curve = free.curves[0]
+    middle = curve.points[(curve.control_index[0] + curve.control_index[1]) // 2]
+    away = np.linalg.norm(large.vertices - middle, axis=1)
+    obstacles = (away < 0.05 * large.diagonal).astype(float)
+    guided = nicmm.design_curve(large, chosen, order="shortest", obstacles=obstacles)
+    assert_valid_design(large, guided)
+
+    def inside(one):
+        weight = obstacles[large.faces[one.faces]] * one.barycentric
+        return float((weight.sum(axis=1) > 0.5).mean())
+
+    assert inside(guided.curves[0]) < 0.3 * inside(curve)

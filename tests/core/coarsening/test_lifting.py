@@ -1,0 +1,51 @@
+"""A curve of the coarse mesh comes back to the fine one, through the points themselves."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
+from nicmm_core.coarsening.lifting import lifted
+from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
+from nicmm_core.surface_points import locate_control_points
+from tests.core.checks import assert_valid_curve
+
+
+def lifted_through(mesh, chosen, closed):
+    """The coarse mesh, a curve on it and the same on the fine mesh."""
+    normals = unsigned_normals(mesh)
+    coarse = build_coarse_mesh(mesh, normals, 0, 600)
+    points = locate_control_points(mesh, chosen, closed)
+    near = coarse.nearest_points(mesh, points)
+    (curve,) = nicmm.design_curve(coarse.mesh, near, closed=closed).curves
+    surface = CurveSurface(mesh, normals)
+    coarse_surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
+    return coarse, curve, lifted(surface, coarse, coarse_surface, curve, points)
+
+
+def rough_sphere():
+    """A sphere with needles and dents, on which straight ways get lost."""
+    generator = np.random.default_rng(4)
+    fine = shapes.sphere(5)
+    return nicmm.Mesh(
+        fine.vertices + generator.normal(scale=0.012, size=fine.vertices.shape), fine.faces
+    )
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize(
+    "mesh",
+    [shapes.sphere(5), shapes.creature(2, faces=200, subdivisions=3), rough_sphere()],
+    ids=["sphere", "creature", "rough"],
+)
+def test_lifted_curve_is_valid_and_near(mesh, closed):
+    chosen = np.random.default_rng(2).choice(len(mesh.vertices), size=4, replace=False)
+    coarse, curve, result = lifted_through(mesh, chosen, closed)
+    assert result is not None
+    assert_valid_curve(mesh, result, closed=closed)
+    found = result.points[result.control_index]
+    assert np.abs(found - mesh.vertices[chosen]).max() <= 1e-12 * mesh.diagonal
+    apart, _ = cKDTree(curve.points).query(result.points)
+    assert apart.max() < 2.0 * coarse.mesh.mean_edge_length
