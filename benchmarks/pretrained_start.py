@@ -15,23 +15,23 @@ import numpy as np
 
 from nicmm_core import shapes
 from nicmm_core.array_types import FloatArray
-from nicmm_core.crossings import crossing_segments
-from nicmm_core.design_result import is_one_curve
+from nicmm_core.level_set.features import BASE_CHANNELS
 from nicmm_core.level_set.problem import Problem
+from nicmm_core.level_set.zero_set import zero_set
 from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkWeights
 from nicmm_core.network.single_pass import predict_once
 from nicmm_core.network.trainable_network import network_weights
-from nicmm_core.network.weights_file import load_weights
+from nicmm_core.network.weights_file import shipped_weights
+from nicmm_core.path.band_refinement import PIECES_TO_START
 from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
 from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
-from nicmm_core.surface_points import SurfacePoints
 
 from . import collections, plots, report
 from .guarantee import NEARLY_STRAIGHT
 from .measures import bending
 from .scale import Scale
-from .solving import Sample, designed_curve, random_field, random_samples, untrained
+from .solving import Sample, random_field, random_samples, untrained
 
 SEED = 21
 DISTURBANCE_SEED = 22
@@ -73,7 +73,7 @@ class Rest:
         Bending before and after relaxation.
     iterations : int
     stopped : str
-        As `relax` says it, or "crossing" where the start crosses itself.
+        As `relax` says it, or "not simple" where the start is not one simple curve.
     seconds : float
         CPU time of the relaxation.
     """
@@ -88,7 +88,7 @@ class Rest:
     @property
     def failed(self) -> bool:
         """Whether there is no relaxed curve."""
-        return self.stopped in ("crossing", "unrelaxed")
+        return self.stopped in ("not simple", "unrelaxed")
 
 
 Results = dict[str, list[Rest]]
@@ -100,7 +100,7 @@ def run(scale: Scale) -> None:
     meshes = [*_meshes(scale)]
     results: dict[str, Results] = {}
     for number, (kind, (order, closed)) in enumerate(KINDS.items()):
-        samples = random_samples(meshes, 1, SEED + 100 * number, order, closed)
+        samples = random_samples(meshes, 1, SEED + 100 * number, order, closed, PIECES_TO_START)
         results[kind] = _relaxed(samples)
     pooled = {start: [one for each in results.values() for one in each[start]] for start in STARTS}
     body = (
@@ -133,7 +133,7 @@ def _disturbed(problem: Problem) -> FloatArray:
 STARTS: dict[str, Callable[[], Callable[[Problem], FloatArray]]] = {
     WITHOUT: lambda: lambda problem: problem.initial_distance,
     UNTRAINED: lambda: _network(network_weights(untrained())),
-    SHIPPED: lambda: _network(load_weights()),
+    SHIPPED: lambda: _network(shipped_weights(BASE_CHANNELS)),
     DISTURBED: lambda: _disturbed,
 }
 """What makes a start, for a run."""
@@ -158,17 +158,18 @@ def _relaxed(samples: Iterable[Sample]) -> Results:
 
 
 def _rest(surface: CurveSurface, sample: Sample, field: FloatArray) -> Rest:
-    curve, by_itself = designed_curve(sample, field)
-    start = bending(sample.mesh, curve)
-    polyline = SurfacePoints(curve.faces, curve.barycentric)
-    crosses = len(crossing_segments(sample.mesh, polyline, curve.closed)) > 0
-    if crosses or not is_one_curve([curve], sample.problem.loop.closed):
-        return Rest(not by_itself, start, start, 0, "crossing", 0.0)
+    mesh, problem = sample.mesh, sample.problem
+    zeros = zero_set(mesh, problem, field)
+    repaired = zeros.breaking_vertices > 0
+    curve = zeros.curves[0]
+    start = bending(mesh, curve)
+    if not zeros.is_simple_curve(mesh, problem.loop.closed):
+        return Rest(repaired, start, start, 0, "not simple", 0.0)
     began = time.process_time()
     relaxed = relax(surface, curve, 1.0, RelaxationConfig())
     seconds = time.process_time() - began
-    end = bending(sample.mesh, relaxed.curve)
-    return Rest(not by_itself, start, end, relaxed.iterations, relaxed.stopped, seconds)
+    end = bending(mesh, relaxed.curve)
+    return Rest(repaired, start, end, relaxed.iterations, relaxed.stopped, seconds)
 
 
 def _ends(results: Results) -> dict[str, FloatArray]:

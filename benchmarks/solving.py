@@ -17,12 +17,13 @@ from nicmm_core.curve import SurfaceCurve
 from nicmm_core.level_set.contour import extract_curves
 from nicmm_core.level_set.losses import LossWeights, balanced
 from nicmm_core.level_set.problem import Problem, build_problem
-from nicmm_core.level_set.topology import keep_topology
+from nicmm_core.level_set.zero_set import zero_set
 from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.path.band_refinement import PIECES
 from nicmm_core.surface_points import locate_control_points
 
 from . import plots, report
@@ -65,12 +66,13 @@ def random_samples(
     seed: int,
     order: str = "shortest",
     closed: bool = True,
+    pieces: int = PIECES,
 ) -> Iterator[Sample]:
     """Problems of `random_sets`; a set without a simple path is named and skipped."""
     for name, mesh, points in random_sets(meshes, per_mesh, seed):
         located = locate_control_points(mesh, points, closed)
         try:
-            problem = build_problem(mesh, located, order, closed=closed)
+            problem = build_problem(mesh, located, order, closed=closed, pieces=pieces)
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
@@ -214,18 +216,8 @@ def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
 
 def designed_curve(sample: Sample, field: FloatArray) -> tuple[SurfaceCurve, bool]:
     """The curve that a design makes of φ, and whether it was one curve by itself."""
-    problem = sample.problem
-    kept, breaking = keep_topology(
-        problem.working,
-        problem.loop,
-        problem.initial_distance,
-        problem.smoother.interpolating(field),
-        problem.bundle,
-    )
-    curves = extract_curves(
-        sample.mesh, problem.working, kept, problem.loop.control_vertices, problem.bundle
-    )
-    return curves[0], not breaking
+    zeros = zero_set(sample.mesh, sample.problem, field)
+    return zeros.curves[0], not zeros.breaking_vertices
 
 
 def random_field(problem: Problem, seed: int) -> FloatArray:
