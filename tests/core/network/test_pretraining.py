@@ -211,12 +211,12 @@ def test_sets_are_of_the_kinds_asked_for(
 
 
 def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
-    settings = replace(SETTINGS, sets=60, epochs=1, open_share=0.4, given_share=0.3)
+    settings = replace(SETTINGS, sets=20, epochs=1, open_share=0.4, given_share=0.3)
     train(meshes, tmp_path / "weights.npz", settings)
     open_curves = sum(not closed for closed, _, _ in prepared)
     given = sum(order == "given" for _, order, _ in prepared)
-    assert 14 <= open_curves <= 34
-    assert 9 <= given <= 27
+    assert 3 <= open_curves <= 13
+    assert 2 <= given <= 11
 
 
 def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared):
@@ -253,7 +253,7 @@ def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
     given = NetworkInput(features, features[:, 7].clone(), None, None, None)
     before = features.clone()
     ways = set()
-    for _ in range(2000):
+    for _ in range(1000):
         other = turned(given, generator)
         axes = np.zeros((3, 3))
         for new in range(3):
