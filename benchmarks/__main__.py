@@ -24,6 +24,7 @@ MEASUREMENTS = (
     "curvature",
     "runtime",
     "dragging",
+    "stages",
     "peers",
     "degraded",
     "resolution",

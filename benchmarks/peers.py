@@ -72,7 +72,7 @@ def run(scale: Scale) -> None:
     surfaces = collections.surfaces(scale, scale.choose(40, 3))
     for name, mesh, points in random_sets(surfaces, 1, SEED):
         try:
-            task = _task(mesh, points)
+            task = task_on(mesh, points)
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
@@ -114,7 +114,8 @@ def _missing() -> str:
     return f" Not installed, so left out: {report.listed(missing)}." if missing else ""
 
 
-def _task(mesh: Mesh, points: IntArray) -> Task:
+def task_on(mesh: Mesh, points: IntArray) -> Task:
+    """What other systems are asked for through some vertices in the shortest order."""
     problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
     working, loop = problem.working, problem.loop
     return Task(

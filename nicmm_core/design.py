@@ -3,8 +3,8 @@
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
 
-On a large mesh all but the last is done on a coarse mesh of the same surface, and the curve is
-lifted from there (`coarsening`).
+On all but small meshes all but the last is done on a coarse mesh of the same surface, and the
+curve is lifted from there (`coarsening`).
 """
 
 from __future__ import annotations
@@ -44,9 +44,6 @@ from .surface_points import SurfacePoints, locate_control_points
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
-
-LARGE = 24_000
-"""Faces of a component from which on a curve is found on a coarse mesh first."""
 
 State = TypeVar("State")
 
@@ -172,9 +169,6 @@ class Designer:
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        if np.count_nonzero(component) < LARGE:
-            return None
         found = self._coarse_starts.find(request)
         if found is None:
             return None
@@ -182,7 +176,7 @@ class Designer:
             curve=found.curve,
             visited=found.visited,
             surface=self._curve_surface(request),
-            unit=float(np.sqrt(self.mesh.face_areas[component].sum())),
+            unit=float(np.sqrt(self._area(request))),
             breaking=found.breaking_vertices,
         )
 
@@ -248,11 +242,16 @@ class Designer:
         """The surface that curves move on."""
         if not request.has_maps:
             return CurveSurface(self.mesh, self._normals)
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        area = float(self.mesh.face_areas[component].sum())
         maps = request.obstacles, request.alignment
         importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / area)
+        return CurveSurface(
+            self.mesh, self._normals, importance, FEATURE_TENSION / self._area(request)
+        )
+
+    def _area(self, request: Request) -> float:
+        """Of the component that the curve is on."""
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        return float(self.mesh.face_areas[component].sum())
 
     @cached_property
     def _normals(self) -> FloatArray:

@@ -110,6 +110,13 @@ class Mesh:
         ones = np.ones(rows.size, dtype=np.int8)
         return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
 
+    def faces_at(self, vertices: IntArray) -> IntArray:
+        """Faces that have any of some vertices, ascending."""
+        begin, end = self.vertex_faces.indptr[vertices], self.vertex_faces.indptr[vertices + 1]
+        count = end - begin
+        place = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+        return np.unique(self.vertex_faces.indices[place]).astype(np.int64)
+
     @cached_property
     def face_component(self) -> IntArray:
         """Which connected component each face belongs to, shape (F,).

@@ -63,11 +63,11 @@ class CoarseMesh:
         """Fine faces at the fine vertices of some cells, ascending."""
         order, begin = self._by_cell
         parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
-        return np.unique(fine.vertex_faces[np.concatenate(parts)].indices)
+        return fine.faces_at(np.concatenate(parts))
 
     def cells_around(self, vertices: IntArray) -> IntArray:
         """Some cells and their neighbours, ascending."""
-        return np.unique(self.mesh.faces[self.mesh.vertex_faces[vertices].indices])
+        return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
 
     def greatest_in_cells(self, values: FloatArray) -> FloatArray:
         """The greatest of the values at fine vertices, (V,), in each cell, shape (n,)."""
@@ -87,10 +87,8 @@ class CoarseMesh:
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
         positions = points.positions(fine)
         faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-        incidence = self.mesh.vertex_faces
-        for number, vertex in enumerate(self.cell[corner].tolist()):
-            ring = np.unique(self.mesh.faces[incidence[[vertex]].indices])
-            around = np.unique(incidence[ring].indices)
+        for number, vertex in enumerate(self.cell[corner]):
+            around = self.mesh.faces_at(self.cells_around(vertex[None]))
             if not len(around):
                 raise UnreachableError("a cell of the coarse mesh has no face")
             found, _ = nearest_points(self.mesh, positions[number : number + 1], around)

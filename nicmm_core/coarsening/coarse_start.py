@@ -17,14 +17,17 @@ from ..surface_points import SurfacePoints, locate_control_points
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .lifting import lifted
 
-COARSE = (4_000, 16_000, 64_000)
-"""Cells of the coarse meshes that are tried one after the other.
+CELLS = 4_000
+"""Cells of the first coarse mesh, about as many vertices as the network was trained on."""
 
-The first is about as fine as the meshes that the network was trained on.
-"""
+REDUCTION = 2
+"""Vertices of the mesh for each cell at least."""
 
-LEAST_REDUCTION = 3.0
-"""Vertices of the mesh for each cell, below which a coarse mesh saves nothing."""
+SMALL = 3_000
+"""Vertices up to which a mesh is its own coarse mesh."""
+
+GROWTH = 4
+"""Growth of the number of cells from one coarse mesh that gives no curve to the next."""
 
 
 @dataclass(frozen=True)
@@ -64,25 +67,34 @@ class CoarseStarts:
     def __init__(self, mesh: Mesh, vertex_normals: FloatArray) -> None:
         self._mesh, self._vertex_normals = mesh, vertex_normals
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
+        self._sizes: dict[int, int] = {}
 
     def find(self, request: Request) -> CoarseStart | None:
         """The curve of the first coarse mesh that gives one; None where none does.
 
-        That may be so for points too close to one another, or strands: the fine mesh decides.
+        That is so on a small mesh, and may be so for points or strands that are close to one
+        another: then the mesh itself decides.
         """
         component = int(self._mesh.face_component[request.points.faces[0]])
-        inside = self._mesh.faces[self._mesh.face_component == component]
-        n_vertices = np.count_nonzero(np.bincount(inside.ravel()))
-        for count in COARSE:
-            if LEAST_REDUCTION * count > n_vertices:
-                break
+        most = self._n_vertices(component) // REDUCTION
+        if most * REDUCTION <= SMALL:
+            return None
+        count = min(CELLS, most)
+        while count <= most:
             try:
                 start = self._lifted(self._surface(component, count), request)
             except NicmmError:
-                continue
+                start = None
             if start is not None:
                 return start
+            count *= GROWTH
         return None
+
+    def _n_vertices(self, component: int) -> int:
+        if component not in self._sizes:
+            inside = self._mesh.faces[self._mesh.face_component == component]
+            self._sizes[component] = np.count_nonzero(np.bincount(inside.ravel()))
+        return self._sizes[component]
 
     def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse

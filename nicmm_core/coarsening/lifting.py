@@ -23,8 +23,12 @@ from ..relaxation.face_walks import strictly_inside
 from ..surface_points import SurfacePoints, nearest_points
 from .coarse_mesh import CoarseMesh
 
-NODES = 256
-"""Nodes that are lifted. What is finer on a coarse curve is its mesh's and not the surface's."""
+NODES = (256, 512, 128)
+"""Nodes that are lifted, the numbers that are tried one after the other.
+
+What is finer on a coarse curve is its mesh's and not the surface's; but where strands are close to
+one another, ways between other nodes may pass beside each other.
+"""
 
 
 def lifted(
@@ -51,13 +55,24 @@ def lifted(
     SurfaceCurve or None
         Simple and exactly through its control points; None where that does not come out.
     """
+    for count in NODES:
+        exact = exact_curve(coarse_surface, curve, count)
+        result = _lifted_nodes(surface, coarse, exact, controls)
+        if result is not None and is_simple(surface, result):
+            return result.surface_curve(surface.mesh)
+    return None
+
+
+def _lifted_nodes(
+    surface: CurveSurface, coarse: CoarseMesh, exact: ExactCurve, controls: SurfacePoints
+) -> ExactCurve | None:
+    """The curve through the nodes of a coarse one, simple or not."""
     fine = surface.mesh
-    exact = exact_curve(coarse_surface, curve, NODES)
     places, cell = _nearest_points(fine, coarse, exact.nodes.places)
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[exact.control_nodes] = controls.faces
     barycentric[exact.control_nodes] = controls.barycentric
-    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), curve.closed)
+    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
     # The coarse mesh's normals do not follow every dent that a way has to pass.
     smooth = replace(nodes, normals=exact.nodes.normals)
     polyline, node_place, lost = straight_ways(fine, exact, smooth)
@@ -69,10 +84,7 @@ def lifted(
         if bridge is None:
             return None
         bridges[node] = bridge
-    result = _with_bridges(exact, nodes, polyline, node_place, bridges)
-    if not is_simple(surface, result):
-        return None
-    return result.surface_curve(fine)
+    return _with_bridges(exact, nodes, polyline, node_place, bridges)
 
 
 def _nearest_points(
@@ -156,8 +168,7 @@ def _support(mesh: Mesh, points: SurfacePoints, number: int) -> list[int]:
 
 def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
     """The first face that has all of some vertices."""
-    incidence = mesh.vertex_faces
-    around = [incidence[[vertex]].indices for vertex in sorted(vertices)]
+    around = [mesh.faces_at(np.array([vertex])) for vertex in sorted(vertices)]
     common = around[0]
     for faces in around[1:]:
         common = np.intersect1d(common, faces)

@@ -16,7 +16,7 @@ from ..array_types import BoolArray, FloatArray
 from .virtual_splits import SplitMesh
 
 PIECES = 64
-"""Edges near the loop are at most its length over this number, for a level set that is the curve."""
+"""Edges near the loop are at most its length over this number, for a level set that is a result."""
 
 PIECES_TO_START = 32
 """The same for a level set from which a relaxed curve only starts."""

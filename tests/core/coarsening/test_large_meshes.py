@@ -1,11 +1,12 @@
 """On a large mesh nothing but the relaxation and single passes over its arrays is done."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.level_set import sparse_solver
@@ -40,7 +41,18 @@ def chosen_on(mesh, count, seed=0):
 def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, closed):
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
-    assert max(unknowns) < 2 * coarse_start.COARSE[0]
+    assert max(unknowns) < 1.5 * coarse_start.CELLS
+
+
+def test_memory_follows_the_vertices():
+    mesh = shapes.sphere(7)
+    tracemalloc.start()
+    try:
+        nicmm.design_curve(mesh, chosen_on(mesh, 4), order="shortest")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 1_000 * len(mesh.vertices)
 
 
 def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
@@ -60,7 +72,7 @@ def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
     mesh = shapes.sphere(6)
     chosen = chosen_on(mesh, 4)
     by_cells = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
-    monkeypatch.setattr(design_module, "LARGE", 10**9)
+    monkeypatch.setattr(coarse_start, "SMALL", 10**9)
     directly = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
     apart, _ = cKDTree(directly.points).query(by_cells.points)
     assert apart.max() < 0.02

@@ -1,0 +1,172 @@
+"""Where the time of a design goes, by stage, and how it grows with the mesh."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from types import ModuleType
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+import nicmm_core as nicmm
+from nicmm_core import design as design_module
+from nicmm_core import shapes
+from nicmm_core.array_types import IntArray
+from nicmm_core.coarsening import coarse_start
+from nicmm_core.level_set import problem, zero_set
+from nicmm_core.mesh import Mesh
+from nicmm_core.network import single_pass
+
+from . import report
+from .scale import Scale
+
+SEED = 0
+SIZES = ((500, 2), (1000, 3), (1500, 5))
+"""Faces and subdivisions of the bodies: 8,000, 64,000 and 1,536,000 faces."""
+
+SETS = 5
+DRAGS = 5
+POINTS = 4
+
+STAGES: dict[str, list[tuple[ModuleType, str]]] = {
+    "normals": [(design_module, "unsigned_normals")],
+    "coarse mesh": [(coarse_start, "build_coarse_mesh")],
+    "initial path": [(problem, "build_initial_loop")],
+    "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
+    "network": [(single_pass, "predict_once")],
+    "one loop, contour": [
+        (problem, "keep_topology"),
+        (zero_set, "keep_topology"),
+        (zero_set, "extract_curves"),
+    ],
+    "lifting": [(coarse_start, "lifted")],
+    "start from the last curve": [(design_module, "moved_along")],
+    "relaxation": [(design_module, "relax")],
+}
+"""Functions that make up a design, each where its caller finds it; none calls another."""
+
+REST = "rest"
+TOTAL = "together"
+
+Times = dict[str, float]
+"""Milliseconds by stage."""
+
+
+def run(scale: Scale) -> None:
+    """Measure generated bodies of three sizes."""
+    sizes = ((200, 1),) if scale is Scale.SMOKE else SIZES[: scale.choose(3, 2)]
+    columns: list[tuple[str, Times]] = []
+    memory = []
+    for faces, subdivisions in sizes:
+        mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
+        label = f"{len(mesh.faces):,}"
+        print(f"  {label} faces", flush=True)
+        columns += [(f"{label}, {kind}", times) for kind, times in _measured(mesh).items()]
+        memory.append((label, _bytes_a_vertex(faces, subdivisions)))
+    rows = [
+        (stage, *(f"{times[stage]:.1f}" if times[stage] else "–" for _, times in columns))
+        for stage in (*STAGES, REST, TOTAL)
+    ]
+    bytes_each = ", ".join(f"{count:,.0f} with {label} faces" for label, count in memory)
+    body = (
+        f"Seed {SEED}, {SETS} sets of {POINTS} random vertices on a generated body of each size, "
+        "shortest order; medians in milliseconds. *First*: the first curve on a mesh, whose arrays "
+        "have been checked and no more. *Another*: through other points on the same Designer. "
+        f"*Dragged*: after a point has moved to a neighbouring vertex, {DRAGS} times a set.\n\n"
+        + report.table(("stage", *(label for label, _ in columns)), rows)
+        + "\n\nGreatest memory that a first curve takes beyond what the process had with the "
+        f"mesh's arrays, in bytes a vertex: {bytes_each}."
+    )
+    report.write_section("stages", "Where the time goes", body, scale)
+
+
+def _measured(mesh: Mesh) -> dict[str, Times]:
+    generator = np.random.default_rng(SEED)
+    runs: dict[str, list[Times]] = {"first": [], "another": [], "dragged": []}
+    for _ in range(SETS):
+        designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))  # without anything cached
+        points = generator.choice(len(mesh.vertices), POINTS, replace=False)
+        runs["first"].append(_timed(designer, points))
+        points = generator.choice(len(mesh.vertices), POINTS, replace=False)
+        designer.forget()
+        runs["another"].append(_timed(designer, points))
+        for _ in range(DRAGS):
+            points = _dragged(designer.mesh, points)
+            runs["dragged"].append(_timed(designer, points))
+    return {
+        kind: {stage: float(np.median([one[stage] for one in times])) for stage in times[0]}
+        for kind, times in runs.items()
+    }
+
+
+def _dragged(mesh: Mesh, points: IntArray) -> IntArray:
+    around = np.unique(mesh.faces[mesh.faces_at(points[:1])])
+    moved = points.copy()
+    moved[0] = next(vertex for vertex in around.tolist() if vertex not in points)
+    return moved
+
+
+def _timed(designer: nicmm.Designer, points: IntArray) -> Times:
+    with _stopwatches() as seconds:
+        started = time.perf_counter()
+        designer.design(points, order="shortest")
+        total = time.perf_counter() - started
+    seconds[REST] = total - sum(seconds.values())
+    seconds[TOTAL] = total
+    return {stage: 1000.0 * value for stage, value in seconds.items()}
+
+
+@contextmanager
+def _stopwatches() -> Iterator[Times]:
+    """Add up the seconds spent in every stage."""
+    seconds = dict.fromkeys(STAGES, 0.0)
+
+    def timed(stage: str, function: Any) -> Any:
+        def wrapped(*arguments: Any, **named: Any) -> Any:
+            started = time.perf_counter()
+            try:
+                return function(*arguments, **named)
+            finally:
+                seconds[stage] += time.perf_counter() - started
+
+        return wrapped
+
+    with ExitStack() as patches:
+        for stage, functions in STAGES.items():
+            for module, name in functions:
+                wrapped = timed(stage, getattr(module, name))
+                patches.enter_context(mock.patch.object(module, name, wrapped))
+        yield seconds
+
+
+def _bytes_a_vertex(faces: int, subdivisions: int) -> float:
+    """What the first curve on a mesh adds to the memory of a process of its own."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return float(pool.apply(_growth, (faces, subdivisions)))
+
+
+def _growth(faces: int, subdivisions: int) -> float:
+    nicmm.design_curve(shapes.sphere(3), [0, 100, 200])  # what every process loads once
+    mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
+    before = _resident()
+    points = np.random.default_rng(SEED).choice(len(mesh.vertices), POINTS, replace=False)
+    nicmm.design_curve(mesh, points, order="shortest")
+    return max(0, _peak() - before) / len(mesh.vertices)
+
+
+def _resident() -> int:
+    """Bytes of memory in use now."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize()
+
+
+def _peak() -> int:
+    """Greatest memory that was ever in use, in bytes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
