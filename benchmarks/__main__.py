@@ -14,6 +14,8 @@ from .scale import Scale
 MEASUREMENTS = (
     "one_loop",
     "guarantee",
+    "corpus",
+    "fuzz",
     "pretraining",
     "transfer",
     "pretrained_start",

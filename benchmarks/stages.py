@@ -15,8 +15,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
-from nicmm_core import shapes
+from nicmm_core import shapes, surface_designer
 from nicmm_core.array_types import IntArray
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.level_set import problem, zero_set
@@ -35,7 +34,7 @@ DRAGS = 5
 POINTS = 4
 
 STAGES: dict[str, list[tuple[ModuleType, str]]] = {
-    "normals": [(design_module, "unsigned_normals")],
+    "normals": [(surface_designer, "unsigned_normals")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
@@ -46,8 +45,8 @@ STAGES: dict[str, list[tuple[ModuleType, str]]] = {
         (zero_set, "extract_curves"),
     ],
     "lifting": [(coarse_start, "lifted")],
-    "start from the last curve": [(design_module, "moved_along")],
-    "relaxation": [(design_module, "relax")],
+    "start from the last curve": [(surface_designer, "moved_along")],
+    "relaxation": [(surface_designer, "relax")],
 }
 """Functions that make up a design, each where its caller finds it; none calls another."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .array_types import FloatArray
@@ -16,10 +17,16 @@ SMOOTHNESS_RANGE = (1e-3, 1e3)
 
 def check_choices(order: str, method: str) -> None:
     """Raise ArgumentError unless both are known."""
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
-    if order not in ORDERS:
+    if not isinstance(order, str) or order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+
+
+def check_closed(closed: bool) -> None:
+    """Raise ArgumentError unless it says yes or no."""
+    if not isinstance(closed, bool | np.bool_):
+        raise ArgumentError(f"closed is {closed!r}; pass True or False")
 
 
 def check_torch() -> None:
@@ -52,11 +59,24 @@ def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray 
     return checked
 
 
+def checked_clearance(clearance: float, obstacles: FloatArray | None) -> float:
+    """A length that is not negative, or an ArgumentError."""
+    try:
+        value = float(clearance)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(f"clearance is {clearance!r}; pass a length") from error
+    if not 0.0 <= value < np.inf:
+        raise ArgumentError(f"clearance is {clearance!r}; pass a length that is not negative")
+    if value > 0.0 and obstacles is None:
+        raise ArgumentError(f"clearance is {clearance!r} without obstacles to keep it from")
+    return value
+
+
 def checked_smoothness(smoothness: float) -> float:
     """A number in `SMOOTHNESS_RANGE`, or an ArgumentError."""
     try:
         value = float(smoothness)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
     low, high = SMOOTHNESS_RANGE
     if not low <= value <= high:

@@ -1,4 +1,7 @@
-"""The main path: from a mesh and control points to a curve. Read this file first.
+"""The front door: a mesh and control points go in, a curve comes out. Read this file first.
+
+A request is checked, brought to a copy of the mesh without defects where it has some
+(`sound_copy`), and answered there (`surface_designer`):
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
@@ -10,62 +13,30 @@ curve is lifted from there (`coarsening`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_choices, check_torch, checked_map, checked_smoothness
-from .array_types import FloatArray, IntArray
-from .coarsening.coarse_start import CoarseStarts
-from .curve import SurfaceCurve
-from .design_result import STATUS, Design, Status
-from .errors import ArgumentError
-from .level_set import variational
-from .level_set.features import feature_map
-from .level_set.losses import LossWeights, balanced
-from .level_set.problem import Problem, requested_problem
-from .level_set.solution import Solution
-from .level_set.zero_set import ZeroSet, zero_set
+from .arguments import (
+    check_choices,
+    check_closed,
+    check_torch,
+    checked_clearance,
+    checked_map,
+    checked_smoothness,
+)
+from .design_result import Design
+from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
-from .network.single_pass import predicted
-from .network.weights_file import shipped_weights
 from .path.via_points import ViaPoints, located_via_points
-from .relaxation.curve_field import curve_field
-from .relaxation.curve_nodes import CurveSurface, unsigned_normals
-from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.relaxing import RelaxationConfig, relax
-from .relaxation.warm_start import WARM, moved_along
-from .request import Progress, Request, same_course, same_request
+from .request import Progress, Request
+from .sound_copy import SoundCopy, sound_copies
+from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, locate_control_points
 
-PROGRESS_INTERVAL = 0.25
-"""Least seconds between two calls of a caller's progress function."""
-
-State = TypeVar("State")
-
-
-@dataclass(frozen=True)
-class _Start:
-    """A simple curve on the mesh from which relaxation begins."""
-
-    curve: SurfaceCurve
-    visited: IntArray  # (k,) which control points it passes, in order
-    surface: CurveSurface
-    unit: float  # square root of the surface's area
-    breaking: int = 0
-
-
-@dataclass(frozen=True)
-class _Remembered:
-    """The last relaxed curve."""
-
-    request: Request
-    start: _Start
-    design: Design
+PARTS = (
+    "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
+    "only, across which no curve is led; join the parts, or choose points on one of them"
+)
 
 
 class Designer:
@@ -89,11 +60,13 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._last: _Remembered | None = None
+        self._copies = sound_copies(mesh)
+        self._designers: list[tuple[SoundCopy, SurfaceDesigner]] = []
 
     def forget(self) -> None:
         """Start the next design anew."""
-        self._last = None
+        for _, designer in self._designers:
+            designer.forget()
 
     def design(
         self,
@@ -105,186 +78,48 @@ class Designer:
         method: str = "nicmm",
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
+        clearance: float = 0.0,
         smoothness: float = 1.0,
         progress: Progress | None = None,
     ) -> Design:
         """Design a curve; arguments, result and errors are those of `design_curve`."""
         started = time.perf_counter()
         check_choices(order, method)
+        check_closed(closed)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method == "nicmm-paper":
             check_torch()
         points = locate_control_points(self.mesh, control_points, closed)
         via = {} if via_points is None else via_points
+        avoided = checked_map("obstacles", obstacles, self.mesh)
         request = Request(
             points=points,
             closed=closed,
             order=order,
             via_points=located_via_points(self.mesh, points, via, order, closed),
-            obstacles=checked_map("obstacles", obstacles, self.mesh),
+            obstacles=avoided,
             alignment=checked_map("alignment", alignment, self.mesh),
+            clearance=checked_clearance(clearance, avoided),
             smoothness=checked_smoothness(smoothness),
         )
-        if method == "nicmm":
-            return self._designed(request, progress, started)
-        problem = requested_problem(self.mesh, request)
-        solution = self._solution(problem, request, method, progress)
-        zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
-        return self._level_set_design(problem, solution, zeros, started)
+        copy, designer, request = self._on_sound_copy(request)
+        return copy.design(designer.design(request, method, progress, started))
 
-    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
-        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
-        last = self._last
-        if last is not None and same_request(request, last.request):
-            return replace(last.design, seconds=time.perf_counter() - started)
-        start = self._start_from_last(request)
-        if start is not None:
-            return self._relaxed(request, start, WARM, progress, started)
-        start = self._start_from_coarse(request)
-        if start is None:
-            found = predicted(self.mesh, request)
-            problem, zeros = found.problem, found.zeros
-            if not zeros.is_simple_curve(self.mesh, request.closed):
-                return self._level_set_design(problem, found.solution, zeros, started)
-            start = _Start(
-                curve=zeros.curves[0],
-                visited=problem.loop.order,
-                surface=self._curve_surface(request),
-                unit=problem.unit,
-                breaking=zeros.breaking_vertices,
-            )
-        return self._relaxed(request, start, RelaxationConfig(), progress, started)
-
-    def _start_from_last(self, request: Request) -> _Start | None:
-        """The last curve with its control points moved; None where the request is too different."""
-        last = self._last
-        if last is None or not same_course(request, last.request):
-            return None
-        points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.design.curves[0], points)
-        if curve is None:
-            return None
-        return replace(last.start, curve=curve, breaking=0)
-
-    def _start_from_coarse(self, request: Request) -> _Start | None:
-        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
-        found = self._coarse_starts.find(request)
-        if found is None:
-            return None
-        return _Start(
-            curve=found.curve,
-            visited=found.visited,
-            surface=self._curve_surface(request),
-            unit=float(np.sqrt(self._area(request))),
-            breaking=found.breaking_vertices,
-        )
-
-    def _relaxed(
-        self,
-        request: Request,
-        start: _Start,
-        config: RelaxationConfig,
-        progress: Progress | None,
-        started: float,
-    ) -> Design:
-        """The design that relaxation makes of a curve; it is kept for the next request."""
-        watch = None if progress is None else _seldom(progress, lambda points: points)
-        surface, unit = start.surface, start.unit
-        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
-        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
-        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
-        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
-        design = Design(
-            status=STATUS[relaxed.stopped],
-            curves=[relaxed.curve],
-            iterations=relaxed.iterations,
-            seconds=time.perf_counter() - started,
-            energy=energy,
-            breaking_vertices=start.breaking,
-            find_field=partial(curve_field, self.mesh, relaxed.curve),
-        )
-        if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, design)
-        return design
-
-    def _level_set_design(
-        self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
-    ) -> Design:
-        """The design that a level set is."""
-        one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
-        return Design(
-            status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
-            curves=zeros.curves,
-            iterations=solution.iterations,
-            seconds=time.perf_counter() - started,
-            energy=solution.terms,
-            breaking_vertices=zeros.breaking_vertices,
-            find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
-        )
-
-    def _solution(
-        self, problem: Problem, request: Request, method: str, progress: Progress | None
-    ) -> Solution:
-        """The level set that a method other than "nicmm" finds."""
-        watch = None if progress is None else self._field_watcher(problem, progress)
-        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        if method == "variational":
-            return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        pretrained = shipped_weights(problem.features.shape[1])
-        # These import PyTorch, which nothing else needs.
-        from .network.prediction import PredictionConfig, predict
-        from .network.trainable_network import build_network
-
-        return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
-
-    def _curve_surface(self, request: Request) -> CurveSurface:
-        """The surface that curves move on."""
-        if not request.has_maps:
-            return CurveSurface(self.mesh, self._normals)
-        maps = request.obstacles, request.alignment
-        importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(
-            self.mesh, self._normals, importance, FEATURE_TENSION / self._area(request)
-        )
-
-    def _area(self, request: Request) -> float:
-        """Of the component that the curve is on."""
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        return float(self.mesh.face_areas[component].sum())
-
-    @cached_property
-    def _normals(self) -> FloatArray:
-        return unsigned_normals(self.mesh)
-
-    @cached_property
-    def _coarse_starts(self) -> CoarseStarts:
-        return CoarseStarts(self.mesh, self._normals)
-
-    def _field_watcher(
-        self, problem: Problem, progress: Progress
-    ) -> Callable[[float, FloatArray], bool]:
-        def points(field: FloatArray) -> FloatArray:
-            curves = zero_set(self.mesh, problem, field).curves
-            return curves[0].points if curves else np.zeros((0, 3))
-
-        return _seldom(progress, points)
-
-
-def _seldom(
-    progress: Progress, points: Callable[[State], FloatArray]
-) -> Callable[[float, State], bool]:
-    """Call a progress function with the points of a state, but not too often."""
-    last_call = -np.inf
-
-    def watch(fraction: float, state: State) -> bool:
-        nonlocal last_call
-        if time.perf_counter() - last_call < PROGRESS_INTERVAL:
-            return True
-        last_call = time.perf_counter()
-        return progress(fraction, points(state)) is not False
-
-    return watch
+    def _on_sound_copy(self, request: Request) -> tuple[SoundCopy, SurfaceDesigner, Request]:
+        """A copy of the mesh without its defects, who designs on it, and the request there."""
+        place = 0
+        while True:
+            if place == len(self._designers):
+                copy = next(self._copies, None)
+                if copy is None:
+                    raise UnreachableError(PARTS)
+                self._designers.append((copy, SurfaceDesigner(copy.mesh)))
+            copy, designer = self._designers[place]
+            there = copy.request(request)
+            if there is not None:
+                return copy, designer, there
+            place += 1
 
 
 def design_curve(
@@ -297,6 +132,7 @@ def design_curve(
     method: str = "nicmm",
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
+    clearance: float = 0.0,
     smoothness: float = 1.0,
     progress: Progress | None = None,
 ) -> Design:
@@ -322,7 +158,10 @@ def design_curve(
         method, which trains the network on for every curve; or the same energy minimised without
         a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
-        What the curve shall avoid and what it shall follow.
+        What the curve shall avoid and what it shall follow. No curve enters a face whose three
+        corners are obstacles of weight 1; lower weights cost in proportion.
+    clearance : float, default 0
+        Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger gives a fairer curve that follows the shortest way less closely.
     progress : callable, optional
@@ -338,7 +177,8 @@ def design_curve(
     ControlPointError
         If there are too few points, or one is repeated, out of range or off the surface.
     UnreachableError
-        If no such curve exists on the surface, or only one that winds round itself too often.
+        If no such curve exists on the surface, or only one that winds round itself too often; also
+        where obstacles of weight 1 leave no way.
     ArgumentError
         If another argument cannot be used.
     MissingPackageError
@@ -361,16 +201,7 @@ def design_curve(
         method=method,
         obstacles=obstacles,
         alignment=alignment,
+        clearance=clearance,
         smoothness=smoothness,
         progress=progress,
     )
-
-
-def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
-    """φ in mesh units at the input vertices."""
-    if problem.bundle is not None:
-        field = np.abs(field)
-    inputs = problem.working.input_vertex
-    values = np.full(len(mesh.vertices), field.max() * problem.unit)
-    values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit
-    return values

@@ -3,68 +3,75 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import igl
-import numpy as np
-
-from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve
 from .errors import ArgumentError, MeshError
 from .mesh import Mesh
+from .mesh_formats.obj import read_obj
+from .mesh_formats.off import read_off
+from .mesh_formats.ply import read_ply
+from .mesh_formats.polygons import FormatError
+from .mesh_formats.stl import read_stl
+from .mesh_formats.writing import obj_bytes, off_bytes, ply_bytes, stl_bytes
 
-MESH_FORMATS = (".obj", ".off", ".ply", ".stl")
+_READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply, ".stl": read_stl}
+
+_WRITERS = {".obj": obj_bytes, ".off": off_bytes, ".ply": ply_bytes, ".stl": stl_bytes}
+
+MESH_FORMATS = tuple(_READERS)
 CURVE_FORMATS = (".obj", ".json", ".csv")
 
 
 def read_mesh(path: str | Path) -> Mesh:
     """Read a triangle mesh from OBJ, OFF, PLY or STL.
 
-    The corners of an STL file, which stores every triangle for itself, are joined where their
-    positions are equal.
+    Larger faces are cut into triangles, and faces that name a vertex twice are left out, so faces
+    may have other numbers than in the file; vertices have not. The corners of an STL file, which
+    stores every triangle for itself, are joined where their positions are equal.
 
     Raises
     ------
     MeshError
-        If the file is missing, has another ending or holds no triangle mesh.
+        If the file is missing, has another ending or holds no mesh.
     """
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise MeshError(f"{path!r} is no path of a mesh file; pass a str or a Path") from error
     if path.suffix.lower() not in MESH_FORMATS:
         raise MeshError(f"{path} is no mesh file known here; use {', '.join(MESH_FORMATS)}")
-    if not path.is_file():
-        raise MeshError(f"{path} does not exist; check the path of the mesh")
     try:
-        with _silent_output():
-            vertices, faces = igl.read_triangle_mesh(str(path))[:2]
-    except (RuntimeError, ValueError) as error:
-        raise MeshError(f"{path} cannot be read as a triangle mesh ({error})") from error
-    if path.suffix.lower() == ".stl" and len(vertices):
-        vertices, faces = _joined(np.asarray(vertices), np.asarray(faces))
-    return Mesh(vertices, faces)
-
-
-@contextmanager
-def _silent_output() -> Iterator[None]:
-    """Keep libigl's readers, which print what they do not like, from writing to the terminal."""
-    sys.stdout.flush()
-    saved = os.dup(1)
+        if not path.is_file():
+            raise MeshError(f"{path} does not exist or is no file; check the path of the mesh")
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{path} cannot be opened ({error}); check who may read it") from error
     try:
-        with open(os.devnull, "wb") as nothing:
-            os.dup2(nothing.fileno(), 1)
-        yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(saved)
+        polygons = _READERS[path.suffix.lower()](data)
+        triangles = polygons.triangles()
+    except FormatError as error:
+        raise MeshError(
+            f"{path} cannot be read as {path.suffix[1:].upper()} ({error}); export it again"
+        ) from error
+    try:
+        return Mesh(polygons.vertices, triangles)
+    except MeshError as error:
+        raise MeshError(f"{path} holds no mesh to draw on: {error}") from error
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
-    """Write a mesh as OBJ, OFF, PLY or STL by the path's ending."""
-    igl.write_triangle_mesh(str(path), mesh.vertices.copy(), mesh.faces.copy())
+    """Write a mesh as OBJ, OFF, PLY or STL by the path's ending.
+
+    Raises
+    ------
+    ArgumentError
+        If the ending is another one, or the file cannot be written.
+    """
+    path = _checked_output(path, MESH_FORMATS)
+    _write(path, _WRITERS[path.suffix.lower()](mesh.vertices, mesh.faces))
 
 
 def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
@@ -76,31 +83,51 @@ def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
     Raises
     ------
     ArgumentError
-        If the ending is another one.
+        If the ending is another one, or the file cannot be written.
     """
-    path = Path(path)
-    writers = {".obj": _write_obj, ".json": _write_json, ".csv": _write_csv}
-    check_curve_path(path)
-    writers[path.suffix.lower()](path, curve)
+    path = check_curve_path(path)
+    texts = {".obj": _obj_text, ".json": _json_text, ".csv": _csv_text}
+    _write(path, texts[path.suffix.lower()](curve).encode("utf-8"))
 
 
-def check_curve_path(path: str | Path) -> None:
+def check_curve_path(path: str | Path) -> Path:
     """Refuse an output path before any work is done for it."""
-    path = Path(path)
-    if path.suffix.lower() not in CURVE_FORMATS:
-        raise ArgumentError(f"{path} has no known ending; write to {', '.join(CURVE_FORMATS)}")
-    if not path.resolve().parent.is_dir():
+    return _checked_output(path, CURVE_FORMATS)
+
+
+def _checked_output(path: str | Path, formats: tuple[str, ...]) -> Path:
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise ArgumentError(f"{path!r} is no path to write to; pass a str or a Path") from error
+    if path.suffix.lower() not in formats:
+        raise ArgumentError(f"{path} has no known ending; write to {', '.join(formats)}")
+    try:
+        has_folder = path.absolute().parent.is_dir()
+    except OSError as error:  # a name that is too long
+        raise ArgumentError(f"{path} is no path to write to ({error}); choose another") from error
+    if not has_folder:
         raise ArgumentError(f"the folder of {path} does not exist; make it first")
+    return path
 
 
-def _write_obj(path: Path, curve: SurfaceCurve) -> None:
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        raise ArgumentError(
+            f"{path} cannot be written ({error}); choose another file or folder"
+        ) from error
+
+
+def _obj_text(curve: SurfaceCurve) -> str:
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in curve.points.tolist()]
     order = [*range(1, len(curve.points) + 1), *([1] if curve.closed else [])]
     lines.append("l " + " ".join(map(str, order)))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
-def _write_json(path: Path, curve: SurfaceCurve) -> None:
+def _json_text(curve: SurfaceCurve) -> str:
     data = {
         "closed": curve.closed,
         "faces": curve.faces.tolist(),
@@ -108,22 +135,15 @@ def _write_json(path: Path, curve: SurfaceCurve) -> None:
         "points": curve.points.tolist(),
         "control_index": curve.control_index.tolist(),
     }
-    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    return json.dumps(data, indent=1) + "\n"
 
 
-def _write_csv(path: Path, curve: SurfaceCurve) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["face", "b0", "b1", "b2", "x", "y", "z"])
-        for face, barycentric, point in zip(
-            curve.faces.tolist(), curve.barycentric.tolist(), curve.points.tolist(), strict=True
-        ):
-            writer.writerow([face, *barycentric, *point])
-
-
-def _joined(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Merge vertices of equal position and drop the faces that this collapses."""
-    unique, index = np.unique(vertices, axis=0, return_inverse=True)
-    faces = index.reshape(-1)[faces]
-    collapsed = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    return unique, faces[~collapsed]
+def _csv_text(curve: SurfaceCurve) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["face", "b0", "b1", "b2", "x", "y", "z"])
+    for face, barycentric, point in zip(
+        curve.faces.tolist(), curve.barycentric.tolist(), curve.points.tolist(), strict=True
+    ):
+        writer.writerow([face, *barycentric, *point])
+    return text.getvalue()

@@ -13,6 +13,9 @@ from scipy.sparse import csgraph
 from .array_types import BoolArray, FloatArray, IntArray
 from .errors import MeshError
 
+LARGEST, SMALLEST = 1e50, 1e-50
+"""Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
+
 
 class Mesh:
     """A triangle mesh with checked arrays and the adjacency that the pipeline asks for.
@@ -35,12 +38,17 @@ class Mesh:
     ------
     MeshError
         If an array has the wrong shape or type, a position is not finite, an index is out of
-        range, a face names one vertex twice, or there are no faces.
+        range, a face names one vertex twice, there are no faces, or they are all at one place.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         self.vertices = _checked_vertices(vertices)
         self.faces = _checked_faces(faces, len(self.vertices))
+        if self.diagonal < SMALLEST:
+            raise MeshError(
+                f"vertices of all faces lie within {self.diagonal:g}, as good as at one place; "
+                "scale the mesh"
+            )
         self.vertices.setflags(write=False)
         self.faces.setflags(write=False)
 
@@ -87,6 +95,12 @@ class Mesh:
         of_two = sides[across > np.arange(len(self.faces))[:, None]]
         others = np.unique(np.sort(sides[across < 0], axis=1), axis=0)
         return np.concatenate([of_two, others])
+
+    @cached_property
+    def branches(self) -> bool:
+        """Whether more than two faces share some edge."""
+        sides = np.sort(self.faces[:, [[1, 2], [2, 0], [0, 1]]][self.face_neighbours < 0], axis=1)
+        return len(np.unique(sides, axis=0)) < len(sides)
 
     @cached_property
     def face_tree(self) -> igl.AABB:
@@ -149,7 +163,10 @@ def real_array(values: ArrayLike) -> FloatArray:
     given = np.array(values)
     if np.iscomplexobj(given):
         raise TypeError("they are complex")
-    return given.astype(np.float64)
+    try:
+        return given.astype(np.float64)
+    except OverflowError as error:  # whole numbers of hundreds of digits
+        raise ValueError(str(error)) from error
 
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -199,6 +216,11 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
         raise MeshError(
             f"vertices has {bad.sum()} positions that are NaN or infinite, the first at index "
             f"{bad.argmax()}; remove or repair them"
+        )
+    if checked.size and np.abs(checked).max() > LARGEST:
+        raise MeshError(
+            f"vertices has coordinates up to {np.abs(checked).max():g}, with which nothing can be "
+            f"computed; remove them, or scale the mesh to less than {LARGEST:g}"
         )
     return checked
 

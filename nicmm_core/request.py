@@ -28,6 +28,8 @@ class Request:
     via_points : dict
         From the index of a control point to points on the way to the next one.
     obstacles, alignment : (V,) float array or None
+    clearance : float
+        Distance from obstacles of weight 1.
     smoothness : float
     """
 
@@ -37,6 +39,7 @@ class Request:
     via_points: LocatedViaPoints
     obstacles: FloatArray | None
     alignment: FloatArray | None
+    clearance: float
     smoothness: float
 
     @property
@@ -56,6 +59,7 @@ def same_course(one: Request, other: Request) -> bool:
         # The path goes round obstacles from the start.
         and _same_map(one.obstacles, other.obstacles)
         and _same_map(one.alignment, other.alignment)
+        and one.clearance == other.clearance
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
@@ -180,13 +181,25 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
             f"{name}[{first}] is off the surface by {distance[first]:.3g}, more than "
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
         )
-    degenerate = ~np.isfinite(points.barycentric).all(axis=1)
-    if degenerate.any():
-        raise ControlPointError(
-            f"{name}[{int(degenerate.argmax())}] lies in a face without area "
-            f"({int(points.faces[degenerate][0])}); remove such faces or choose another point"
-        )
+    flat = ~np.isfinite(points.barycentric).all(axis=1)
+    for place in np.flatnonzero(flat):
+        corners = mesh.vertices[mesh.faces[points.faces[place]]]
+        points.barycentric[place] = _on_longest_edge(corners, positions[place])
     return points
+
+
+def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
+    """Barycentrics of the nearest point of a triangle without area, which is its longest edge."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    start = int(lengths.argmax())
+    end = (start + 1) % 3
+    along = 0.0
+    if lengths[start] > 0.0:
+        side = (corners[end] - corners[start]) / lengths[start]
+        along = float(np.clip((position - corners[start]) @ side / lengths[start], 0.0, 1.0))
+    barycentric = np.zeros(3)
+    barycentric[start], barycentric[end] = 1.0 - along, along
+    return barycentric
 
 
 def nearest_points(
@@ -248,11 +261,15 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
     """Refuse two points that are the same."""
-    positions = points.positions(mesh)
-    separation = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-    same = np.triu(separation <= tolerances.COINCIDENT * mesh.diagonal, k=1)
+    if len(points) < 2:
+        return
+    tolerance = tolerances.COINCIDENT * mesh.diagonal
+    # Against the other of the two nearest, since every point is the nearest of its own.
+    distance, nearest = cKDTree(points.positions(mesh)).query(points.positions(mesh), k=2)
+    same = distance[:, 1] <= tolerance
     if same.any():
-        first, second = (int(i[0]) for i in np.nonzero(same))
+        first = int(same.argmax())
+        second = int(nearest[first][nearest[first] != first][0])
         raise ControlPointError(
             f"{names[first]} and {names[second]} are the same point; "
             "remove one of them (a closed curve returns to its first point by itself)"

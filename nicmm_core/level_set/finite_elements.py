@@ -9,8 +9,10 @@ import numpy as np
 from scipy import sparse
 
 from ..array_types import BoolArray, FloatArray, IntArray
+from ..errors import MeshError
 from ..mesh import triangle_areas
 from .sign_bundle import SignBundle, corner_matrix
+from .sparse_solver import DEGENERATE
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ def build_finite_elements(
         at_corners = vertices[faces].reshape(-1, 3)
         stiffness = sparse.csr_array(reading.T @ (-igl.cotmatrix(at_corners, apart)) @ reading)
         gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
+    if not (vertex_areas > 0.0).all():
+        raise MeshError(DEGENERATE)
     inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)
     return FiniteElements(
         face_areas=face_areas,

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import lzma
+import struct
+import tokenize
+import warnings
 import zipfile
 import zlib
 from dataclasses import asdict
@@ -11,12 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ..array_types import Array
 from ..errors import ArgumentError
 from ..level_set.features import BASE_CHANNELS
 from .forward_pass import NetworkConfig, NetworkWeights, parameter_shapes
 
 SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
 """Weights that come with the package; `docs/pretraining.md` names the command that made them."""
+
+LARGEST = 2**28
+"""Bytes of all arrays of a file; a small archive may hold any amount of zeros."""
 
 
 def save_weights(path: str | Path, weights: NetworkWeights) -> None:
@@ -39,9 +47,7 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
         If the file is missing or is no weights file.
     """
     try:
-        # Without pickles nothing in a file is executed.
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays = _read_arrays(path)
         config = NetworkConfig(**json.loads(str(arrays.pop("config"))))
         extra = channels - arrays["stem.weight"].shape[1]
         arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
@@ -50,6 +56,8 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
             parameters[name] = arrays.pop(name).astype(np.float32, casting="same_kind")
             if parameters[name].shape != shape:
                 raise ValueError(f"{name} has shape {parameters[name].shape}, not {shape}")
+            if not np.isfinite(parameters[name]).all():
+                raise ValueError(f"{name} has values that are NaN or infinite")
         if arrays:
             raise ValueError(f"{', '.join(arrays)} belongs to another network")
     except _UNREADABLE as error:
@@ -58,6 +66,21 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
             "'python -m nicmm_core pretrain'"
         ) from error
     return NetworkWeights(config, parameters)
+
+
+def _read_arrays(path: str | Path) -> dict[str, Array]:
+    """The arrays of an archive by name. Without pickles nothing in a file is executed."""
+    with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
+        warnings.simplefilter("error")  # NumPy warns of headers that it can only guess at
+        size = sum(member.file_size for member in archive.infolist())
+        if size > LARGEST:
+            raise ValueError(f"it would unpack to {size} bytes, more than {LARGEST}")
+        arrays = {}
+        for member in archive.infolist():
+            with archive.open(member) as file:
+                name = member.filename.removesuffix(".npy")
+                arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
+        return arrays
 
 
 @cache
@@ -77,6 +100,12 @@ _UNREADABLE = (
     AttributeError,
     RuntimeError,
     MemoryError,
+    OverflowError,
+    SyntaxError,
+    UserWarning,
+    tokenize.TokenError,
+    struct.error,
+    lzma.LZMAError,
     zipfile.BadZipFile,
     zlib.error,
 )

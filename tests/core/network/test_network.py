@@ -11,6 +11,7 @@ import torch
 
 import nicmm_core as nicmm
 from nicmm_core.level_set.problem import build_problem
+from nicmm_core.network import weights_file
 from nicmm_core.network.forward_pass import (
     NetworkConfig,
     NetworkInput,
@@ -354,6 +355,13 @@ def bad_files(folder):
         description = {"descr": "<f4", "fortran_order": False, "shape": (10**15,)}
         np.lib.format.write_array_header_1_0(header, description)
         archive.writestr("config.npy", header.getvalue())
+    altered(paths["not a number"], **{"head.bias": np.array([np.nan], dtype=np.float32)})
+    for name, method in (("lzma garbage", zipfile.ZIP_LZMA), ("old header", zipfile.ZIP_STORED)):
+        with zipfile.ZipFile(paths[name], "w", method) as archive:
+            archive.writestr("config.npy", b"\x93NUMPY\x01\x00\x10\x00{'shape': (3L,,}" * 9)
+    content = bytearray(paths["lzma garbage"].read_bytes())
+    content[60:90] = bytes(30)
+    paths["lzma garbage"].write_bytes(content)
     return paths
 
 
@@ -378,6 +386,9 @@ BAD_FILES = (
     "another layer",
     "layer in words",
     "layer without axes",
+    "not a number",
+    "lzma garbage",
+    "old header",
 )
 
 
@@ -386,3 +397,12 @@ def test_bad_weights_are_refused_by_name(tmp_path, name):
     path = bad_files(tmp_path)[name]
     with pytest.raises(nicmm.ArgumentError, match=path.name):
         load_weights(path)
+
+
+def test_archives_that_unpack_to_too_much_are_refused_before(tmp_path, monkeypatch):
+    monkeypatch.setattr(weights_file, "LARGEST", 1_000_000)
+    with zipfile.ZipFile(tmp_path / "zeros.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for index in range(3):
+            archive.writestr(f"{index}.npy", bytes(500_000))
+    with pytest.raises(nicmm.ArgumentError, match=r"zeros\.npz .* unpack to 1500000 bytes"):
+        load_weights(tmp_path / "zeros.npz")

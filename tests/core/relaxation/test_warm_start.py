@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import design as design_module
+from nicmm_core import surface_designer
 from tests.core.checks import apart, assert_valid_design, circle, nearest_vertices
 
 CHOSEN = [12, 80, 41, 150]
@@ -24,7 +24,9 @@ def problems(monkeypatch):
     """How often a design has started anew."""
     built = []
     for name in ("predicted", "requested_problem"):
-        monkeypatch.setattr(design_module, name, _counted(getattr(design_module, name), built))
+        monkeypatch.setattr(
+            surface_designer, name, _counted(getattr(surface_designer, name), built)
+        )
     return built
 
 

@@ -1,0 +1,72 @@
+"""Hostile input for the public interface and the readers; whatever is not typed is a finding.
+
+A case is a number: `hostile_input.answer` draws it and says what was wrong. It runs in a process
+of its own, so that crashes, hangs and what is printed below Python are found too.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from . import report
+from .hostile_input import SEED, Answer, answer
+from .isolation import Isolated, isolated
+from .scale import Scale
+
+SLOW = 10.0
+"""Seconds of CPU time that no case may take."""
+
+PATIENCE = 60.0
+"""Seconds by the wall clock after which a case has hung."""
+
+MEMORY = 8 * 2**30
+"""Bytes of address space; a case that asks for more follows some count that it was told."""
+
+LISTED = 40
+
+TOLD = 500
+"""Cases after which a run says how far it is."""
+
+
+def run(scale: Scale) -> None:
+    """Ask, and list what is wrong."""
+    cases = scale.choose(10_500, 1_050, 42)
+    kinds: Counter[str] = Counter()
+    outcomes: Counter[tuple[str, str]] = Counter()
+    findings: list[str] = []
+    slowest = 0.0
+    for done in isolated(answer, range(cases), PATIENCE, MEMORY):
+        kind = done.result.kind if done.result else "?"
+        kinds[kind] += 1
+        outcomes[kind, done.result.outcome if done.result else "lost"] += 1
+        slowest = max(slowest, done.seconds)
+        if done.item and done.item % TOLD == 0:
+            print(f"  {done.item} cases, {len(findings)} findings", flush=True)
+        for fault in _faults(done):
+            findings.append(f"{done.item} ({kind}): {fault}")
+            print(f"  {findings[-1]}", flush=True)
+    rows = []
+    for kind, count in sorted(kinds.items()):
+        of_kind = [f"{o} {n}" for (k, o), n in sorted(outcomes.items()) if k == kind]
+        rows.append((kind, count, report.listed(of_kind)))
+    body = (
+        f"Seed {SEED}, {cases} cases of hostile input, see `hostile_input.py`. A finding is an "
+        "error not the package's own, anything printed, a curve that `checker.py` faults, a "
+        f"changed mesh, a crash, or more than {SLOW:g} s of CPU time; the slowest took "
+        f"{slowest:.1f} s.\n\n**{len(findings)} findings.**\n\n"
+        + "".join(f"- {finding}\n" for finding in findings[:LISTED])
+        + "\n"
+        + report.table(("input", "cases", "outcomes"), rows)
+    )
+    report.write_section("fuzz", "Hostile input", body, scale)
+
+
+def _faults(done: Isolated[int, Answer]) -> list[str]:
+    if done.result is None:
+        return [done.failure]
+    faults = list(done.result.faults)
+    if done.output.strip():
+        faults.append(f"printed {done.output.strip()[-300:]!r}")
+    if done.seconds > SLOW:
+        faults.append(f"took {done.seconds:.0f} s")
+    return faults

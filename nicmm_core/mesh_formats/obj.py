@@ -1,0 +1,55 @@
+"""Wavefront OBJ: positions and faces; all else is passed over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .numbers import floats, shown, whole
+from .polygons import FormatError, Polygons
+
+
+def read_obj(data: bytes) -> Polygons:
+    """Read the ``v`` and ``f`` lines.
+
+    Raises
+    ------
+    FormatError
+        If one of them cannot be understood.
+    """
+    positions: list[bytes] = []
+    corners: list[int] = []
+    sizes: list[int] = []
+    count = 0
+    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    for number, line in enumerate(data.splitlines(), start=1):
+        if line[:1] not in b"vf \t":
+            continue
+        words = line.partition(b"#")[0].split()
+        if not words:
+            continue
+        if words[0] == b"v":
+            if len(words) < 4:
+                raise FormatError(f"line {number} has a vertex of {len(words) - 1} coordinates")
+            positions += words[1:4]
+            count += 1
+        elif words[0] == b"f":
+            for word in words[1:]:
+                index = whole(word.partition(b"/")[0])
+                if index == 0:
+                    raise FormatError(
+                        f"line {number} refers to vertex {shown(word)}; they count from 1"
+                    )
+                # Negative indices count back from the last vertex so far.
+                corners.append(index - 1 if index > 0 else _counted_back(count, index, number))
+            sizes.append(len(words) - 1)
+    return Polygons(
+        floats(positions).reshape(-1, 3),
+        np.array(corners, dtype=np.int64),
+        np.array(sizes, dtype=np.int64),
+    )
+
+
+def _counted_back(count: int, index: int, number: int) -> int:
+    if count + index < 0:
+        raise FormatError(f"line {number} counts back {-index} vertices, of {count} so far")
+    return count + index

@@ -1,0 +1,53 @@
+"""Object File Format, as text; colours, normals and texture coordinates are passed over."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from .numbers import floats, shown, whole, wholes
+from .polygons import FormatError, Polygons
+
+_HEADER = re.compile(rb"(ST)?C?N?OFF")
+
+
+def read_off(data: bytes) -> Polygons:
+    """Read one vertex or face a line.
+
+    Raises
+    ------
+    FormatError
+        If the header is another one, or lines are missing or cannot be understood.
+    """
+    rows = (line.partition(b"#")[0].split() for line in data.splitlines())
+    lines = [words for words in rows if words]
+    if not lines or not _HEADER.fullmatch(lines[0][0]):
+        raise FormatError("it does not begin with OFF (binary and 4D OFF are not read)")
+    head, rest = lines[0][1:], lines[1:]
+    if not head:
+        head, rest = (rest[0], rest[1:]) if rest else ([], [])
+    if len(head) < 2:
+        raise FormatError("it does not say how many vertices and faces it has")
+    n_vertices, n_faces = whole(head[0]), whole(head[1])
+    if not 0 <= n_vertices + n_faces <= len(rest) or min(n_vertices, n_faces) < 0:
+        raise FormatError(
+            f"it announces {n_vertices} vertices and {n_faces} faces and has {len(rest)} lines "
+            "for them; it may be cut off"
+        )
+    positions: list[bytes] = []
+    for place, words in enumerate(rest[:n_vertices]):
+        if len(words) < 3:
+            raise FormatError(f"vertex {place} has {len(words)} coordinates")
+        positions += words[:3]
+    corners: list[bytes] = []
+    sizes = np.zeros(n_faces, dtype=np.int64)
+    for place, words in enumerate(rest[n_vertices : n_vertices + n_faces]):
+        size = whole(words[0])
+        if not 0 <= size < len(words):
+            raise FormatError(
+                f"face {place} announces {shown(words[0])} corners and has {len(words) - 1}"
+            )
+        corners += words[1 : size + 1]
+        sizes[place] = size
+    return Polygons(floats(positions).reshape(-1, 3), wholes(corners), sizes)

@@ -1,0 +1,65 @@
+"""STL, binary and text. Every triangle has three corners of its own; equal ones are joined."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from .numbers import floats
+from .polygons import FormatError, Polygons
+
+HEADER_BYTES = 84
+"""80 of any content, then the number of triangles."""
+
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+
+
+def read_stl(data: bytes) -> Polygons:
+    """Read either form, whichever the file is: binary ones, too, may begin with "solid".
+
+    Raises
+    ------
+    FormatError
+        If it is neither.
+    """
+    count = int.from_bytes(data[HEADER_BYTES - 4 : HEADER_BYTES], "little")
+    room = max(len(data) - HEADER_BYTES, 0) // TRIANGLE.itemsize
+    whole_file = HEADER_BYTES + TRIANGLE.itemsize * count == len(data)
+    if not whole_file and data.lstrip()[:5].lower() == b"solid":
+        vertices = _text_corners(data)
+    elif len(data) < HEADER_BYTES or count > room:
+        raise FormatError(
+            f"it announces {count} triangles and has room for {room}; it may be cut off"
+        )
+    else:
+        triangles = np.frombuffer(data, TRIANGLE, count=count, offset=HEADER_BYTES)
+        vertices = triangles["corners"].astype(np.float64).reshape(-1, 3)
+    joined, corners = joined_positions(vertices)
+    return Polygons(joined, corners, np.full(len(vertices) // 3, 3))
+
+
+def joined_positions(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Different positions, sorted, and which of them each vertex has."""
+    vertices = vertices + 0.0  # -0.0 and 0.0 are one position
+    order = np.lexsort(vertices.T[::-1])
+    new = np.ones(len(vertices), dtype=bool)
+    new[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
+    index = np.empty(len(vertices), dtype=np.int64)
+    index[order] = np.cumsum(new) - 1
+    return vertices[order[new]], index
+
+
+def _text_corners(data: bytes) -> FloatArray:
+    tokens = [token for corner in _VERTEX.findall(data) for token in corner]
+    facets = len(_FACET.findall(data))
+    if len(tokens) != 9 * facets:
+        raise FormatError(
+            f"it has {facets} whole facets and {len(tokens) // 3} corners, which are not three "
+            "each; it may be cut off"
+        )
+    return floats(tokens).reshape(-1, 3)

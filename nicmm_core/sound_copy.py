@@ -1,0 +1,401 @@
+"""The copy that curves are computed on where a mesh has defects; the mesh itself stays as it is.
+
+A sound copy has the faces of the mesh, with their corners in the same order. So a face with
+barycentrics is the same point of both, and a curve on the copy is one on the mesh, as simple as it
+is there. Three things may differ:
+
+- Of faces with the same three corners only the first is there.
+- Where more than two faces share an edge they are joined two by two, and what is left over is cut
+  off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
+  there are doubled.
+- Vertices of faces without area are moved by a thousandth of their shortest edge that has a length,
+  each its own way, so that every face has an area.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .array_types import BoolArray, FloatArray, IntArray
+from .crossings import crossing_segments
+from .curve import SurfaceCurve, curve_on_mesh
+from .design_result import Design, Status
+from .mesh import Mesh, unique_edges
+from .request import Request
+from .surface_points import SurfacePoints
+
+FLAT = 1e-10
+"""Sine between the longest and the shortest edge of a face below which it has no area."""
+
+SHORT = 1e-12
+"""Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
+
+MOVED = 1e-3
+"""How far vertices of faces without area are moved, in lengths of their shortest edge."""
+
+ATTEMPTS = 4
+"""Of moving vertices, until every face has an area."""
+
+ROUNDS = 8
+"""Of cutting one edge further where a cut does not come apart."""
+
+SEED = 0
+"""Of the ways in which vertices are moved; the same mesh has the same copy."""
+
+
+@dataclass(frozen=True)
+class SoundCopy:
+    """A mesh, its copy, and what in it belongs to what.
+
+    Attributes
+    ----------
+    original : Mesh
+    mesh : Mesh
+        The copy; the same object where nothing differs.
+    vertex : (v,) int array
+        The original of each of its vertices. The first ones are the mesh's own, in their order.
+    face : (f,) int array
+        The original of each of its faces.
+    """
+
+    original: Mesh
+    mesh: Mesh
+    vertex: IntArray
+    face: IntArray
+
+    @property
+    def differs(self) -> bool:
+        """Whether the mesh has defects."""
+        return self.mesh is not self.original
+
+    def request(self, request: Request) -> Request | None:
+        """The same request on the copy; None where cuts separate its points."""
+        if not self.differs:
+            return request
+        sets = [request.points, *request.via_points.values()]
+        candidates = [self.candidates(points) for points in sets]
+        common = self._common_component([each for of_set in candidates for each in of_set])
+        if common is None:
+            return None
+        points, *via_points = (
+            self._points(points, of_set, common)
+            for points, of_set in zip(sets, candidates, strict=True)
+        )
+        return replace(
+            request,
+            points=points,
+            via_points=dict(zip(request.via_points, via_points, strict=True)),
+            obstacles=None if request.obstacles is None else request.obstacles[self.vertex],
+            alignment=None if request.alignment is None else request.alignment[self.vertex],
+        )
+
+    def design(self, design: Design) -> Design:
+        """A design on the copy as one on the mesh."""
+        if not self.differs:
+            return design
+        curves = [self._curve(curve) for curve in design.curves]
+        status = design.status
+        # Strands that pass different copies of one vertex touch there.
+        if len(self.vertex) > len(self.original.vertices) and not all(map(self._is_simple, curves)):
+            status = Status.NOT_ONE_CURVE
+        return replace(
+            design, status=status, curves=curves, find_field=partial(self._field, design)
+        )
+
+    def _is_simple(self, curve: SurfaceCurve) -> bool:
+        polyline = SurfacePoints(curve.faces, curve.barycentric)
+        return not len(crossing_segments(self.original, polyline, curve.closed))
+
+    def _curve(self, curve: SurfaceCurve) -> SurfaceCurve:
+        faces = self.face[curve.faces]
+        index = curve.control_index
+        return curve_on_mesh(self.original, curve.closed, faces, curve.barycentric, index)
+
+    def _field(self, design: Design) -> FloatArray:
+        """φ at the vertices of the mesh; the copy of a vertex nearest to the curve counts."""
+        field = np.full(len(self.original.vertices), np.inf)
+        order = np.argsort(-np.abs(design.field), kind="stable")
+        field[self.vertex[order]] = design.field[order]
+        # What the copy does not have is outside.
+        field[np.isinf(field)] = design.field.max()
+        return field
+
+    @cached_property
+    def _copies(self) -> IntArray:
+        """The face of the copy that each face is, (F,), or -1."""
+        copies = np.full(len(self.original.faces), -1)
+        copies[self.face] = np.arange(len(self.face))
+        return copies
+
+    def candidates(self, points: SurfacePoints) -> list[IntArray]:
+        """Faces of the copy that each point lies in, its own first."""
+        around = self.original.vertex_faces
+        found = []
+        for face, barycentric in zip(points.faces, points.barycentric, strict=True):
+            corners = self.original.faces[face][barycentric > 0.0]
+            shared = None
+            for corner in corners:
+                here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
+                shared = here if shared is None else np.intersect1d(shared, here)
+            copies = self._copies[np.concatenate([[face], shared])]
+            found.append(copies[copies >= 0])
+        return found
+
+    def _common_component(self, candidates: list[IntArray]) -> int | None:
+        """The largest component of the copy that has all points; None where there is none."""
+        component = self.mesh.face_component
+        common = set(component[candidates[0]].tolist())
+        for faces in candidates:
+            common &= set(component[faces].tolist())
+        areas = np.bincount(component, weights=self.mesh.face_areas)
+        return max(common, key=lambda label: float(areas[label]), default=None)
+
+    def _points(
+        self, points: SurfacePoints, candidates: list[IntArray], component: int
+    ) -> SurfacePoints:
+        """Points in faces of one component of the copy."""
+        faces, barycentric = [], []
+        for place, of_point in enumerate(candidates):
+            chosen = of_point[self.mesh.face_component[of_point] == component][0]
+            corners = self.original.faces[points.faces[place]].tolist()
+            weights = dict(zip(corners, points.barycentric[place], strict=True))
+            own = self.original.faces[self.face[chosen]].tolist()
+            faces.append(chosen)
+            barycentric.append([weights.get(corner, 0.0) for corner in own])
+        shape = (len(faces), 3)
+        return SurfacePoints(
+            np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
+        )
+
+
+def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
+    """The copy of a mesh, and another where that separates points that are connected.
+
+    The first goes straight on where more than two faces share an edge. The second joins as many
+    parts of the surface as it can.
+    """
+    sides = _Sides(mesh.faces)
+    if mesh.branches:
+        kept = _without_twins(mesh.faces)
+        sides = _Sides(mesh.faces[kept])
+        for joined in (sides.straight_on, sides.linked):
+            yield _with_areas(mesh, *sides.cut(joined(mesh.vertices), len(mesh.vertices)), kept)
+    else:
+        every = np.arange(len(mesh.faces))
+        yield _with_areas(mesh, *sides.cut(sides.plain_pairs, len(mesh.vertices)), every)
+
+
+def _without_twins(faces: IntArray) -> IntArray:
+    """Indices of the faces without those whose corners an earlier one has, ascending."""
+    return np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
+
+
+class _Sides:
+    """The sides of faces, three each, and which of them are one edge.
+
+    Side 3 f + j lies opposite corner j of face f.
+    """
+
+    def __init__(self, faces: IntArray) -> None:
+        self._faces = faces
+        # Corners at the ends of each side, that with the smaller vertex first.
+        first, second = self._corners(1), self._corners(2)
+        swapped = faces.ravel()[first] > faces.ravel()[second]
+        self._low, self._high = np.where(swapped, [second, first], [first, second])
+        vertices = faces.ravel()
+        keys = vertices[self._low] * (int(vertices.max()) + 1) + vertices[self._high]
+        self._order = np.argsort(keys, kind="stable")
+        _, self._first, self._count = np.unique(
+            keys[self._order], return_index=True, return_counts=True
+        )
+
+    def _corners(self, step: int) -> IntArray:
+        corner = np.arange(self._faces.size)
+        return corner - corner % 3 + (corner + step) % 3
+
+    @cached_property
+    def plain_pairs(self) -> IntArray:
+        """Sides of edges that two faces have, shape (p, 2)."""
+        first = self._first[self._count == 2]
+        return np.stack([self._order[first], self._order[first + 1]], axis=1)
+
+    @cached_property
+    def _branching(self) -> list[IntArray]:
+        """Sides of each edge that more faces have."""
+        several = self._count > 2
+        return [
+            self._order[first : first + count]
+            for first, count in zip(self._first[several], self._count[several], strict=True)
+        ]
+
+    def straight_on(self, vertices: FloatArray) -> IntArray:
+        """Pairs of sides that are joined, shape (p, 2): those that go on most straightly."""
+        pairs = [self.plain_pairs]
+        for sides in self._branching:
+            pairs.append(self._straightest(sides, vertices))
+        return np.concatenate(pairs)
+
+    def linked(self, vertices: FloatArray) -> IntArray:
+        """Pairs of sides that join all parts of the surface that meet at an edge.
+
+        Edges where the same parts meet share the work: on each run of them two parts are joined.
+        """
+        n_faces = len(self._faces)
+        faces = self.plain_pairs // 3
+        graph = sparse.coo_array((np.ones(len(faces)), faces.T), shape=(n_faces, n_faces))
+        part = csgraph.connected_components(graph, directed=False)[1]
+        groups: dict[tuple[int, ...], list[IntArray]] = {}
+        for sides in self._branching:
+            parts = tuple(np.unique(part[sides // 3]).tolist())
+            groups.setdefault(parts, []).append(sides)
+        pairs = [self.plain_pairs]
+        for parts, edges in groups.items():
+            if len(parts) == 1:
+                pairs += [self._straightest(sides, vertices) for sides in edges]
+                continue
+            ends = vertices[self._faces.ravel()[[self._low[s[0]] for s in edges]]]
+            along = np.linalg.svd(ends - ends.mean(axis=0), full_matrices=False)[2][0]
+            in_order = np.argsort(ends @ along, kind="stable")
+            for run, some in enumerate(np.array_split(in_order, len(parts) - 1)):
+                for place in some.tolist():
+                    sides = edges[place]
+                    here = [sides[part[sides // 3] == parts[run + step]][0] for step in (0, 1)]
+                    pairs.append(np.array([here]))
+        return np.concatenate(pairs)
+
+    def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
+        """Pairs of the sides of one edge, the straightest first, until fewer than two are left."""
+        corner = self._faces.ravel()
+        start, end = vertices[corner[self._low[sides]]], vertices[corner[self._high[sides]]]
+        edge = end - start
+        outward = vertices[corner[sides]] - start
+        squared = np.maximum((edge * edge).sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        outward -= (outward * edge).sum(axis=1, keepdims=True) / squared * edge
+        length = np.linalg.norm(outward, axis=1, keepdims=True)
+        outward /= np.maximum(length, np.finfo(float).tiny)
+        straight = outward @ outward.T
+        np.fill_diagonal(straight, np.inf)
+        pairs = []
+        for _ in range(len(sides) // 2):
+            one, other = np.unravel_index(straight.argmin(), straight.shape)
+            pairs.append([sides[one], sides[other]])
+            straight[[one, other]] = straight[:, [one, other]] = np.inf
+        return np.array(pairs)
+
+    def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
+        """Faces whose corners are one vertex only where pairs of sides join them.
+
+        Returns
+        -------
+        (f, 3) int array
+            Corners.
+        (v,) int array
+            The vertex that each vertex was.
+        """
+        corner = self._faces.ravel()
+        one, other = pairs.T
+        rows = np.concatenate([self._low[one], self._high[one]])
+        columns = np.concatenate([self._low[other], self._high[other]])
+        graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
+        n_labels, label = csgraph.connected_components(graph, directed=False)
+        source = np.zeros(n_labels, dtype=np.int64)
+        source[label] = corner
+        # One of the copies keeps the number of the vertex.
+        first = np.unique(source, return_index=True)[1]
+        number = np.full(n_labels, -1)
+        number[first] = source[first]
+        new = np.flatnonzero(number < 0)
+        number[new] = n_vertices + np.arange(len(new))
+        corners = number[label]
+        vertex = np.concatenate([np.arange(n_vertices), source[new]])
+        for _ in range(ROUNDS):
+            corners, vertex, changed = self._slit(pairs, corners, vertex)
+            if not changed:
+                break
+        return corners.reshape(-1, 3), vertex
+
+    def _slit(
+        self, pairs: IntArray, corners: IntArray, vertex: IntArray
+    ) -> tuple[IntArray, IntArray, bool]:
+        """Give corners a vertex of their own where a cut ends at both ends of an edge.
+
+        Then the faces on both sides of the cut still have both vertices in common. A further edge
+        is cut for it. Gives the corners, the vertices, and whether anything had to be done.
+        """
+        partner = np.arange(len(corners))
+        partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+        own = []
+        for sides in self._branching:
+            ends = np.sort(corners[np.stack([self._low[sides], self._high[sides]])], axis=0)
+            for edge in np.unique(ends, axis=1).T:
+                here = sides[(ends == edge[:, None]).all(axis=0)]
+                groups = {tuple(sorted({int(side), int(partner[side])})) for side in here}
+                # What is joined stays where it is before what is cut off.
+                own += sorted(groups, key=lambda group: (-len(group), group))[1:]
+        corners = corners.copy()
+        added = []
+        for group in own:
+            added.append(vertex[corners[self._low[group[0]]]])
+            corners[self._low[list(group)]] = len(vertex) + len(added) - 1
+        if not added:
+            return corners, vertex, False
+        return corners, np.concatenate([vertex, added]), True
+
+
+def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> SoundCopy:
+    """A copy with these faces, in which every face has an area where that is possible."""
+    vertices = mesh.vertices[vertex]
+    short = SHORT * mesh.diagonal
+    flat = _flat(vertices, faces, short)
+    if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
+        return SoundCopy(mesh, mesh, vertex, face)
+    if flat.any():
+        # Far from the origin a small move would be lost to rounding.
+        vertices = vertices - vertices[faces[0, 0]]
+        start, still = vertices, flat
+        reach = MOVED * _shortest_edges(vertices, faces, short)
+        generator = np.random.default_rng(SEED)
+        for _ in range(ATTEMPTS):
+            moving = np.zeros(len(vertices), dtype=bool)
+            moving[faces[still]] = True
+            moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
+            vertices = np.where(moving[:, None], start + moves, vertices)
+            still = _flat(vertices, faces, short)
+            if not still.any():
+                break
+    return SoundCopy(mesh, Mesh(vertices, faces), vertex, face)
+
+
+def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
+    """Which faces have no area, shape (f,): a corner on another, or on the opposite edge.
+
+    Needles have an area, however thin: their shortest edge stands across the longest.
+    """
+    corner = vertices[faces]
+    sides = np.roll(corner, -1, axis=1) - corner
+    lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return (lengths[:, 0] <= short) | (twice_area <= FLAT * lengths[:, 0] * lengths[:, 2])
+
+
+def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
+    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
+
+    Shorter ones join vertices to one place. Zero where no edge is longer.
+    """
+    edges, _ = unique_edges(faces)
+    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    at_one_place = edges[lengths <= short].T
+    shape = (len(vertices), len(vertices))
+    graph = sparse.coo_array((np.ones(at_one_place.shape[1]), at_one_place), shape=shape)
+    n_places, place = csgraph.connected_components(graph, directed=False)
+    shortest = np.full(n_places, np.inf)
+    for end in edges[lengths > short].T:
+        np.minimum.at(shortest, place[end], lengths[lengths > short])
+    return np.where(np.isfinite(shortest), shortest, 0.0)[place]

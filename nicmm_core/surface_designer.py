@@ -1,0 +1,299 @@
+"""Curves on a sound mesh: from the last curve, a coarse mesh or the network, then relaxed.
+
+The main path for one checked request; `design` is the front of it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TypeVar
+
+import numpy as np
+
+from .array_types import FloatArray, IntArray
+from .coarsening.coarse_start import CoarseStarts
+from .curve import SurfaceCurve
+from .design_result import STATUS, Design, Status
+from .free_surface import check_reachable, free_surface
+from .level_set import variational
+from .level_set.features import feature_map
+from .level_set.losses import LossWeights, balanced
+from .level_set.problem import Problem, requested_problem
+from .level_set.solution import Solution
+from .level_set.zero_set import ZeroSet, zero_set
+from .mesh import Mesh
+from .network.single_pass import predicted
+from .network.weights_file import shipped_weights
+from .relaxation.curve_field import curve_field
+from .relaxation.curve_nodes import CurveSurface, unsigned_normals
+from .relaxation.elastic_energy import FEATURE_TENSION
+from .relaxation.relaxing import RelaxationConfig, relax
+from .relaxation.warm_start import WARM, moved_along
+from .request import Progress, Request, same_course, same_request
+from .sound_copy import SoundCopy
+
+PROGRESS_INTERVAL = 0.25
+"""Least seconds between two calls of a caller's progress function."""
+
+State = TypeVar("State")
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A simple curve on the mesh from which relaxation begins."""
+
+    curve: SurfaceCurve
+    visited: IntArray  # (k,) which control points it passes, in order
+    surface: CurveSurface
+    unit: float  # square root of the surface's area
+    breaking: int = 0
+
+
+@dataclass(frozen=True)
+class _Free:
+    """What obstacles leave of the surface, and who designs there; no copy if it is all of it."""
+
+    obstacles: FloatArray
+    clearance: float
+    copy: SoundCopy | None
+    designer: SurfaceDesigner
+
+
+@dataclass(frozen=True)
+class _Remembered:
+    """The last relaxed curve."""
+
+    request: Request
+    start: _Start
+    design: Design
+
+
+class SurfaceDesigner:
+    """Designs on one mesh; what depends on the mesh alone is found once.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Every face has an area, and no edge has more than two.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._last: _Remembered | None = None
+        self._free: _Free | None = None
+
+    def forget(self) -> None:
+        """Start the next design anew."""
+        self._last = None
+        if self._free is not None and self._free.copy is not None:
+            self._free.designer.forget()
+
+    def design(
+        self, request: Request, method: str, progress: Progress | None, started: float
+    ) -> Design:
+        """Design a curve.
+
+        Parameters
+        ----------
+        request : Request
+        method : {"nicmm", "nicmm-paper", "variational"}
+        progress : callable or None
+        started : float
+            When the design began, by `time.perf_counter`.
+
+        Raises
+        ------
+        UnreachableError
+            If no simple curve passes the points in this order, or obstacles leave no way.
+        """
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            check_reachable(free.copy, request)
+            there = free.copy.request(replace(request, clearance=0.0))
+            assert there is not None  # as it has just been checked
+            return free.copy.design(free.designer.design(there, method, progress, started))
+        if method == "nicmm":
+            return self._designed(request, progress, started)
+        problem = requested_problem(self.mesh, request)
+        solution = self._solution(problem, request, method, progress)
+        zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
+        return self._level_set_design(problem, solution, zeros, started)
+
+    def _without_obstacles(self, request: Request) -> _Free | None:
+        """The surface that obstacles leave, the one of the last request if they are the same."""
+        if request.obstacles is None:
+            return None
+        last = self._free
+        same = last is not None and last.clearance == request.clearance
+        if last is None or not (same and np.array_equal(last.obstacles, request.obstacles)):
+            copy = free_surface(self.mesh, request.obstacles, request.clearance)
+            designer = self if copy is None else SurfaceDesigner(copy.mesh)
+            last = self._free = _Free(request.obstacles, request.clearance, copy, designer)
+        return last
+
+    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
+        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
+        last = self._last
+        if last is not None and same_request(request, last.request):
+            return replace(last.design, seconds=time.perf_counter() - started)
+        start = self._start_from_last(request)
+        if start is not None:
+            return self._relaxed(request, start, WARM, progress, started)
+        start = self._start_from_coarse(request)
+        if start is None:
+            found = predicted(self.mesh, request)
+            problem, zeros = found.problem, found.zeros
+            if not zeros.is_simple_curve(self.mesh, request.closed):
+                return self._level_set_design(problem, found.solution, zeros, started)
+            start = _Start(
+                curve=zeros.curves[0],
+                visited=problem.loop.order,
+                surface=self._curve_surface(request),
+                unit=problem.unit,
+                breaking=zeros.breaking_vertices,
+            )
+        return self._relaxed(request, start, RelaxationConfig(), progress, started)
+
+    def _start_from_last(self, request: Request) -> _Start | None:
+        """The last curve with its control points moved; None where the request is too different."""
+        last = self._last
+        if last is None or not same_course(request, last.request):
+            return None
+        points = request.points[last.start.visited]
+        curve = moved_along(last.start.surface, last.design.curves[0], points)
+        if curve is None:
+            return None
+        return replace(last.start, curve=curve, breaking=0)
+
+    def _start_from_coarse(self, request: Request) -> _Start | None:
+        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
+        found = self._coarse_starts.find(request)
+        if found is None:
+            return None
+        return _Start(
+            curve=found.curve,
+            visited=found.visited,
+            surface=self._curve_surface(request),
+            unit=float(np.sqrt(self._area(request))),
+            breaking=found.breaking_vertices,
+        )
+
+    def _relaxed(
+        self,
+        request: Request,
+        start: _Start,
+        config: RelaxationConfig,
+        progress: Progress | None,
+        started: float,
+    ) -> Design:
+        """The design that relaxation makes of a curve; it is kept for the next request."""
+        watch = None if progress is None else _seldom(progress, lambda points: points)
+        surface, unit = start.surface, start.unit
+        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
+        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
+        # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
+        energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
+        design = Design(
+            status=STATUS[relaxed.stopped],
+            curves=[relaxed.curve],
+            iterations=relaxed.iterations,
+            seconds=time.perf_counter() - started,
+            energy=energy,
+            breaking_vertices=start.breaking,
+            find_field=partial(curve_field, self.mesh, relaxed.curve),
+        )
+        if design.status is not Status.CANCELLED:
+            self._last = _Remembered(request, start, design)
+        return design
+
+    def _level_set_design(
+        self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
+    ) -> Design:
+        """The design that a level set is."""
+        one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
+        return Design(
+            status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
+            curves=zeros.curves,
+            iterations=solution.iterations,
+            seconds=time.perf_counter() - started,
+            energy=solution.terms,
+            breaking_vertices=zeros.breaking_vertices,
+            find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
+        )
+
+    def _solution(
+        self, problem: Problem, request: Request, method: str, progress: Progress | None
+    ) -> Solution:
+        """The level set that a method other than "nicmm" finds."""
+        watch = None if progress is None else self._field_watcher(problem, progress)
+        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
+        if method == "variational":
+            return variational.solve(problem, weights, variational.VariationalConfig(), watch)
+        pretrained = shipped_weights(problem.features.shape[1])
+        # These import PyTorch, which nothing else needs.
+        from .network.prediction import PredictionConfig, predict
+        from .network.trainable_network import build_network
+
+        return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
+
+    def _curve_surface(self, request: Request) -> CurveSurface:
+        """The surface that curves move on."""
+        if not request.has_maps:
+            return CurveSurface(self.mesh, self._normals)
+        maps = request.obstacles, request.alignment
+        importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
+        return CurveSurface(
+            self.mesh, self._normals, importance, FEATURE_TENSION / self._area(request)
+        )
+
+    def _area(self, request: Request) -> float:
+        """Of the component that the curve is on."""
+        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
+        return float(self.mesh.face_areas[component].sum())
+
+    @cached_property
+    def _normals(self) -> FloatArray:
+        return unsigned_normals(self.mesh)
+
+    @cached_property
+    def _coarse_starts(self) -> CoarseStarts:
+        return CoarseStarts(self.mesh, self._normals)
+
+    def _field_watcher(
+        self, problem: Problem, progress: Progress
+    ) -> Callable[[float, FloatArray], bool]:
+        def points(field: FloatArray) -> FloatArray:
+            curves = zero_set(self.mesh, problem, field).curves
+            return curves[0].points if curves else np.zeros((0, 3))
+
+        return _seldom(progress, points)
+
+
+def _seldom(
+    progress: Progress, points: Callable[[State], FloatArray]
+) -> Callable[[float, State], bool]:
+    """Call a progress function with the points of a state, but not too often."""
+    last_call = -np.inf
+
+    def watch(fraction: float, state: State) -> bool:
+        nonlocal last_call
+        if time.perf_counter() - last_call < PROGRESS_INTERVAL:
+            return True
+        last_call = time.perf_counter()
+        # A copy, with which the caller may do as it likes.
+        return progress(fraction, points(state).copy()) is not False
+
+    return watch
+
+
+def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
+    """φ in mesh units at the input vertices."""
+    if problem.bundle is not None:
+        field = np.abs(field)
+    inputs = problem.working.input_vertex
+    values = np.full(len(mesh.vertices), field.max() * problem.unit)
+    values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit
+    return values

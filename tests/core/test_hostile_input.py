@@ -1,0 +1,95 @@
+"""What the fuzzer has found, one small test each; `python -m benchmarks fuzz` looks for more."""
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from benchmarks import hostile_input
+from benchmarks.checker import judge
+from benchmarks.isolation import isolated
+from nicmm_core import shapes
+
+HUGE = 10**400
+BALL = shapes.sphere(1)
+POINTS = [0, 9, 30]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"method": np.array(["nicmm", "nicmm"])},
+        {"order": np.array([1, 2, 3])},
+        {"order": []},
+        {"closed": np.array([1, 2, 3])},
+        {"closed": "no"},
+        {"closed": None},
+        {"smoothness": HUGE},
+        {"smoothness": np.array([1.0, 2.0])},
+        {"obstacles": [HUGE] * 42},
+        {"progress": 3},
+    ],
+    ids=str,
+)
+def test_arguments_of_no_sense_are_refused(arguments):
+    with pytest.raises(nicmm.ArgumentError, match=next(iter(arguments))):
+        nicmm.design_curve(BALL, POINTS, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces"),
+    [
+        ([[HUGE, 0, 0]] * 3, [[0, 1, 2]]),
+        (BALL.vertices, [[0, 1, HUGE]]),
+        ([[1e300, 0, 0], [0, 1e300, 0], [0, 0, 1]], [[0, 1, 2]]),
+        (np.ones((3, 3)), [[0, 1, 2]]),
+    ],
+    ids=["huge position", "huge index", "positions whose squares overflow", "one place"],
+)
+def test_arrays_of_no_sense_are_refused(vertices, faces):
+    with pytest.raises(nicmm.MeshError):
+        nicmm.Mesh(vertices, faces)
+
+
+def test_ten_thousand_points_are_refused_at_once():
+    with pytest.raises(nicmm.ControlPointError, match="same point"):
+        nicmm.design_curve(BALL, np.arange(10_000) % 42)
+
+
+def test_the_progress_function_gets_points_of_its_own():
+    def spoil(fraction, points):
+        points *= np.nan
+
+    design = nicmm.design_curve(BALL, POINTS, progress=spoil)
+    assert not judge(BALL, design, POINTS).faults
+
+
+def test_the_callers_own_error_passes_and_the_designer_goes_on():
+    def fail(fraction, points):
+        raise ZeroDivisionError("the caller's")
+
+    designer = nicmm.Designer(BALL)
+    with pytest.raises(ZeroDivisionError, match="the caller's"):
+        designer.design(POINTS, progress=fail)
+    assert not judge(BALL, designer.design(POINTS), POINTS).faults
+
+
+def test_a_seeded_part_of_the_fuzzing():
+    for number in range(150):
+        assert hostile_input.answer(number).faults == [], number
+
+
+def fate(item):
+    if item == "dies":
+        raise SystemExit(7)
+    if item == "hangs":
+        while True:
+            pass
+    print("hello", item)
+    return item
+
+
+def test_crashes_and_hangs_are_results_of_the_fuzzer():
+    done = list(isolated(fate, ["one", "dies", "two", "hangs", "three"], patience=8.0))
+    assert [one.result for one in done] == ["one", None, "two", None, "three"]
+    assert [one.output.strip() for one in done] == ["hello one", "", "hello two", "", "hello three"]
+    assert "died" in done[1].failure and "no answer" in done[3].failure

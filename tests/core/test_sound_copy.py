@@ -1,0 +1,182 @@
+"""Meshes with every defect: a curve where one exists, on the user's own faces."""
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from benchmarks import corpus
+from benchmarks.checker import judge
+from benchmarks.defects import defective_meshes
+from nicmm_core import shapes
+from nicmm_core.mesh import unique_edges
+from nicmm_core.sound_copy import FLAT, sound_copies
+from nicmm_core.surface_points import locate_points
+from tests.core.checks import grid, joined
+
+MESHES = dict(defective_meshes())
+
+
+def first_copy(mesh):
+    return next(sound_copies(mesh))
+
+
+@pytest.mark.parametrize("request_number", [0, 3])
+@pytest.mark.parametrize("name", MESHES)
+def test_a_good_curve_unless_an_error_is_due(name, request_number):
+    outcome = corpus.outcome(corpus.Item(corpus.GENERATED, name, None, request_number))
+    assert outcome.verdict in (corpus.GOOD, corpus.DUE), outcome.words
+
+
+class TestWhatIsDue:
+    """The judge of errors is independent of the core, so it is tried by itself."""
+
+    def test_components(self):
+        mesh = MESHES["components"]
+        assert "different parts" in corpus.not_possible(mesh, np.array([0, len(mesh.vertices) - 1]))
+        assert corpus.not_possible(mesh, np.array([0, 1, 2])) == ""
+
+    def test_one_common_vertex_joins_nothing(self):
+        mesh = MESHES["hour glass"]
+        shared = np.flatnonzero(np.bincount(mesh.faces.ravel()) > 6)[-1]
+        ends = np.array([0, len(mesh.vertices) - 1])
+        assert corpus.not_possible(mesh, ends)
+        assert corpus.not_possible(mesh, np.array([0, shared])) == ""
+        assert corpus.not_possible(mesh, np.array([shared, len(mesh.vertices) - 1])) == ""
+
+    def test_sheets_are_joined_by_their_common_edge(self):
+        mesh = MESHES["three sheets along an edge"]
+        assert corpus.not_possible(mesh, np.arange(0, len(mesh.vertices), 20)) == ""
+
+    def test_two_points_at_one_place(self):
+        mesh = MESHES["seam"]
+        twin = np.array([5, 5 + len(mesh.vertices) // 2])
+        assert "one place" in corpus.not_possible(mesh, twin)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [shapes.sphere(2), shapes.disc(4), shapes.moebius_strip(), MESHES["needles"], MESHES["hole"]],
+    ids=["sphere", "disc", "Möbius strip", "needles", "hole"],
+)
+def test_meshes_without_defects_are_their_own_copy(mesh):
+    (copy,) = sound_copies(mesh)
+    assert copy.mesh is mesh and not copy.differs
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_copies_keep_faces_and_have_no_defects(name):
+    mesh = MESHES[name]
+    for copy in sound_copies(mesh):
+        np.testing.assert_array_equal(copy.vertex[copy.mesh.faces], mesh.faces[copy.face])
+        np.testing.assert_array_equal(
+            copy.vertex[: len(mesh.vertices)], np.arange(len(mesh.vertices))
+        )
+        assert (unique_edges(copy.mesh.faces)[1] <= 2).all()
+        assert (copy.mesh.face_areas > 0.0).all()
+        moved = (copy.mesh.vertices - mesh.vertices[copy.vertex])[np.unique(copy.mesh.faces)]
+        assert np.ptp(moved, axis=0).max() <= 2e-3 * mesh.mean_edge_length
+
+
+def test_only_vertices_of_faces_without_area_move():
+    vertices = grid(4).vertices.copy()
+    faces = grid(4).faces
+    vertices[faces[5, 0]] = vertices[faces[5, 1]]
+    copy = first_copy(nicmm.Mesh(vertices, faces))
+    offset = copy.mesh.vertices - vertices
+    offset -= np.median(offset, axis=0)
+    flat = triangle_heights(vertices[faces]) <= FLAT
+    assert flat.any()
+    still = np.setdiff1d(np.arange(len(vertices)), faces[flat])
+    np.testing.assert_allclose(offset[still], 0.0, atol=1e-15)
+    assert (np.linalg.norm(offset[np.unique(faces[flat])], axis=1) > 0.0).all()
+
+
+def triangle_heights(corners):
+    side = corners - np.roll(corners, 1, axis=1)
+    return np.linalg.norm(np.cross(side[:, 0], side[:, 1]), axis=1)
+
+
+def test_curve_field_and_warm_start_belong_to_the_users_mesh():
+    mesh = MESHES["caps"]
+    before = mesh.vertices.copy(), mesh.faces.copy()
+    designer = nicmm.Designer(mesh)
+    points = np.array([3, 100, 400, 500])
+    first = designer.design(points, order="shortest")
+    again = designer.design(points, order="shortest", smoothness=2.0)
+    for design in (first, again):
+        assert not judge(mesh, design, points, True, "shortest").faults
+        assert design.field.shape == (len(mesh.vertices),)
+        assert np.isfinite(design.field).all()
+        np.testing.assert_allclose(design.field[points], 0.0, atol=1e-2 * mesh.mean_edge_length)
+    assert again.iterations < first.iterations
+    np.testing.assert_array_equal(mesh.vertices, before[0])
+    np.testing.assert_array_equal(mesh.faces, before[1])
+
+
+@pytest.mark.parametrize("name", ["fins", "caps"])
+def test_maps_and_via_points_reach_the_copy(name):
+    mesh = MESHES[name]
+    on_ball = mesh.vertices[: len(MESHES["sphere"].vertices)]
+    obstacles = (mesh.vertices[:, 2] > 0.3).astype(float)
+    ends = np.array([on_ball[:, 0].argmin(), on_ball[:, 0].argmax()])
+    down = [int(on_ball[:, 2].argmin())]
+    around = nicmm.design_curve(mesh, ends, closed=False, obstacles=obstacles)
+    below = nicmm.design_curve(mesh, ends, closed=False, via_points={0: down})
+    for design in (around, below):
+        assert not judge(mesh, design, ends, False).faults
+    assert around.curves[0].points[:, 2].max() < 0.6
+    assert below.curves[0].points[:, 2].mean() < 0.0
+
+
+def test_points_of_a_twin_face_and_of_a_cut_edge():
+    """Control points in the faces that the copy leaves out or cuts."""
+    ball = shapes.sphere(2)
+    mesh = nicmm.Mesh(ball.vertices, np.concatenate([ball.faces, ball.faces[:, [1, 0, 2]]]))
+    faces = len(ball.faces) + np.array([3, 90, 200])
+    points = nicmm.SurfacePoints(faces, np.array([[0.5, 0.3, 0.2], [0.5, 0.5, 0.0], [0, 0, 1.0]]))
+    design = nicmm.design_curve(mesh, points)
+    assert not judge(mesh, design, points).faults
+
+
+@pytest.mark.parametrize("along", [0.0, 0.25, 1.0])
+def test_position_in_a_face_without_area(along):
+    """Of a mesh that has no other face there."""
+    mesh = joined(nicmm.Mesh([[2, 0, 0], [3, 0, 0], [5, 0, 0]], [[0, 1, 2]]), shapes.sphere(1))
+    place = np.array([[2 + 3 * along, 0, 0]])
+    located = locate_points(mesh, place, "here")
+    assert located.faces.tolist() == [0]
+    np.testing.assert_allclose(located.positions(mesh), place, atol=1e-12)
+    assert (located.barycentric >= 0.0).all()
+
+
+def test_parts_that_meet_in_one_vertex_are_refused():
+    mesh = MESHES["hour glass"]
+    points = [0, 1, len(mesh.vertices) - 1]
+    try:
+        design = nicmm.design_curve(mesh, points)
+    except nicmm.UnreachableError as error:
+        assert "points" in str(error)
+    else:
+        assert design.status is nicmm.Status.NOT_ONE_CURVE
+
+
+def test_components_without_any_area_are_refused():
+    flat = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], [[0, 1, 2], [1, 3, 2]])
+    mesh = joined(flat, shapes.sphere(1))
+    curve = nicmm.design_curve(mesh, [5, 20, 35])
+    assert not judge(mesh, curve, [5, 20, 35]).faults
+
+
+@pytest.mark.parametrize("factor", [1e-40, 1e40])
+def test_any_size_in_reason(factor):
+    ball = shapes.sphere(2)
+    mesh = nicmm.Mesh(factor * ball.vertices, ball.faces)
+    design = nicmm.design_curve(mesh, [3, 60, 100])
+    assert not judge(mesh, design, [3, 60, 100]).faults
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-60, 1e60, 1e300])
+def test_sizes_beyond_all_numbers_are_refused(factor):
+    ball = shapes.sphere(1)
+    with pytest.raises(nicmm.MeshError, match="scale"):
+        nicmm.Mesh(factor * ball.vertices, ball.faces)
