@@ -55,6 +55,10 @@ class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
                 "built with --with-torch brings PyTorch along",
             )
             return {"CANCELLED"}
+        except nicmm.UnreachableError as error:
+            group = f' (obstacles: the vertex group "{self.obstacle_group}")'
+            self.report({"ERROR"}, f"{error}{group if self.obstacle_group else ''}")
+            return {"CANCELLED"}
         except (mesh_data.InputError, nicmm.NicmmError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -96,6 +100,7 @@ class NICMM_OT_design_curve(settings.DesignProperties, bpy.types.Operator):
                 method=self.method.lower().replace("_", "-"),
                 obstacles=obstacles,
                 alignment=alignment,
+                clearance=0.0 if obstacles is None else self.clearance,
                 smoothness=self.smoothness,
                 progress=progress,
             )

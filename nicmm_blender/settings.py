@@ -52,7 +52,17 @@ class DesignProperties:
     )
     obstacle_group: StringProperty(
         name="Obstacles",
-        description="Vertex group whose weights keep the curve away. Leave empty for none",
+        description=(
+            "Vertex group whose weights keep the curve away; where the weight is 1 the curve never "
+            "enters. Leave empty for none"
+        ),
+    )
+    clearance: FloatProperty(
+        name="Clearance",
+        description="Distance along the surface that the curve keeps from obstacles of weight 1",
+        subtype="DISTANCE",
+        default=0.0,
+        min=0.0,
     )
     alignment_group: StringProperty(
         name="Alignment",
@@ -87,6 +97,10 @@ def draw(layout, properties, mesh_object) -> None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
         else:
             layout.prop_search(properties, name, mesh_object, "vertex_groups")
+        if name == "obstacle_group":
+            row = layout.row()
+            row.active = bool(properties.obstacle_group)
+            row.prop(properties, "clearance")
     layout.prop(properties, "thickness")
 
 

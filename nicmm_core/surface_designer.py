@@ -30,6 +30,7 @@ from .network.weights_file import shipped_weights
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
+from .relaxation.exact_curve import ExactCurve
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
 from .request import Progress, Request, same_course, same_request
@@ -45,7 +46,7 @@ State = TypeVar("State")
 class _Start:
     """A simple curve on the mesh from which relaxation begins."""
 
-    curve: SurfaceCurve
+    curve: SurfaceCurve | ExactCurve
     visited: IntArray  # (k,) which control points it passes, in order
     surface: CurveSurface
     unit: float  # square root of the surface's area
@@ -68,6 +69,7 @@ class _Remembered:
 
     request: Request
     start: _Start
+    exact: ExactCurve  # the design's curve with its nodes
     design: Design
 
 
@@ -163,7 +165,7 @@ class SurfaceDesigner:
         if last is None or not same_course(request, last.request):
             return None
         points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.design.curves[0], points)
+        curve = moved_along(last.start.surface, last.exact, points)
         if curve is None:
             return None
         return replace(last.start, curve=curve, breaking=0)
@@ -206,7 +208,7 @@ class SurfaceDesigner:
             find_field=partial(curve_field, self.mesh, relaxed.curve),
         )
         if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, design)
+            self._last = _Remembered(request, start, relaxed.exact, design)
         return design
 
     def _level_set_design(

@@ -85,14 +85,15 @@ class Nodes:
     @cached_property
     def lengths(self) -> FloatArray:
         """Lengths of the steps; (n,), or (n - 1,) of an open curve."""
-        lengths = np.linalg.norm(self.steps, axis=1)
+        steps = self.steps.T
+        lengths = np.sqrt(dot(steps, steps))
         return lengths if self.closed else lengths[:-1]
 
     @cached_property
     def sideways(self) -> FloatArray:
         """Unit vectors across the curve in the tangent planes, shape (n, 3)."""
         unit = _unit(self.steps)
-        return _unit(np.cross(self.normals, unit + np.roll(unit, 1, axis=0)))
+        return _unit(cross(self.normals.T, unit.T + before_each(unit.T)).T)
 
     def sideways_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
         """How normals, (n, 3), and φ_fea, (n,), change with a sideways move of their node."""
@@ -135,11 +136,38 @@ def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
 
 
 def _steps(positions: FloatArray, closed: bool) -> FloatArray:
-    steps = np.roll(positions, -1, axis=0) - positions
+    steps = after_each(positions.T).T - positions
     if not closed:
         steps[-1] = 0.0
     return steps
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), tolerances.TINY)
+    lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
+    return vectors / np.maximum(lengths, tolerances.TINY)[:, None]
+
+
+def after_each(values: FloatArray) -> FloatArray:
+    """What the next node of the ring has; nodes are the last axis."""
+    return np.concatenate([values[..., 1:], values[..., :1]], axis=-1)
+
+
+def before_each(values: FloatArray) -> FloatArray:
+    """What the node before has; nodes are the last axis."""
+    return np.concatenate([values[..., -1:], values[..., :-1]], axis=-1)
+
+
+def dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Products of vectors whose components are the first axis, which is several times as fast."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Vectors across two others, components first."""
+    return np.stack(
+        [
+            one[1] * other[2] - one[2] * other[1],
+            one[2] * other[0] - one[0] * other[2],
+            one[0] * other[1] - one[1] * other[0],
+        ]
+    )

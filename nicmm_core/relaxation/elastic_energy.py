@@ -16,18 +16,16 @@ nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
+from scipy.sparse.linalg import splu
 
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
-from .curve_nodes import CurveSurface, Nodes
-from .strand_contact import contact_residuals
-
-DIFFERENCE = 1e-4
-"""Move of a node for differences, in mean steps."""
+from .curve_nodes import CurveSurface, Nodes, after_each, before_each, cross, dot
+from .strand_contact import contacts_between
 
 FEATURE_TENSION = 600.0
 """λ_fea / λ_smooth for lengths in square roots of the surface's area.
@@ -70,81 +68,99 @@ def balance(surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool)
 
 def bending_energy(nodes: Nodes) -> float:
     """∮ κ_g² ds, in 1/length."""
-    return float((_residuals(nodes)[0] ** 2).sum())
+    return float(_terms(nodes)[0].sum())
 
 
 def feature_energy(nodes: Nodes) -> float:
     """∮ φ_fea² ds, in units of length."""
-    return float((_residuals(nodes)[1] ** 2).sum())
+    return float(_terms(nodes)[1].sum())
 
 
 def elastic_energy(nodes: Nodes, weights: Balance) -> float:
     """E, with contact where that has a weight."""
-    bending, stretch = _residuals(nodes)
-    energy = float((bending**2).sum() + weights.tension * (stretch**2).sum())
+    bending, feature = _terms(nodes)
+    energy = float(bending.sum() + weights.tension * feature.sum())
     if weights.contact:
-        energy += weights.contact * float((contact_residuals(nodes).overlap ** 2).sum())
+        energy += 2.0 * weights.contact * float((contacts_between(nodes).overlap ** 2).sum())
     return energy
+
+
+def _terms(nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+    """κ_g² ds and φ_fea² ds at each node, both (n,); an open curve does not bend at its ends."""
+    after = nodes.steps.T
+    before = before_each(after)
+    normals = nodes.normals.T
+    out_before, out_after = dot(before, normals), dot(after, normals)
+    turning = np.arctan2(
+        dot(cross(before, after), normals), dot(before, after) - out_before * out_after
+    )
+    if not nodes.closed:
+        turning[[0, -1]] = 0.0
+    lengths = np.sqrt(dot(after, after))
+    ds = np.maximum(0.5 * (lengths + before_each(lengths)), tolerances.TINY)
+    return turning**2 / ds, nodes.importance**2 * ds
+
+
+def _no_pairs() -> IntArray:
+    return np.zeros((0, 2), dtype=np.int64)
+
+
+def _no_entries() -> FloatArray:
+    return np.zeros((3, 0))
 
 
 @dataclass(frozen=True)
 class ElasticSystem:
-    """Gauss-Newton's matrix, symmetric with two cyclic bands to each side, and the slope.
+    """Gauss-Newton's matrix and the slope, halves of the energy's derivatives by sideways moves.
 
     Attributes
     ----------
     bands : (3, n) float array
-        Entries (i, i), (i, i + 1) and (i, i + 2) in column i, indices modulo n.
+        The matrix without contact, symmetric with two cyclic bands to each side: entries (i, i),
+        (i, i + 1) and (i, i + 2) in column i, indices modulo n.
     slope : (n,) float array
-        Half the derivative of the energy by each node's sideways move.
+        By each node's move.
+    pairs : (p, 2) int array
+        Nodes in contact.
+    pair_entries : (3, p) float array
+        What that adds to entries (i, i), (i, j) and (j, j) of the matrix.
     """
 
     bands: FloatArray
     slope: FloatArray
+    pairs: IntArray = field(default_factory=_no_pairs)
+    pair_entries: FloatArray = field(default_factory=_no_entries)
+
+    @property
+    def diagonal(self) -> FloatArray:
+        """Of the whole matrix, shape (n,)."""
+        added = self.pair_entries[[0, 2]].ravel()
+        return self.bands[0] + np.bincount(self.pairs.T.ravel(), added, len(self.slope))
 
 
 def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> ElasticSystem:
-    """Linearise the residuals about a curve."""
+    """Linearise the residuals κ_g √ds, φ_fea √ds and those of contact about a curve."""
     n = len(nodes.positions)
-    at_rest = _residuals(nodes)
-    # Derivative of residual i by the move of node i - 1, i and i + 1: two (n, 3) arrays.
-    jacobians = np.zeros((2, n, 3))
-    step = DIFFERENCE * float(nodes.lengths.mean())
-    turn, drift = nodes.sideways_derivatives(surface)
-    colour = _colours(n)
-    for chosen in range(int(colour.max()) + 1):
-        change = step * (colour == chosen)
-        changed = _residuals(
-            Nodes(
-                nodes.places,
-                nodes.closed,
-                nodes.positions + change[:, None] * nodes.sideways,
-                nodes.normals + change[:, None] * turn,
-                nodes.importance + change * drift,
-            )
-        )
-        for column in range(3):
-            rows = np.flatnonzero(np.roll(colour, 1 - column) == chosen)
-            for jacobian, before, after in zip(jacobians, at_rest, changed, strict=True):
-                jacobian[rows, column] = (after - before)[rows] / step
-    bands, slope = np.zeros((3, n)), np.zeros(n)
-    for weight, jacobian, residual in zip((1.0, weights.tension), jacobians, at_rest, strict=True):
-        bands += weight * _squared(jacobian)
-        slope += weight * _transposed(jacobian, residual)
+    bending, stretch, bending_by, stretch_by = _linearised(surface, nodes)
+    bands = _squared(bending_by) + weights.tension * _squared(stretch_by)
+    slope = _transposed(bending_by, bending) + weights.tension * _transposed(stretch_by, stretch)
     # Residuals do not have all of the length's second derivative: this is a string's stiffness.
     stiffness = np.zeros(n)
     stiffness[: len(nodes.lengths)] = weights.tension / np.maximum(nodes.lengths, tolerances.TINY)
     stiffness *= nodes.importance**2
-    bands[0] += stiffness + np.roll(stiffness, 1)
+    bands[0] += stiffness + before_each(stiffness)
     # Without an orientation of the surface, neighbours may have opposite moves to one side.
-    opposite = (nodes.normals * np.roll(nodes.normals, -1, axis=0)).sum(axis=1) < 0.0
+    opposite = dot(nodes.normals.T, after_each(nodes.normals.T)) < 0.0
     bands[1] -= np.where(opposite, -stiffness, stiffness)
-    if weights.contact:
-        contact = contact_residuals(nodes)
-        weight = 2.0 * weights.contact  # a move changes what both nodes of a pair have
-        np.add.at(bands[0], contact.node, weight * contact.derivative**2)
-        np.add.at(slope, contact.node, weight * contact.overlap * contact.derivative)
-    return ElasticSystem(bands, slope)
+    if not weights.contact:
+        return ElasticSystem(bands, slope)
+    contact = contacts_between(nodes)
+    weight = 2.0 * weights.contact  # a pair counts for either of its nodes
+    pull = weight * contact.overlap[:, None] * contact.derivatives
+    slope += np.bincount(contact.pairs.ravel(), pull.ravel(), n)
+    one, other = contact.derivatives.T
+    entries = weight * np.stack([one * one, one * other, other * other])
+    return ElasticSystem(bands, slope, contact.pairs, entries)
 
 
 def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> FloatArray:
@@ -156,12 +172,90 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> Float
     free : (n,) bool array
         At least one node.
     damping : float
-        Added to the diagonal, relative to its greatest entry.
+        Added to the diagonal, relative to the greatest entry of a free node.
     """
-    n = len(free)
-    both = np.stack([free, free & np.roll(free, -1), free & np.roll(free, -2)])
-    bands = np.where(both, system.bands, 0.0)
-    bands[0] += np.where(free, damping * bands[0].max(), 1.0)
+    bands = np.where(
+        np.stack([free, free & np.roll(free, -1), free & np.roll(free, -2)]), system.bands, 0.0
+    )
+    bands[0] += np.where(free, damping * system.diagonal[free].max(), 1.0)
+    right = np.where(free, -system.slope, 0.0)
+    if not len(system.pairs):
+        return _solved(bands, right)
+    one, other = system.pairs.T
+    both = np.stack([free[one], free[one] & free[other], free[other]])
+    return _solved_with_pairs(bands, system.pairs, np.where(both, system.pair_entries, 0.0), right)
+
+
+def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
+    """By how much sideways moves lower the linearised energy."""
+    return -float(move @ (2.0 * system.slope + _product(system, move)))
+
+
+def _linearised(
+    surface: CurveSurface, nodes: Nodes
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Residuals κ_g √ds and φ_fea √ds of every node, and how moves change them.
+
+    Returns
+    -------
+    (n,) float array
+    (n,) float array
+    (3, n) float array
+        Derivatives of the first by the sideways moves of nodes i - 1, i and i + 1.
+    (3, n) float array
+        Of the second.
+    """
+    here = nodes.sideways.T
+    normal_turn, drift = nodes.sideways_derivatives(surface)
+    turn, normal = normal_turn.T, nodes.normals.T
+    after = nodes.steps.T
+    before = before_each(after)
+    # How the steps before and after change with the moves of their two ends.
+    before_by, after_by = np.stack([-before_each(here), here]), np.stack([-here, after_each(here)])
+    if not nodes.closed:
+        before_by[:, :, 0] = 0.0
+        after_by[:, :, -1] = 0.0
+    out_before, out_after = dot(before, normal), dot(after, normal)
+    flat_before, flat_after = before - out_before * normal, after - out_after * normal
+    squared_before = np.maximum(dot(flat_before, flat_before), tolerances.TINY)
+    squared_after = np.maximum(dot(flat_after, flat_after), tolerances.TINY)
+    product = cross(before, after)
+    sine, cosine = dot(product, normal), dot(flat_before, flat_after)
+    turning = np.arctan2(sine, cosine)
+    by_before = cross(flat_before, normal) / squared_before
+    by_after = cross(normal, flat_after) / squared_after
+    by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
+    by_normal = (by_normal + cosine * dot(product, turn)) / (squared_before * squared_after)
+    turning_by = np.stack(
+        [
+            dot(by_before, before_by[0]),
+            dot(by_before, before_by[1]) + dot(by_after, after_by[0]) + by_normal,
+            dot(by_after, after_by[1]),
+        ]
+    )
+    if not nodes.closed:
+        turning[[0, -1]] = 0.0
+        turning_by[:, [0, -1]] = 0.0
+    length_before, length_after = np.sqrt(dot(before, before)), np.sqrt(dot(after, after))
+    along_before = before / np.maximum(length_before, tolerances.TINY)
+    along_after = after / np.maximum(length_after, tolerances.TINY)
+    root = np.sqrt(np.maximum(0.5 * (length_before + length_after), tolerances.TINY))
+    root_by = np.stack(
+        [
+            dot(along_before, before_by[0]),
+            dot(along_before, before_by[1]) + dot(along_after, after_by[0]),
+            dot(along_after, after_by[1]),
+        ]
+    ) / (4.0 * root)
+    bending = turning / root
+    stretch_by = nodes.importance * root_by
+    stretch_by[1] += drift * root
+    return bending, nodes.importance * root, (turning_by - bending * root_by) / root, stretch_by
+
+
+def _solved(bands: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a positive cyclic system."""
+    n = len(right)
     # Folding the ring flat, 0, n-1, 1, n-2, …, puts neighbours at most four places apart.
     place = np.empty(n, dtype=np.int64)
     place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
@@ -170,48 +264,53 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> Float
     for offset in range(3):
         here, there = place, np.roll(place, -offset)
         np.add.at(folded, (np.abs(here - there), np.minimum(here, there)), bands[offset])
-    right = np.zeros(n)
-    right[place] = np.where(free, -system.slope, 0.0)
-    return linalg.solveh_banded(folded, right, lower=True, check_finite=False)[place]
+    in_order = np.empty(n)
+    in_order[place] = right
+    return linalg.solveh_banded(folded, in_order, lower=True, check_finite=False)[place]
 
 
-def _residuals(nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """κ_g √ds and φ_fea √ds at each node, both (n,); an open curve does not bend at its ends."""
-    after = nodes.steps
-    before = np.roll(after, 1, axis=0)
-    lengths = np.sqrt((after**2).sum(axis=1))
-    root = np.sqrt(np.maximum(0.5 * (lengths + np.roll(lengths, 1)), tolerances.TINY))
-    sine = (np.cross(before, after) * nodes.normals).sum(axis=1)
-    cosine = (before * after).sum(axis=1)
-    cosine -= (before * nodes.normals).sum(axis=1) * (after * nodes.normals).sum(axis=1)
-    turning = np.arctan2(sine, cosine)
-    if not nodes.closed:
-        turning[[0, -1]] = 0.0
-    return turning / root, nodes.importance * root
-
-
-def _colours(n: int) -> IntArray:
-    """Numbers such that three consecutive nodes of a ring have three of them, shape (n,)."""
-    colours = np.arange(n) % 3
-    if n % 3:
-        colours[-(n % 3) :] = np.arange(3, 3 + n % 3)
-    return colours
+def _solved_with_pairs(
+    bands: FloatArray, pairs: IntArray, entries: FloatArray, right: FloatArray
+) -> FloatArray:
+    """The same with further entries, those of pairs of nodes."""
+    n = len(right)
+    node = np.arange(n)
+    rows = np.concatenate([node, node, pairs[:, 0]])
+    columns = np.concatenate([np.roll(node, -1), np.roll(node, -2), pairs[:, 1]])
+    beside = np.concatenate([bands[1], bands[2], entries[1]])
+    diagonal = bands[0] + np.bincount(pairs.T.ravel(), entries[[0, 2]].ravel(), n)
+    values = np.concatenate([diagonal, beside, beside])
+    places = np.concatenate([node, rows, columns]), np.concatenate([node, columns, rows])
+    matrix = sparse.csc_array((values, places), shape=(n, n))
+    symmetric = {"SymmetricMode": True}
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", options=symmetric).solve(right)
 
 
 def _squared(jacobian: FloatArray) -> FloatArray:
     """Bands of JᵀJ, shape (3, n)."""
-    left, middle, right = jacobian.T
-    after = np.roll(jacobian, -1, axis=0)
+    left, middle, right = jacobian
     return np.stack(
         [
-            np.roll(right, 1) ** 2 + middle**2 + after[:, 0] ** 2,
-            middle * right + after[:, 0] * after[:, 1],
-            after[:, 0] * after[:, 2],
+            before_each(right**2) + middle**2 + after_each(left**2),
+            middle * right + after_each(left * middle),
+            after_each(left * right),
         ]
     )
 
 
 def _transposed(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
     """Jᵀ r, shape (n,)."""
-    left, middle, right = (jacobian * residual[:, None]).T
-    return np.roll(left, -1) + middle + np.roll(right, 1)
+    left, middle, right = jacobian * residual
+    return after_each(left) + middle + before_each(right)
+
+
+def _product(system: ElasticSystem, move: FloatArray) -> FloatArray:
+    """The matrix times moves, shape (n,)."""
+    result = system.bands[0] * move
+    for offset, band in ((1, system.bands[1]), (2, system.bands[2])):
+        result += band * np.roll(move, -offset) + np.roll(band * move, offset)
+    one, other = system.pairs.T
+    own, mixed, others = system.pair_entries
+    result += np.bincount(one, own * move[one] + mixed * move[other], len(move))
+    result += np.bincount(other, others * move[other] + mixed * move[one], len(move))
+    return result

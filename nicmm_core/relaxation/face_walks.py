@@ -123,12 +123,11 @@ def moved(
     """
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
-    walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(length > 0.0))
+    blocked = length > 0.0
+    walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(blocked))
+    blocked[walkers.index] = False
     left = length.copy()
     faces, barycentric = start.faces.copy(), start.barycentric.copy()
-    blocked = np.zeros(len(origin), dtype=bool)
-    lost = np.setdiff1d(np.flatnonzero(length > 0.0), walkers.index)
-    blocked[lost] = True
     for _ in range(MOST_FACES):
         if not len(walkers.index):
             break

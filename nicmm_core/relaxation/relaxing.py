@@ -26,12 +26,14 @@ from ..curve import SurfaceCurve
 from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
     Balance,
+    ElasticSystem,
     balance,
     bending_energy,
     damped_step,
     elastic_energy,
     elastic_system,
     feature_energy,
+    predicted_fall,
 )
 from .exact_curve import ExactCurve, drawn, exact_curve, is_simple, redrawn, respaced, sideways
 
@@ -75,8 +77,14 @@ class RelaxationConfig:
 DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
 
+RELEASES = 2
+"""Times in a level that nodes which could not follow are tried again when the others rest."""
+
 HELD_TRIES = 3
 """Steps that are tried without the nodes that could not follow the one before."""
+
+SURELY = 0.1
+"""Share of the least decrease below which a step is not tried: damping makes forecasts small."""
 
 STRAIGHT = 1e-2
 """Share of bending in the energy below which a curve is straight enough not to go on for it."""
@@ -93,6 +101,8 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         Simple.
+    exact : ExactCurve
+        The same with the nodes that it came to rest with.
     bending : float
         ∮ κ_g² ds, in 1/length.
     feature : float
@@ -105,6 +115,7 @@ class Relaxed:
     """
 
     curve: SurfaceCurve
+    exact: ExactCurve
     bending: float
     feature: float
     iterations: int
@@ -116,7 +127,7 @@ Watch = Callable[[float, FloatArray], bool]
 
 def relax(
     surface: CurveSurface,
-    start: SurfaceCurve,
+    start: SurfaceCurve | ExactCurve,
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
@@ -126,7 +137,7 @@ def relax(
     Parameters
     ----------
     surface : CurveSurface
-    start : SurfaceCurve
+    start : SurfaceCurve or ExactCurve
         Simple, and through its control points in order.
     smoothness : float
         Divides the tension.
@@ -136,25 +147,36 @@ def relax(
         after every iteration; relaxation stops when it returns False.
     """
     relaxation = _Relaxation(surface, smoothness, config, watch)
-    first = exact_curve(surface, start, config.levels[0])
-    curve = None
-    for place in range(len(config.levels)):
-        levels = config.levels[place:]
-        drawing = _Drawing.HOLD if len(levels) == 1 else _Drawing.END
+    if isinstance(start, ExactCurve):
+        first, start = start, start.surface_curve(surface.mesh)
+    else:
+        first = exact_curve(surface, start, config.levels[0])
+    # Each level may lose a way between its nodes; the last one holds what it would lose.
+    attempts = [(config.levels[place:], _Drawing.END) for place in range(len(config.levels) - 1)]
+    attempts = attempts or [(config.levels, _Drawing.END)]
+    attempts.append((config.levels[-1:], _Drawing.HOLD))
+    for levels, drawing in attempts:
         curve = relaxation.run(first, levels, drawing)
         if curve is not None:
             break
-    if relaxation.stopped != "cancelled" and not (curve and is_simple(surface, curve)):
+    simple = curve is not None and is_simple(surface, curve)
+    if not simple and relaxation.stopped != "cancelled":
         # Strands that cross here would do so with more nodes too.
         curve = relaxation.run(first, config.levels[1:] or config.levels, _Drawing.SIMPLE)
-    if curve and is_simple(surface, curve):
+        simple = curve is not None and is_simple(surface, curve)
+    if curve is not None and simple:
         result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
     else:
         curve, result = first, start
         stopped = "cancelled" if relaxation.stopped == "cancelled" else "unrelaxed"
     nodes = curve.nodes
     return Relaxed(
-        result, bending_energy(nodes), feature_energy(nodes), relaxation.iterations, stopped
+        result,
+        curve,
+        bending_energy(nodes),
+        feature_energy(nodes),
+        relaxation.iterations,
+        stopped,
     )
 
 
@@ -216,6 +238,9 @@ class _Relaxation:
                 curve = self._level(curve, level, least, last_iteration, drawing)
                 if self.stopped != "converged":
                     break
+                if drawing is _Drawing.END and level != levels[-1]:
+                    if not is_simple(self.surface, curve):
+                        break  # strands that cross here would do so with more nodes too
         except _LostError:
             return None
         return curve
@@ -233,42 +258,58 @@ class _Relaxation:
         curve = self._respaced(curve, level, drawing)
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
-        released = False
-        while self.iterations < last_iteration:
-            self.iterations += 1
+        releases = 0
+        while True:
             apart = drawing is _Drawing.SIMPLE
             weights = balance(self.surface, nodes, self.smoothness, apart)
             before = elastic_energy(nodes, weights)
-            step = self._step(curve, nodes, held, weights, damping, drawing)
+            system = elastic_system(self.surface, nodes, weights)
+            scale = max(bending_energy(nodes), STRAIGHT * before)
+            step = None
+            if self._may_fall(curve, system, held) > SURELY * least * scale:
+                if self.iterations == last_iteration:
+                    self.stopped = "cap"
+                    break
+                self.iterations += 1
+                step = self._step(curve, nodes, held, system, weights, damping, drawing)
             if step is not None:
                 curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
                 done = 1.0 - (last_iteration - self.iterations) / config.iterations
                 if self.watch is not None and not self.watch(done, nodes.positions):
                     self.stopped = "cancelled"
                     break
-            scale = max(bending_energy(nodes), STRAIGHT * before)
-            if step is not None and before - elastic_energy(nodes, weights) > least * scale:
-                released = False
-            elif released or not held.any():
-                break
-            else:
+                scale = max(bending_energy(nodes), STRAIGHT * before)
+            if step is None or before - elastic_energy(nodes, weights) <= least * scale:
+                if releases == RELEASES or not held.any():
+                    break
                 # At rest with nodes that once could not follow: perhaps they can now.
-                released, damping = True, config.damping
+                releases, damping = releases + 1, config.damping
                 held = np.zeros(len(held), dtype=bool)
             moved = step is not None and step.farthest > SMALL_MOVE
             if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
                 curve = self._respaced(self._drawn(curve, nodes), level, drawing)
                 nodes = curve.nodes
                 held = np.zeros(len(nodes.positions), dtype=bool)
-        else:
-            self.stopped = "cap"
         return self._drawn(curve, nodes)
+
+    def _may_fall(self, curve: ExactCurve, system: ElasticSystem, held: BoolArray) -> float:
+        """By how much the least damped step is going to lower the energy."""
+        free = self._free(curve, held)
+        if not free.any():
+            return 0.0
+        return predicted_fall(system, damped_step(system, free, self.config.damping))
+
+    def _free(self, curve: ExactCurve, held: BoolArray) -> BoolArray:
+        free = ~held
+        free[curve.control_nodes] = False
+        return free
 
     def _step(
         self,
         curve: ExactCurve,
         nodes: Nodes,
         held: BoolArray,
+        system: ElasticSystem,
         weights: Balance,
         damping: float,
         drawing: _Drawing,
@@ -276,10 +317,8 @@ class _Relaxation:
         """The least damped step that lowers the energy; None when there is none."""
         config, surface = self.config, self.surface
         energy = elastic_energy(nodes, weights)
-        system = elastic_system(surface, nodes, weights)
         spacing = float(nodes.lengths.mean())
-        free = ~held
-        free[curve.control_nodes] = False
+        free = self._free(curve, held)
         tries = 0
         while damping <= config.most_damping and free.any():
             move = damped_step(system, free, damping)
@@ -314,7 +353,10 @@ class _Relaxation:
         return changed
 
     def _respaced(self, curve: ExactCurve, level: int, drawing: _Drawing) -> ExactCurve:
-        """Nodes at equal distances; where they would make strands touch, the ones it has."""
+        """Nodes at about equal distances; where they would make strands touch, those it has."""
+        alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
+        if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
+            return curve
         changed = respaced(self.surface, curve, level)
         if drawing is _Drawing.SIMPLE and not is_simple(self.surface, changed):
             return curve

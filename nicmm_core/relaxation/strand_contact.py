@@ -23,36 +23,37 @@ SAME_SIDE = 0.3
 
 @dataclass(frozen=True)
 class Contacts:
-    """Pairs of near nodes, each once for either of the two.
+    """Pairs of near nodes of different strands.
 
     Attributes
     ----------
-    node : (p,) int array
+    pairs : (p, 2) int array
+        Each pair once.
     overlap : (p,) float array
         1 - distance / clearance.
-    derivative : (p,) float array
-        Of the overlap by the node's sideways move.
+    derivatives : (p, 2) float array
+        Of the overlap by the two nodes' sideways moves.
     """
 
-    node: IntArray
+    pairs: IntArray
     overlap: FloatArray
-    derivative: FloatArray
+    derivatives: FloatArray
 
 
-def contact_residuals(nodes: Nodes) -> Contacts:
+def contacts_between(nodes: Nodes) -> Contacts:
     """Which nodes of different strands are closer than the clearance."""
     clearance = CLEARANCE * float(nodes.lengths.mean())
-    first, second = cKDTree(nodes.positions).query_pairs(clearance, output_type="ndarray").T
+    pairs = cKDTree(nodes.positions).query_pairs(clearance, output_type="ndarray")
     arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])
-    along = np.abs(arc[first] - arc[second])
+    along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
         along = np.minimum(along, arc[-1] - along)
-    cosine = (nodes.normals[first] * nodes.normals[second]).sum(axis=1)
-    # Without an orientation of the surface, normals may differ in sign on one side of it too.
-    kept = (along > ALONG * clearance) & (cosine > SAME_SIDE)
-    first, second = first[kept], second[kept]
-    node, other = np.concatenate([first, second]), np.concatenate([second, first])
-    offset = nodes.positions[node] - nodes.positions[other]
+    pairs = pairs[along > ALONG * clearance]
+    normals, positions = nodes.normals[pairs], nodes.positions[pairs]
+    offset = positions[:, 0] - positions[:, 1]
     distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
-    approach = (offset * nodes.sideways[node]).sum(axis=1) / distance
-    return Contacts(node, 1.0 - distance / clearance, -approach / clearance)
+    direction = offset / distance[:, None]
+    kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
+    pairs, distance, direction = pairs[kept], distance[kept], direction[kept]
+    approach = np.einsum("pd,pkd->pk", direction, nodes.sideways[pairs]) * [-1.0, 1.0]
+    return Contacts(pairs, 1.0 - distance / clearance, approach / clearance)

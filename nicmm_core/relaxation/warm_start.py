@@ -10,17 +10,16 @@ import numpy as np
 
 from .. import tolerances
 from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .exact_curve import drawn, exact_curve, is_simple, shifted
+from .exact_curve import ExactCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig
 
-NODES = 512
-"""Nodes that are moved; as many as the curve was relaxed with."""
+WARM = RelaxationConfig(levels=(512,), damping=1e-8, least_decrease=1e-3)
+"""Relaxation from there: the curve is fine already and near its rest.
 
-WARM = RelaxationConfig(levels=(128, NODES), least_decrease=1e-3, least_decrease_before=5e-2)
-"""Relaxation from there: the curve is fine already and near its rest."""
+So many nodes swing so softly in long waves that the damping of a start from afar would hold them.
+"""
 
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
@@ -30,29 +29,28 @@ TAKEN_ALONG = 4.0
 
 
 def moved_along(
-    surface: CurveSurface, curve: SurfaceCurve, controls: SurfacePoints
-) -> SurfaceCurve | None:
+    surface: CurveSurface, curve: ExactCurve, controls: SurfacePoints
+) -> ExactCurve | None:
     """A curve with its control points at new places nearby.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : SurfaceCurve
+    curve : ExactCurve
         Simple, and through its control points in order.
     controls : SurfacePoints
         The new places, in the order visited.
 
     Returns
     -------
-    SurfaceCurve or None
+    ExactCurve or None
         Simple; None where the moves are too far for that.
     """
     mesh = surface.mesh
-    move = controls.positions(mesh) - curve.points[curve.control_index]
-    if np.linalg.norm(move, axis=1).max() > LONGEST_MOVE * curve.length:
+    nodes, at_controls = curve.nodes, curve.control_nodes
+    move = controls.positions(mesh) - nodes.positions[at_controls]
+    if np.linalg.norm(move, axis=1).max() > LONGEST_MOVE * float(nodes.lengths.sum()):
         return None
-    exact = exact_curve(surface, curve, NODES)
-    nodes, at_controls = exact.nodes, exact.control_nodes
     shift = _shifts(nodes, at_controls, move)
     shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(shift, axis=1)
@@ -62,10 +60,10 @@ def moved_along(
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[at_controls], barycentric[at_controls] = controls.faces, controls.barycentric
     places = SurfacePoints(faces, barycentric)
-    changed = drawn(surface, exact, nodes_at(surface, places, curve.closed))
+    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed))
     if changed is None or not is_simple(surface, changed):
         return None
-    return changed.surface_curve(mesh)
+    return changed
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from nicmm_core.relaxation.elastic_energy import (
     elastic_energy,
     elastic_system,
     feature_energy,
+    predicted_fall,
 )
 from nicmm_core.relaxation.exact_curve import sideways
 from tests.core.checks import circle, flipped, points_near, renumbered, scaled
@@ -231,6 +232,11 @@ def dense(system):
             j = (i + offset) % n
             matrix[i, j] += system.bands[offset, i]
             matrix[j, i] += system.bands[offset, i]
+    for (i, j), (own, mixed, other) in zip(system.pairs, system.pair_entries.T, strict=True):
+        matrix[i, i] += own
+        matrix[i, j] += mixed
+        matrix[j, i] += mixed
+        matrix[j, j] += other
     return matrix
 
 
@@ -254,6 +260,45 @@ def test_a_step_solves_the_dense_system_of_the_free_nodes(count, held):
     kept = kept + 0.01 * np.diag(kept).max() * np.eye(free.sum())
     np.testing.assert_array_equal(step[~free], 0.0)
     np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)
+
+
+@pytest.mark.parametrize("held", [(), (0, 1), (2, 5)])
+@pytest.mark.parametrize("count", [8, 41])
+def test_with_contact_a_step_solves_the_dense_system_too(count, held):
+    """Of pairs far apart along the curve, which no band holds."""
+    generator = np.random.default_rng(count)
+    bands = np.abs(generator.normal(size=(3, count))) + [[9.0], [0.0], [0.0]]
+    pairs = np.array([[0, 4], [5, 1], [2, 6]])
+    one, other = generator.normal(size=(2, 3))
+    entries = np.stack([one * one, one * other, other * other])
+    system = ElasticSystem(bands, generator.normal(size=count), pairs, entries)
+    free = np.ones(count, dtype=bool)
+    free[list(held)] = False
+    step = damped_step(system, free, damping=0.01)
+    kept = dense(system)[np.ix_(free, free)]
+    np.testing.assert_allclose(system.diagonal, np.diag(dense(system)))
+    kept = kept + 0.01 * np.diag(kept).max() * np.eye(free.sum())
+    np.testing.assert_array_equal(step[~free], 0.0)
+    np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)
+    expected = -2.0 * system.slope @ step - step @ dense(system) @ step
+    assert predicted_fall(system, step) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("mapped", [False, True])
+def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
+    """Strands in contact among them; the rest is of second order."""
+    feature_map = 1.5 + flat_disc.vertices[:, 0] if mapped else None
+    surface = surface_of(flat_disc, feature_map, 1.0)
+    nodes = nodes_on(flat_disc, near_strands(), feature_map=feature_map)
+    weights = Balance(3.0, 5.0)
+    system = elastic_system(surface, nodes, weights)
+    assert len(system.pairs) > 0
+    step = 1e-3 * damped_step(system, np.ones(len(nodes.positions), dtype=bool), 1.0)
+    fall = elastic_energy(nodes, weights) - elastic_energy(
+        sideways(surface, nodes, step)[0], weights
+    )
+    assert fall > 0.0
+    assert fall == pytest.approx(predicted_fall(system, step), rel=0.05)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

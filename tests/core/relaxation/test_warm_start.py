@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import surface_designer
+from nicmm_core import shapes, surface_designer
+from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
+from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
+from nicmm_core.relaxation.warm_start import WARM, moved_along
+from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import apart, assert_valid_design, circle, nearest_vertices
 
 CHOSEN = [12, 80, 41, 150]
@@ -159,3 +163,40 @@ def test_a_bad_request_leaves_the_last_curve(body, problems):
         designer.design([12, 80, 80, 150], order="shortest")
     designer.design([beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]], order="shortest")
     assert len(problems) == 1
+
+
+def test_iterations_are_few_from_afar_and_fewer_from_the_last_curve():
+    """Medians over random points of generated creatures, with every attempt counted.
+
+    From afar they depend on the initial curve too; that bound only keeps them from growing.
+    """
+    from_afar, dragged = [], []
+    for seed in range(6):
+        mesh = shapes.creature(seed, resolution=32, faces=2000)
+        generator = np.random.default_rng(seed)
+        for closed in (True, False):
+            chosen = generator.choice(len(mesh.vertices), 4, replace=False).tolist()
+            designer = nicmm.Designer(mesh)
+            design = designer.design(chosen, closed=closed, order="shortest")
+            from_afar.append(design.iterations)
+            for _ in range(3):
+                chosen[0] = beside(mesh, chosen[0], chosen)
+                design = designer.design(chosen, closed=closed, order="shortest")
+                assert_valid_design(mesh, design, closed=closed)
+                dragged.append(design.iterations)
+    assert np.median(from_afar) <= 15
+    assert np.median(dragged) <= 3
+
+
+def test_a_dragged_curve_keeps_its_nodes(ball):
+    """What is remembered is the curve that was returned, with as many nodes as it has."""
+    surface = CurveSurface(ball, unsigned_normals(ball))
+    start = nicmm.design_curve(ball, CHOSEN, order="shortest").curves[0]
+    first = relax(surface, start, 1.0, RelaxationConfig())
+    np.testing.assert_array_equal(first.exact.surface_curve(ball).points, first.curve.points)
+    places = locate_control_points(ball, first.curve.points[first.curve.control_index], True)
+    moved = moved_along(surface, first.exact, places)
+    again = relax(surface, moved, 1.0, WARM)
+    assert len(again.exact.nodes.positions) == len(first.exact.nodes.positions)
+    assert again.iterations <= 2
+    assert apart(again.curve.points, first.curve.points) < 2e-3
