@@ -18,6 +18,7 @@ MEASUREMENTS = (
     "fuzz",
     "pretraining",
     "transfer",
+    "pretrained_start",
     "convergence",
     "ablation",
     "parameters",
