@@ -19,6 +19,7 @@ MEASUREMENTS = (
     "cuts",
     "pretraining",
     "transfer",
+    "pretrained_start",
     "convergence",
     "ablation",
     "parameters",

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from nicmm_core.design_result import is_one_curve
-from nicmm_core.level_set.losses import LossWeights
 from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
@@ -24,7 +23,6 @@ from .solving import (
     random_samples,
     run_networks,
     train,
-    typical_weights,
 )
 
 SEED = 11
@@ -88,9 +86,8 @@ class Stop:
 def run(scale: Scale) -> None:
     """Pretrain every variant alike on one mesh and predict other sets of that mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
-    weights = typical_weights(mesh, SEED)
     sets, epochs = scale.choose(100, 6, 4), scale.choose(10, 2)
-    networks, seconds = _pretrained({**MODULES, **FEATURES}, mesh, weights, sets, epochs)
+    networks, seconds = _pretrained({**MODULES, **FEATURES}, mesh, sets, epochs)
     runs = run_networks(
         {label: networks[label] for label in MODULES},
         random_samples([(name, mesh)], scale.choose(40, 2), TEST_SEED),
@@ -105,8 +102,7 @@ def run(scale: Scale) -> None:
     )
     body = (
         f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices. Every variant "
-        f"is pretrained on the same {sets} sets (seed {SEED}) × {epochs} epochs with λ_smooth = "
-        f"{weights.smooth:.2g}, the median of what designs on this mesh take; that takes "
+        f"is pretrained on the same {sets} sets (seed {SEED}) × {epochs} epochs; that takes "
         f"{min(seconds.values()):.0f} to {max(seconds.values()):.0f} s on one core, where the "
         "paper has 30 minutes (Table 3) and 2 minutes (Table 4) on an RTX 4090, out of reach "
         "here. Sets have 3–5 random vertices, shortest order.\n\n"
@@ -120,7 +116,7 @@ def run(scale: Scale) -> None:
 
 
 def _pretrained(
-    configs: Mapping[str, NetworkConfig], mesh: Mesh, weights: LossWeights, sets: int, epochs: int
+    configs: Mapping[str, NetworkConfig], mesh: Mesh, sets: int, epochs: int
 ) -> tuple[dict[str, CurveNetwork], dict[str, float]]:
     """A network for each variant, and the seconds of its training; equal variants share one."""
     networks: dict[str, CurveNetwork] = {}
@@ -130,7 +126,7 @@ def _pretrained(
         if same is not None:
             networks[label], seconds[label] = networks[same], seconds[same]
             continue
-        trained = train(mesh, weights, sets, epochs, SEED, config)
+        trained = train(mesh, sets, epochs, SEED, config)
         networks[label], seconds[label] = trained.network, trained.training_seconds
     return networks, seconds
 

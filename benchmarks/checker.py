@@ -23,6 +23,9 @@ ROUNDING = 1e-12
 POSITION_ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Of a point computed from its barycentrics, relative to the greatest coordinate."""
 
+BOX_ROOM = 1e-6
+"""Distance of boxes of weights beyond which chords have no point in common, rounded or not."""
+
 FEWEST_POINTS = {True: 3, False: 2}
 """Of the polyline of a closed and of an open curve."""
 
@@ -317,7 +320,8 @@ def _contacts_in_faces(
 ) -> tuple[int, int]:
     """Contacts of chords through the inside of a face."""
     face = np.unique(faces, axis=0, return_inverse=True)[1].ravel()
-    pairs = _pairs_within(face)
+    own = np.stack([_weights_in(vertices, weights, chords[:, e], faces) for e in (0, 1)])
+    pairs = _near(_pairs_within(face), own.min(axis=0), own.max(axis=0))
     names = pairs.T
     ends = [[_weights_in(vertices, weights, chords[n, e], faces[n]) for e in (0, 1)] for n in names]
     cross = np.ones(len(pairs), dtype=bool)
@@ -376,6 +380,13 @@ def _pairs_within(group: IntArray) -> IntArray:
     nth = np.arange(len(later)) - np.repeat(np.cumsum(rank) - rank, rank)
     earlier = later - rank[later] + nth
     return np.stack([order[earlier], order[later]], axis=1)
+
+
+def _near(pairs: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
+    """Pairs of chords whose boxes of weights meet, with room for sums that are not quite 1."""
+    one, other = pairs.T
+    meet = (low[one] <= high[other] + BOX_ROOM) & (low[other] <= high[one] + BOX_ROOM)
+    return pairs[meet.all(axis=1)]
 
 
 def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> IntArray:

@@ -24,7 +24,14 @@ from nicmm_core.surface_points import locate_control_points
 from . import collections, plots, renders, report
 from .polylines import initial_path
 from .scale import Scale
-from .solving import Sample, designed_curve, level_set, random_samples, relative_distances
+from .solving import (
+    Sample,
+    designed_curve,
+    level_set,
+    random_field,
+    random_samples,
+    relative_distances,
+)
 
 SEED = 6
 RANDOM_SEED = 16
@@ -45,11 +52,6 @@ CLEARANCE = 0.06
 
 WAVES = 3
 """Times that the wavy loop swings out to both sides."""
-
-FREQUENCY = 4.0
-"""Of the random field: standard deviation of its wave numbers, in 1/√area."""
-
-HARMONICS = 20
 
 PICTURED = 2
 
@@ -202,7 +204,7 @@ def _without_loops(
         UNSIGNED: np.abs(
             heat_distance(problem.elements, problem.loop.control_vertices, problem.edge_length**2)
         ),
-        RANDOM: _random_field(problem),
+        RANDOM: random_field(problem, RANDOM_SEED),
     }
     outcomes = {}
     for label, field in fields.items():
@@ -216,17 +218,6 @@ def _without_loops(
         distance = relative_distances(sample, curves[0], reference) if one else None
         outcomes[label] = WithoutLoop(len(curves), one, distance)
     return outcomes
-
-
-def _random_field(problem: Problem) -> FloatArray:
-    """A sum of waves in space with random directions, lengths and phases, of mean slope 1."""
-    generator = np.random.default_rng(RANDOM_SEED)
-    positions = problem.features[:, :3]
-    waves = generator.normal(scale=FREQUENCY, size=(3, HARMONICS))
-    phases = generator.uniform(0.0, 2 * np.pi, HARMONICS)
-    field = np.sin(positions @ waves + phases).sum(axis=1)
-    slope = np.linalg.norm((problem.elements.gradient @ field).reshape(3, -1), axis=0)
-    return field / slope.mean()
 
 
 def _pairs(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,12 +17,13 @@ from nicmm_core.curve import SurfaceCurve
 from nicmm_core.level_set.contour import extract_curves
 from nicmm_core.level_set.losses import LossWeights, balanced
 from nicmm_core.level_set.problem import Problem, build_problem
-from nicmm_core.level_set.topology import keep_topology
+from nicmm_core.level_set.zero_set import zero_set
 from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.path.band_refinement import PIECES
 from nicmm_core.surface_points import locate_control_points
 
 from . import plots, report
@@ -30,8 +31,10 @@ from .measures import diagonal, distances
 from .samples import random_sets
 from .scale import Scale
 
-TYPICAL_SETS = 9
-"""Sets whose middle λ_smooth is taken for pretraining."""
+FREQUENCY = 4.0
+"""Of a random field: standard deviation of its wave numbers, in 1/√area."""
+
+HARMONICS = 20
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,18 @@ class Sample:
 
 
 def random_samples(
-    meshes: Iterable[tuple[str, Mesh]], per_mesh: int, seed: int
+    meshes: Iterable[tuple[str, Mesh]],
+    per_mesh: int,
+    seed: int,
+    order: str = "shortest",
+    closed: bool = True,
+    pieces: int = PIECES,
 ) -> Iterator[Sample]:
-    """Problems of `random_sets`; a set without a simple loop is named and skipped."""
+    """Problems of `random_sets`; a set without a simple path is named and skipped."""
     for name, mesh, points in random_sets(meshes, per_mesh, seed):
+        located = locate_control_points(mesh, points, closed)
         try:
-            problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
+            problem = build_problem(mesh, located, order, closed=closed, pieces=pieces)
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
@@ -97,7 +106,6 @@ class Trained:
 
 def train(
     mesh: Mesh,
-    weights: LossWeights,
     sets: int,
     epochs: int,
     seed: int,
@@ -113,8 +121,10 @@ def train(
 
     with TemporaryDirectory() as folder:
         output = Path(folder) / "weights.npz"
-        config = PretrainingConfig(sets=sets, epochs=epochs, seed=seed)
-        losses = pretrain([mesh], output, network_config, config, weights, watch)
+        config = PretrainingConfig(
+            sets=sets, open_share=0.0, given_share=0.0, epochs=epochs, seed=seed
+        )
+        losses = pretrain([mesh], output, network_config, config, progress=watch)
         finished = time.perf_counter()
         network = load_network(output)
     print(
@@ -123,15 +133,6 @@ def train(
         flush=True,
     )
     return Trained(network, losses, prepared - started, finished - prepared)
-
-
-def typical_weights(mesh: Mesh, seed: int) -> LossWeights:
-    """The weights with the middle one of the λ_smooth that designs on this mesh take.
-
-    Prediction lowers λ_smooth set by set; pretraining has one value for all of its sets.
-    """
-    samples = random_samples([("typical λ_smooth", mesh)], TYPICAL_SETS, seed)
-    return replace(LossWeights(), smooth=float(np.median([s.weights.smooth for s in samples])))
 
 
 def without_early_stop(iterations: int) -> PredictionConfig:
@@ -209,20 +210,27 @@ def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
         problem.working,
         problem.smoother.interpolating(field),
         problem.loop.control_vertices,
+        problem.bundle,
     )
 
 
 def designed_curve(sample: Sample, field: FloatArray) -> tuple[SurfaceCurve, bool]:
-    """The curve that a design makes of φ, and whether it was one loop by itself."""
-    problem = sample.problem
-    kept, breaking = keep_topology(
-        problem.working,
-        problem.loop,
-        problem.initial_distance,
-        problem.smoother.interpolating(field),
-    )
-    curves = extract_curves(sample.mesh, problem.working, kept, problem.loop.control_vertices)
-    return curves[0], not breaking
+    """The curve that a design makes of φ, and whether it was one curve by itself."""
+    zeros = zero_set(sample.mesh, sample.problem, field)
+    return zeros.curves[0], not zeros.breaking_vertices
+
+
+def random_field(problem: Problem, seed: int) -> FloatArray:
+    """A sum of waves in space with random directions, lengths and phases, of mean slope 1."""
+    generator = np.random.default_rng(seed)
+    positions = problem.features[:, :3]
+    waves = generator.normal(scale=FREQUENCY, size=(3, HARMONICS))
+    phases = generator.uniform(0.0, 2 * np.pi, HARMONICS)
+    field = np.sin(positions @ waves + phases).sum(axis=1)
+    if problem.bundle is not None:
+        field = field * problem.bundle.side
+    slope = np.linalg.norm((problem.elements.gradient @ field).reshape(3, -1), axis=0)
+    return field / slope.mean()
 
 
 def relative_distances(

@@ -7,6 +7,8 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
+
 from .curve import SurfaceCurve
 from .errors import ArgumentError, MeshError
 from .mesh import Mesh
@@ -50,8 +52,10 @@ def read_mesh(path: str | Path) -> Mesh:
     except OSError as error:
         raise MeshError(f"{path} cannot be opened ({error}); check who may read it") from error
     try:
-        polygons = _READERS[path.suffix.lower()](data)
-        triangles = polygons.triangles()
+        # Positions that are no numbers are refused below, without a warning before.
+        with np.errstate(invalid="ignore", over="ignore"):
+            polygons = _READERS[path.suffix.lower()](data)
+            triangles = polygons.triangles()
     except FormatError as error:
         raise MeshError(
             f"{path} cannot be read as {path.suffix[1:].upper()} ({error}); export it again"

@@ -14,6 +14,7 @@ from .array_types import BoolArray, FloatArray
 from .errors import UnreachableError
 from .level_set.redistancing import build_distance_surface, spread
 from .mesh import Mesh
+from .path.leg_graph import fans
 from .request import Request
 from .sound_copy import SoundCopy
 
@@ -45,8 +46,9 @@ def free_surface(mesh: Mesh, obstacles: FloatArray, clearance: float) -> SoundCo
             "obstacles leave nothing of the surface; paint less with weight 1, or use a smaller "
             "clearance"
         )
-    vertex, corners = np.unique(mesh.faces[face], return_inverse=True)
-    return SoundCopy(mesh, Mesh(mesh.vertices[vertex], corners.reshape(-1, 3)), vertex, face)
+    # Parts that meet in nothing but a vertex come apart there: no curve passes between them.
+    corners, vertex = fans(Mesh(mesh.vertices, mesh.faces[face]))
+    return SoundCopy(mesh, Mesh(mesh.vertices[vertex], corners), vertex, face)
 
 
 def check_reachable(free: SoundCopy, request: Request) -> None:

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 from ..array_types import Array
 
-NORMAL_CHANNELS, INDICATOR_CHANNEL, DISTANCE_CHANNEL = slice(3, 6), 6, 7
-"""Places of N, φ_p and φ₀ among the input channels."""
+POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)
+INDICATOR_CHANNEL, DISTANCE_CHANNEL = 6, 7
+"""Places of P, N, φ_p and φ₀ among the input channels."""
 
 
 @dataclass(frozen=True)

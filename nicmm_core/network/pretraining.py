@@ -1,4 +1,9 @@
-"""Stage 1 (section 4.1): train one network on random control points of one or more meshes."""
+"""Stage 1 (section 4.1): train one network on random control points of one or more meshes.
+
+Every set has the λ_smooth that a design takes for it (`losses.balanced`): with one value for all,
+the least energy of most sets would be a flat φ. In every epoch every set is turned at random, since
+a few bodies stand in few ways about their axes.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +18,17 @@ import numpy as np
 import torch
 
 from ..errors import ArgumentError, UnreachableError
-from ..level_set.losses import LossWeights, loss_terms, total_loss
+from ..level_set.losses import EnergySurface, LossWeights, balanced, loss_terms, total_loss
 from ..level_set.problem import Problem, build_problem
 from ..mesh import Mesh
 from ..surface_points import locate_control_points
-from .forward_pass import NetworkConfig
+from .forward_pass import (
+    DISTANCE_CHANNEL,
+    NORMAL_CHANNELS,
+    POSITION_CHANNELS,
+    NetworkConfig,
+    NetworkInput,
+)
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .trainable_network import CurveNetwork, network_weights
@@ -37,6 +48,12 @@ class PretrainingConfig:
         Sets of control points in all, spread evenly over the meshes.
     fewest_points, most_points : int
         Points of a set.
+    open_share : float
+        Share of sets that are asked for as open curves.
+    given_share : float
+        Share of sets whose closed curve visits the points in the order drawn, not the shortest.
+    batch : int
+        Sets to a step.
     epochs : int
         Passes over all sets.
     learning_rate : float
@@ -47,6 +64,9 @@ class PretrainingConfig:
     sets: int = 1000
     fewest_points: int = 3
     most_points: int = 5
+    open_share: float = 0.35
+    given_share: float = 0.15
+    batch: int = 4
     epochs: int = 10
     learning_rate: float = 0.01
     seed: int = 0
@@ -72,7 +92,8 @@ def pretrain(
     output : path
         Where the weights go, a ``.npz`` archive.
     network_config, config, weights : optional
-        Defaults are those of the paper and of this package.
+        Defaults are those of the paper and of this package. λ_smooth is lowered set by set, as for
+        a design.
     progress : callable, optional
         Called with the name of the stage, steps done, steps in all and the mean loss so far.
 
@@ -91,9 +112,15 @@ def pretrain(
     report = progress or (lambda stage, done, total, loss: None)
     if not meshes:
         raise ArgumentError("meshes is empty; name at least one mesh to train on")
-    for name in ("sets", "epochs"):
+    for name in ("sets", "batch", "epochs"):
         if getattr(config, name) < 1:
             raise ArgumentError(f"{name} is {getattr(config, name)}; at least 1 is needed")
+    shares = (config.open_share, config.given_share)
+    if min(shares) < 0.0 or sum(shares) > 1.0:
+        raise ArgumentError(
+            f"open_share and given_share are {shares[0]} and {shares[1]}; they are shares of all "
+            "sets, so neither may be negative nor both together more than 1"
+        )
     if not Path(output).resolve().parent.is_dir():
         raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
@@ -106,24 +133,34 @@ def pretrain(
 
     # The tensors of a set on 4,000 vertices take about 2 MB, so all of them stay on the device.
     prepared = [
-        (surface_tensors(problem, device), network_input(problem, device))
+        _Prepared(
+            surface_tensors(problem, device),
+            network_input(problem, device),
+            balanced(weights, problem),
+        )
         for problem in _random_problems(meshes, config, report)
     ]
     for epoch in range(len(losses), config.epochs):
-        order = np.random.default_rng([config.seed, epoch]).permutation(len(prepared))
+        generator = np.random.default_rng([config.seed, epoch])
+        order = generator.permutation(len(prepared))
         total = 0.0
         for group in optimiser.param_groups:
             group["lr"] = _learning_rate(config, epoch)
-        for step, index in enumerate(order):
-            surface, given = prepared[index]
+        done = 0
+        for first in range(0, len(order), config.batch):
+            chosen = order[first : first + config.batch]
             optimiser.zero_grad()
-            loss = total_loss(loss_terms(surface, network(given)), weights)
-            loss.backward()
+            for index in chosen:
+                one = prepared[index]
+                phi = network(turned(one.given, generator))
+                loss = total_loss(loss_terms(one.surface, phi), one.weights)
+                (loss / len(chosen)).backward()
+                total += loss.item()
+                done += 1
+                all_done = epoch * len(order) + done
+                report("training", all_done, config.epochs * len(order), total / done)
             torch.nn.utils.clip_grad_norm_(network.parameters(), GRADIENT_LIMIT)
             optimiser.step()
-            total += loss.item()
-            done = epoch * len(order) + step + 1
-            report("training", done, config.epochs * len(order), total / (step + 1))
         losses.append(total / len(order))
         state = {
             "configuration": configuration,
@@ -138,6 +175,29 @@ def pretrain(
     save_weights(output, network_weights(network))
     checkpoint.unlink(missing_ok=True)
     return losses
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """A set with its tensors on the device."""
+
+    surface: EnergySurface
+    given: NetworkInput
+    weights: LossWeights
+
+
+def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
+    """The same set with its axes exchanged or reversed at random, and perhaps the sign of φ₀.
+
+    The energy of Eq. 2 knows neither axes nor the sign of φ.
+    """
+    axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
+    side = float(generator.choice([-1.0, 1.0]))
+    features = given.features.clone()
+    for channels in (POSITION_CHANNELS, NORMAL_CHANNELS):
+        features[:, channels] = given.features[:, channels][:, axes] * features.new_tensor(signs)
+    features[:, DISTANCE_CHANNEL] *= side
+    return given._replace(features=features, initial_distance=side * given.initial_distance)
 
 
 def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
@@ -168,6 +228,13 @@ def _resume(
     return list(state["losses"])
 
 
+def _kind(drawn: float, config: PretrainingConfig) -> tuple[bool, str]:
+    """Whether a set's curve is closed, and in which order it visits the points."""
+    if drawn < config.open_share:
+        return False, "shortest"
+    return True, "given" if drawn < config.open_share + config.given_share else "shortest"
+
+
 def _fingerprint(meshes: Sequence[Mesh]) -> str:
     digest = hashlib.sha256()
     for mesh in meshes:
@@ -181,7 +248,7 @@ def _random_problems(
     config: PretrainingConfig,
     report: Callable[[str, int, int, float], None],
 ) -> Iterator[Problem]:
-    """Random sets of vertices, as many on each mesh; sets without a loop are redrawn."""
+    """Random sets of vertices, as many on each mesh; sets without a simple path are redrawn."""
     done = 0
     per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
     for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
@@ -199,9 +266,10 @@ def _random_problems(
                 break
             count = generator.integers(config.fewest_points, config.most_points + 1)
             chosen = generator.choice(vertices, size=count, replace=False)
-            points = locate_control_points(mesh, chosen, closed=True)
+            closed, order = _kind(generator.random(), config)
+            points = locate_control_points(mesh, chosen, closed)
             try:
-                problem = build_problem(mesh, points, order="shortest")
+                problem = build_problem(mesh, points, order, closed=closed)
             except UnreachableError:
                 continue
             found += 1
@@ -210,7 +278,7 @@ def _random_problems(
             yield problem
         if found < wanted:
             raise ArgumentError(
-                f"meshes[{number}]: only {found} of {wanted} random sets of points have a loop "
+                f"meshes[{number}]: only {found} of {wanted} random sets of points have a path "
                 "through them; leave the mesh out or use a finer one"
             )
 

@@ -93,9 +93,22 @@ class Patch:
 
 
 def pinched_vertices(mesh: Mesh) -> BoolArray:
-    """Vertices whose faces form more than one fan, shape (V,).
+    """Vertices whose faces form more than one fan, shape (V,)."""
+    _, vertex_of_fan = fans(mesh)
+    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1
+
+
+def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
+    """Fans of faces about the vertices.
 
     Faces belong to one fan of a vertex when edges at that vertex lead from one to the other.
+
+    Returns
+    -------
+    (F, 3) int array
+        The fan of each corner.
+    (number of fans,) int array
+        The vertex of each fan.
     """
     faces = mesh.faces
     n_vertices = len(mesh.vertices)
@@ -112,4 +125,4 @@ def pinched_vertices(mesh: Mesh) -> BoolArray:
     n_fans, fan = csgraph.connected_components(graph, directed=False)
     vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
     vertex_of_fan[fan] = faces.ravel()
-    return np.bincount(vertex_of_fan, minlength=n_vertices) > 1
+    return fan.reshape(-1, 3), vertex_of_fan

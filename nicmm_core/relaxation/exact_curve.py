@@ -159,19 +159,16 @@ def straight_ways(
     return _drawn(mesh, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
 
 
-def redrawn(
-    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, simple: bool
-) -> tuple[ExactCurve, BoolArray]:
-    """The curve through nodes at new places where it can be drawn, the old one elsewhere.
+def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[ExactCurve, BoolArray]:
+    """The curve through nodes at new places where that leaves it simple, the old one elsewhere.
 
     Parameters
     ----------
     surface : CurveSurface
     curve : ExactCurve
+        Simple.
     nodes : Nodes
         n nodes, the control points where they are.
-    simple : bool
-        Whether the curve, which is simple, has to stay simple.
 
     Returns
     -------
@@ -190,7 +187,7 @@ def redrawn(
             )
             nodes = nodes_at(surface, places, curve.closed)
         polyline, node_place, bad = _drawn(surface.mesh, curve, nodes, kept)
-        if simple and not bad.any():
+        if not bad.any():
             pairs = crossing_segments(surface.mesh, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
         if not bad.any():

@@ -4,17 +4,17 @@ A level set is as fine as its mesh, and two strands of it a few edges apart hold
 settles is where the curve runs. From there nodes move on the surface until the energy of Eq. 6
 and 7, taken along the curve, rests (`elastic_energy`).
 
-Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. On the way
-the curve may pass through itself, which only its end must not: strands often have to swap. When
-they do not part again, the relaxation is done once more with strands that keep apart, where every
-state in between is a simple curve (`exact_curve`). The same goes for nodes that are too far
-apart for a thin limb, so that no straight way over the surface joins them: a level with more nodes
-takes over from the start.
+Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. The curve is
+drawn after every step, and strands push each other: a node whose stretch could not be drawn, or
+would cross another, stays for that step. So every state in between is a simple curve.
+
+A curve that is near its rest already, as one whose control point was dragged, may do without that:
+its nodes move freely, and it is drawn once they rest. If it then crosses itself, it is done again
+from the start with a simple curve throughout.
 """
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -49,9 +49,9 @@ class RelaxationConfig:
     longest_move : float
         Farthest that a node moves at once.
     damping : float
-        At the start of a level, relative to the greatest diagonal entry. Far below 1, because that
-        measures the stiffness of a zigzag from node to node, against which a slow swing of the
-        whole curve has almost none.
+        At the start of a level of 128 nodes, relative to the greatest diagonal entry. Far below 1,
+        because that measures the stiffness of a zigzag from node to node, against which a slow
+        swing of the whole curve has almost none: the more nodes, the less, by the third power.
     most_damping : float
         Where the search for a step ends.
     least_decrease : float
@@ -62,17 +62,23 @@ class RelaxationConfig:
         Ratio of the longest to the shortest step of a leg at which nodes are spaced anew.
     iterations : int
         The cap, over all levels of one attempt.
+    drawn_at_rest : bool
+        Whether to try first without drawing the curve after every step.
     """
 
-    levels: tuple[int, ...] = (64, 128, 256, 512)
+    levels: tuple[int, ...] = (128, 512)
     longest_move: float = 4.0
     damping: float = 1e-6
     most_damping: float = 1e2
-    least_decrease: float = 1e-4
-    least_decrease_before: float = 1e-2
+    least_decrease: float = 3e-4
+    least_decrease_before: float = 3e-2
     stretch: float = 1.6
     iterations: int = 100
+    drawn_at_rest: bool = False
 
+
+DAMPING_NODES = 128
+"""Number of nodes that the damping is given for."""
 
 DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
@@ -151,20 +157,11 @@ def relax(
         first, start = start, start.surface_curve(surface.mesh)
     else:
         first = exact_curve(surface, start, config.levels[0])
-    # Each level may lose a way between its nodes; the last one holds what it would lose.
-    attempts = [(config.levels[place:], _Drawing.END) for place in range(len(config.levels) - 1)]
-    attempts = attempts or [(config.levels, _Drawing.END)]
-    attempts.append((config.levels[-1:], _Drawing.HOLD))
-    for levels, drawing in attempts:
-        curve = relaxation.run(first, levels, drawing)
-        if curve is not None:
+    for simple in (False, True) if config.drawn_at_rest else (True,):
+        curve = relaxation.run(first, simple)
+        if relaxation.stopped == "cancelled" or _is_simple(surface, curve):
             break
-    simple = curve is not None and is_simple(surface, curve)
-    if not simple and relaxation.stopped != "cancelled":
-        # Strands that cross here would do so with more nodes too.
-        curve = relaxation.run(first, config.levels[1:] or config.levels, _Drawing.SIMPLE)
-        simple = curve is not None and is_simple(surface, curve)
-    if curve is not None and simple:
+    if curve is not None and _is_simple(surface, curve):
         result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
     else:
         curve, result = first, start
@@ -180,20 +177,16 @@ def relax(
     )
 
 
+def _is_simple(surface: CurveSurface, curve: ExactCurve | None) -> bool:
+    return curve is not None and is_simple(surface, curve)
+
+
 def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
     """Greatest ratio of the longest to the shortest step of one leg."""
     lengths = nodes.lengths
     first = control_nodes[control_nodes < len(lengths)]
     longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
     return float((longest / np.maximum(shortest, tolerances.TINY)).max())
-
-
-class _Drawing(enum.Enum):
-    """What happens where the curve cannot be drawn through nodes that have moved."""
-
-    END = "the attempt ends"
-    HOLD = "those nodes stay"
-    SIMPLE = "those nodes stay, and so do nodes whose strands would cross"
 
 
 @dataclass(frozen=True)
@@ -208,7 +201,7 @@ class _Step:
 
 
 class _LostError(Exception):
-    """The curve cannot be drawn with so few nodes."""
+    """The curve cannot be drawn through its nodes."""
 
 
 class _Relaxation:
@@ -224,23 +217,18 @@ class _Relaxation:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
         self.iterations, self.stopped = 0, "converged"
 
-    def run(
-        self, curve: ExactCurve, levels: tuple[int, ...], drawing: _Drawing
-    ) -> ExactCurve | None:
-        """Bring a curve to rest level by level; None where the attempt ended early."""
-        last_iteration = self.iterations + self.config.iterations
+    def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
+        """Bring a curve to rest level by level; None where it could not be drawn there."""
+        config = self.config
+        last_iteration = self.iterations + config.iterations
         self.stopped = "converged"
         try:
-            for level in levels:
-                least = self.config.least_decrease_before
-                if level == levels[-1]:
-                    least = self.config.least_decrease
-                curve = self._level(curve, level, least, last_iteration, drawing)
+            for level in config.levels:
+                last = level == config.levels[-1]
+                least = config.least_decrease if last else config.least_decrease_before
+                curve = self._level(curve, level, least, last_iteration, simple)
                 if self.stopped != "converged":
                     break
-                if drawing is _Drawing.END and level != levels[-1]:
-                    if not is_simple(self.surface, curve):
-                        break  # strands that cross here would do so with more nodes too
         except _LostError:
             return None
         return curve
@@ -251,17 +239,17 @@ class _Relaxation:
         level: int,
         least: float,
         last_iteration: int,
-        drawing: _Drawing,
+        simple: bool,
     ) -> ExactCurve:
         """Steps with one number of nodes until the energy falls by less than the least share."""
-        config, damping = self.config, self.config.damping
-        curve = self._respaced(curve, level, drawing)
+        config, least_damping = self.config, self._least_damping(level)
+        damping = least_damping
+        curve = self._respaced(curve, level, simple)
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
         releases = 0
         while True:
-            apart = drawing is _Drawing.SIMPLE
-            weights = balance(self.surface, nodes, self.smoothness, apart)
+            weights = balance(self.surface, nodes, self.smoothness, apart=simple)
             before = elastic_energy(nodes, weights)
             system = elastic_system(self.surface, nodes, weights)
             scale = max(bending_energy(nodes), STRAIGHT * before)
@@ -271,7 +259,7 @@ class _Relaxation:
                     self.stopped = "cap"
                     break
                 self.iterations += 1
-                step = self._step(curve, nodes, held, system, weights, damping, drawing)
+                step = self._step(curve, nodes, held, system, weights, damping, simple)
             if step is not None:
                 curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
                 done = 1.0 - (last_iteration - self.iterations) / config.iterations
@@ -283,21 +271,25 @@ class _Relaxation:
                 if releases == RELEASES or not held.any():
                     break
                 # At rest with nodes that once could not follow: perhaps they can now.
-                releases, damping = releases + 1, config.damping
+                releases, damping = releases + 1, least_damping
                 held = np.zeros(len(held), dtype=bool)
             moved = step is not None and step.farthest > SMALL_MOVE
             if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
-                curve = self._respaced(self._drawn(curve, nodes), level, drawing)
+                curve = self._respaced(self._drawn(curve, nodes), level, simple)
                 nodes = curve.nodes
                 held = np.zeros(len(nodes.positions), dtype=bool)
         return self._drawn(curve, nodes)
+
+    def _least_damping(self, n_nodes: int) -> float:
+        return self.config.damping * (DAMPING_NODES / n_nodes) ** 3
 
     def _may_fall(self, curve: ExactCurve, system: ElasticSystem, held: BoolArray) -> float:
         """By how much the least damped step is going to lower the energy."""
         free = self._free(curve, held)
         if not free.any():
             return 0.0
-        return predicted_fall(system, damped_step(system, free, self.config.damping))
+        damping = self._least_damping(len(free))
+        return predicted_fall(system, damped_step(system, free, damping))
 
     def _free(self, curve: ExactCurve, held: BoolArray) -> BoolArray:
         free = ~held
@@ -312,7 +304,7 @@ class _Relaxation:
         system: ElasticSystem,
         weights: Balance,
         damping: float,
-        drawing: _Drawing,
+        simple: bool,
     ) -> _Step | None:
         """The least damped step that lowers the energy; None when there is none."""
         config, surface = self.config, self.surface
@@ -329,8 +321,8 @@ class _Relaxation:
                 move *= config.longest_move / farthest
             moved, stayed = sideways(surface, nodes, move)
             lowered = elastic_energy(moved, weights) < energy
-            if lowered and drawing is not _Drawing.END:
-                drawn_curve, kept = redrawn(surface, curve, moved, drawing is _Drawing.SIMPLE)
+            if lowered and simple:
+                drawn_curve, kept = redrawn(surface, curve, moved)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
                     tries += 1
@@ -340,7 +332,7 @@ class _Relaxation:
                 if lowered:
                     curve = drawn_curve
             if lowered:
-                damping = max(damping / DAMPING_FACTOR, config.damping)
+                damping = max(damping / DAMPING_FACTOR, self._least_damping(len(free)))
                 return _Step(curve, moved, stayed, damping, min(farthest, config.longest_move))
             damping *= DAMPING_FACTOR
         return None
@@ -352,12 +344,12 @@ class _Relaxation:
             raise _LostError
         return changed
 
-    def _respaced(self, curve: ExactCurve, level: int, drawing: _Drawing) -> ExactCurve:
+    def _respaced(self, curve: ExactCurve, level: int, simple: bool) -> ExactCurve:
         """Nodes at about equal distances; where they would make strands touch, those it has."""
         alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
         if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
             return curve
         changed = respaced(self.surface, curve, level)
-        if drawing is _Drawing.SIMPLE and not is_simple(self.surface, changed):
+        if simple and not is_simple(self.surface, changed):
             return curve
         return changed

@@ -15,11 +15,8 @@ from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig
 
-WARM = RelaxationConfig(levels=(512,), damping=1e-8, least_decrease=1e-3)
-"""Relaxation from there: the curve is fine already and near its rest.
-
-So many nodes swing so softly in long waves that the damping of a start from afar would hold them.
-"""
+WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
+"""Relaxation from there: the curve is fine already and near its rest."""
 
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""

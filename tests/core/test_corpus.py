@@ -7,11 +7,18 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.files import read_mesh
+from benchmarks import corpus
+from nicmm_core.files import MESH_FORMATS, read_mesh
 from tests.core.checks import assert_valid_design
 
 CORPUS = Path(__file__).parents[3] / "shared" / "meshes" / "shrec16"
 COUNT = 6
+
+LARGEST_FILE = 150_000
+"""Bytes; larger ones take long."""
+
+SHARE = 5
+"""Every how many files."""
 
 
 def some_files():
@@ -34,3 +41,22 @@ def test_subdivided_scan_gives_a_valid_curve_or_a_typed_error(path):
         assert "control_points" in str(error)
         return
     assert_valid_design(mesh, design)
+
+
+def defective_files():
+    """A few small files of the collections of meshes with defects, each with another request."""
+    files = [
+        (folder, path)
+        for folder in ("nasty", "thingi10k")
+        for path in sorted((CORPUS.parent / folder).glob("*.*"))
+        if path.suffix in MESH_FORMATS and path.stat().st_size < LARGEST_FILE
+    ]
+    return files[::SHARE]
+
+
+@pytest.mark.skipif(not defective_files(), reason="the meshes are not beside this folder")
+@pytest.mark.parametrize(("folder", "path"), defective_files(), ids=lambda part: Path(part).stem)
+def test_mesh_with_defects_gives_a_good_curve_or_the_error_that_is_due(folder, path):
+    request = len(path.stem) % len(corpus.REQUESTS)
+    outcome = corpus.outcome(corpus.Item(folder, path.name, path, request))
+    assert outcome.verdict in (corpus.GOOD, corpus.DUE), outcome.words

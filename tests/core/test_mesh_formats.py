@@ -1,6 +1,7 @@
 """Mesh files by hand: what readers understand, and that nothing else gets past them."""
 
 import struct
+import warnings
 
 import numpy as np
 import pytest
@@ -186,6 +187,7 @@ REFUSED = {
     "none.stl": b"\0" * 84,
     "huge.stl": b"\0" * 80 + struct.pack("<I", HUGE) + b"\0" * 50,
     "nan.stl": b"\0" * 80 + struct.pack("<I12fH", 1, *[np.nan] * 12, 0),
+    "signalling nan.stl": b"\0" * 80 + struct.pack("<I", 1) + b"\x00\x00\xa0\x7f" * 12 + b"\0\0",
     "cut.stl": "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
     "quad.stl": "solid x\n" + "vertex 0 0 0\n" * 4 + "endfacet\n",
     "words.stl": "solid x\n" + "vertex 0 0 zero\n" * 3 + "endfacet\n",
@@ -194,7 +196,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_refused_with_the_name_of_the_file(read, name, capfd):
-    with pytest.raises(nicmm.MeshError) as refusal:
+    with warnings.catch_warnings(), pytest.raises(nicmm.MeshError) as refusal:
+        warnings.simplefilter("error")
         read(name, REFUSED[name])
     assert name in str(refusal.value)
     assert len(str(refusal.value)) < 600

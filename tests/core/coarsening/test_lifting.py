@@ -30,7 +30,7 @@ def rough_sphere():
     generator = np.random.default_rng(4)
     fine = shapes.sphere(5)
     return nicmm.Mesh(
-        fine.vertices + generator.normal(scale=0.012, size=fine.vertices.shape), fine.faces
+        fine.vertices + generator.normal(scale=0.008, size=fine.vertices.shape), fine.faces
     )
 
 

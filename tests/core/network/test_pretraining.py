@@ -1,17 +1,27 @@
 """Stage 1 at toy size: it learns, it is seeded, and an interruption changes nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.pretraining import PretrainingConfig, pretrain
+from nicmm_core.level_set.losses import (
+    LossWeights,
+    balanced,
+    energy_surface,
+    loss_terms,
+    total_loss,
+)
+from nicmm_core.network import pretraining
+from nicmm_core.network.forward_pass import NetworkConfig, NetworkInput
+from nicmm_core.network.pretraining import PretrainingConfig, pretrain, turned
 from nicmm_core.network.weights_file import load_weights
 
 NETWORK = NetworkConfig(width=12, depth=1, gate_rank=2)
-SETTINGS = PretrainingConfig(sets=4, epochs=3, seed=7)
+SETTINGS = PretrainingConfig(sets=4, batch=2, epochs=3, seed=7)
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +51,10 @@ def finished(meshes, tmp_path_factory):
 
 
 def test_loss_falls(meshes, tmp_path):
-    losses = train(meshes, tmp_path / "weights.npz", PretrainingConfig(sets=4, epochs=6, seed=7))
-    assert len(losses) == 6
+    losses = train(
+        meshes, tmp_path / "weights.npz", PretrainingConfig(sets=4, batch=1, epochs=8, seed=7)
+    )
+    assert len(losses) == 8
     assert np.isfinite(losses).all()
     assert losses[-1] < 0.97 * losses[0], losses
 
@@ -67,7 +79,7 @@ def test_same_seed_gives_identical_weights(meshes, finished, tmp_path):
 
 
 def test_other_seed_gives_other_weights(meshes, finished, tmp_path):
-    train(meshes, tmp_path / "other.npz", PretrainingConfig(sets=4, epochs=3, seed=8))
+    train(meshes, tmp_path / "other.npz", PretrainingConfig(sets=4, batch=2, epochs=3, seed=8))
     other, first = weights_in(tmp_path / "other.npz"), weights_in(finished[0])
     assert not np.array_equal(other["stem.weight"], first["stem.weight"])
 
@@ -111,8 +123,9 @@ def test_checkpoint_of_other_settings_is_refused(meshes, tmp_path):
     with pytest.raises(StopError):
         train(meshes, path, progress=interrupt_in_epoch(2))
     for change in (
-        {"settings": PretrainingConfig(sets=4, epochs=5, seed=7)},
-        {"settings": PretrainingConfig(sets=4, epochs=3, seed=8)},
+        {"settings": replace(SETTINGS, epochs=5)},
+        {"settings": replace(SETTINGS, seed=8)},
+        {"settings": replace(SETTINGS, batch=4)},
         {"network": NetworkConfig(width=12, depth=1, gate_rank=2, attention=False)},
     ):
         with pytest.raises(nicmm.ArgumentError, match="settings"):
@@ -164,3 +177,111 @@ def test_folder_that_does_not_exist_is_refused_before_the_training(meshes, tmp_p
     with pytest.raises(nicmm.NicmmError):
         train(meshes, tmp_path / "nowhere" / "weights.npz", progress=lambda *c: steps.append(c))
     assert not [stage for stage, *_ in steps if stage == "training"]
+
+
+@pytest.fixture
+def prepared(monkeypatch):
+    """Collects what sets a training asks for: whether closed, in which order, and the problem."""
+    asked = []
+    build = pretraining.build_problem
+
+    def recorded(mesh, points, order, *, closed):
+        problem = build(mesh, points, order, closed=closed)
+        asked.append((closed, order, problem))
+        return problem
+
+    monkeypatch.setattr(pretraining, "build_problem", recorded)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("open_share", "given_share", "expected"),
+    [
+        (1.0, 0.0, {(False, "shortest")}),
+        (0.0, 1.0, {(True, "given")}),
+        (0.0, 0.0, {(True, "shortest")}),
+    ],
+)
+def test_sets_are_of_the_kinds_asked_for(
+    meshes, tmp_path, prepared, open_share, given_share, expected
+):
+    settings = replace(SETTINGS, epochs=1, open_share=open_share, given_share=given_share)
+    train(meshes, tmp_path / "weights.npz", settings)
+    assert {(closed, order) for closed, order, _ in prepared} == expected
+
+
+def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
+    settings = replace(SETTINGS, sets=20, epochs=1, open_share=0.4, given_share=0.3)
+    train(meshes, tmp_path / "weights.npz", settings)
+    open_curves = sum(not closed for closed, _, _ in prepared)
+    given = sum(order == "given" for _, order, _ in prepared)
+    assert 3 <= open_curves <= 13
+    assert 2 <= given <= 11
+
+
+def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared):
+    """An untrained network returns φ₀, or -φ₀ where a set is turned: the same energy."""
+    settings = replace(SETTINGS, learning_rate=0.0)
+    losses = train(meshes, tmp_path / "weights.npz", settings)
+    expected = [
+        total_loss(
+            loss_terms(energy_surface(problem), problem.initial_distance),
+            balanced(LossWeights(), problem),
+        )
+        for _, _, problem in prepared
+    ]
+    np.testing.assert_allclose(losses, np.mean(expected), rtol=1e-4)
+
+
+def test_loss_weights_are_lowered_set_by_set(prepared, meshes, tmp_path):
+    settings = replace(SETTINGS, epochs=1, learning_rate=0.0)
+    stiff = LossWeights(smooth=100.0)
+    (loss,) = pretrain(meshes, tmp_path / "weights.npz", NETWORK, settings, stiff)
+    flat = np.mean(
+        [
+            total_loss(loss_terms(energy_surface(p), p.initial_distance), stiff)
+            for _, _, p in prepared
+        ]
+    )
+    assert loss < 0.01 * flat
+
+
+@pytest.mark.parametrize("channels", [8, 9])
+def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
+    generator = np.random.default_rng(3)
+    features = torch.as_tensor(generator.normal(size=(20, channels)), dtype=torch.float32)
+    given = NetworkInput(features, features[:, 7].clone(), None, None, None)
+    before = features.clone()
+    ways = set()
+    for _ in range(1000):
+        other = turned(given, generator)
+        axes = np.zeros((3, 3))
+        for new in range(3):
+            for old in range(3):
+                if torch.equal(other.features[:, new].abs(), before[:, old].abs()):
+                    axes[new, old] = torch.sign(other.features[0, new] * before[0, old])
+        side = torch.sign(other.initial_distance[0] * before[0, 7]).item()
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3))
+        matrix = torch.as_tensor(axes.T, dtype=torch.float32)
+        torch.testing.assert_close(other.features[:, :3], before[:, :3] @ matrix)
+        torch.testing.assert_close(other.features[:, 3:6], before[:, 3:6] @ matrix)
+        torch.testing.assert_close(other.features[:, 7], other.initial_distance)
+        torch.testing.assert_close(other.initial_distance, side * before[:, 7])
+        assert torch.equal(other.features[:, 6], before[:, 6])
+        assert torch.equal(other.features[:, 8:], before[:, 8:])
+        ways.add((*axes.ravel().tolist(), side))
+    assert len(ways) == 2 * 48
+    assert torch.equal(features, before)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"batch": 0}, "batch"),
+        ({"open_share": -0.1}, "open_share"),
+        ({"open_share": 0.6, "given_share": 0.6}, "given_share"),
+    ],
+)
+def test_impossible_settings_are_refused_by_name(meshes, tmp_path, change, named):
+    with pytest.raises(nicmm.ArgumentError, match=named):
+        train(meshes, tmp_path / "weights.npz", replace(SETTINGS, **change))

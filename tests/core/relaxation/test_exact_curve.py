@@ -193,7 +193,7 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
         step = generator.normal(scale=size, size=n)
         step[exact.control_nodes] = 0.0
         nodes, _ = sideways(surface, exact.nodes, step)
-        new, stays = redrawn(surface, exact, nodes, simple=True)
+        new, stays = redrawn(surface, exact, nodes)
         assert is_simple(surface, new)
         result = new.surface_curve(flat_disc)
         assert_valid_curve(flat_disc, result, controls)
@@ -209,7 +209,7 @@ def test_moves_that_cross_nothing_are_all_made(flat_disc):
     step = np.full(len(exact.nodes.positions), 0.02)
     step[exact.control_nodes] = 0.0
     nodes, _ = sideways(surface, exact.nodes, step)
-    new, stays = redrawn(surface, exact, nodes, simple=True)
+    new, stays = redrawn(surface, exact, nodes)
     assert not stays.any()
     np.testing.assert_array_equal(new.nodes.positions, nodes.positions)
 
@@ -224,9 +224,7 @@ def test_only_the_nodes_that_would_cross_stay(flat_disc):
     step[exact.control_nodes] = 0.0
     nodes, _ = sideways(surface, exact.nodes, step)
     assert not is_simple(surface, drawn(surface, exact, nodes))
-    crossing, nobody = redrawn(surface, exact, nodes, simple=False)
-    assert not nobody.any() and not is_simple(surface, crossing)
-    simple, stays = redrawn(surface, exact, nodes, simple=True)
+    simple, stays = redrawn(surface, exact, nodes)
     assert is_simple(surface, simple)
     assert stays.any() and not stays[np.abs(here[:, 1]) > 0.5].any()
 
@@ -243,7 +241,7 @@ def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
     chosen.faces[node], chosen.barycentric[node] = chosen.faces[far], chosen.barycentric[far]
     nodes = nodes_at(surface, chosen, True)
     assert drawn(surface, exact, nodes) is None
-    kept, stays = redrawn(surface, exact, nodes, simple=False)
+    kept, stays = redrawn(surface, exact, nodes)
     assert stays[node]
     np.testing.assert_array_equal(kept.nodes.positions[node], exact.nodes.positions[node])
     assert_valid_curve(mesh, kept.surface_curve(mesh), kept.nodes.positions[kept.control_nodes])
