@@ -14,11 +14,6 @@ def edges_with_counts(faces):
     return np.unique(np.sort(sides(faces), axis=1), axis=0, return_counts=True)
 
 
-def histogram_of_branches(faces):
-    """How many edges have one face, how many two …, without those that have one or two."""
-    return np.bincount(edges_with_counts(faces)[1])[3:].tolist()
-
-
 def assert_valid_cut(mesh, cut, curve=None):
     n_input = len(mesh.vertices)
     np.testing.assert_array_equal(cut.vertices[:n_input], mesh.vertices)
@@ -81,7 +76,6 @@ def longest_edge(mesh):
 
 def components_without(faces, chain_edges):
     """Number of parts that faces fall into where no way may lead over some edges."""
-    size = int(faces.max()) + 1
     forbidden = {tuple(sorted(edge)) for edge in chain_edges.tolist()}
     keys = np.sort(sides(faces), axis=1)
     at_edge = {}
@@ -99,5 +93,4 @@ def components_without(faces, chain_edges):
         if edge not in forbidden:
             for face in beside[1:]:
                 parent[root(face)] = root(beside[0])
-    assert size
     return len({root(face) for face in range(len(faces))})
