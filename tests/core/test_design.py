@@ -559,7 +559,7 @@ import sys
 import nicmm_core as nicmm
 from nicmm_core import shapes
 mesh = shapes.sphere(2)
-maps = {"obstacles": [0.0] * 100 + [0.9] * 62}
+maps = {"obstacles": [0.0] * 100 + [0.5] * 62}
 for method in ("nicmm", "variational"):
     for given in ({}, maps):
         design = nicmm.design_curve(mesh, [3, 60, 100], method=method, **given)
