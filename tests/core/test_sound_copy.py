@@ -7,7 +7,7 @@ import nicmm_core as nicmm
 from benchmarks import corpus
 from benchmarks.checker import judge
 from benchmarks.defects import defective_meshes
-from nicmm_core import shapes
+from nicmm_core import shapes, surface_designer
 from nicmm_core.mesh import unique_edges
 from nicmm_core.sound_copy import FLAT, sound_copies
 from nicmm_core.surface_points import locate_points
@@ -96,8 +96,13 @@ def triangle_heights(corners):
     return np.linalg.norm(np.cross(side[:, 0], side[:, 1]), axis=1)
 
 
-def test_curve_field_and_warm_start_belong_to_the_users_mesh():
+def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     mesh = MESHES["caps"]
+    predictions = []
+    predicted = surface_designer.predicted
+    monkeypatch.setattr(
+        surface_designer, "predicted", lambda *given: predictions.append(1) or predicted(*given)
+    )
     before = mesh.vertices.copy(), mesh.faces.copy()
     designer = nicmm.Designer(mesh)
     points = np.array([3, 100, 400, 500])
@@ -108,7 +113,7 @@ def test_curve_field_and_warm_start_belong_to_the_users_mesh():
         assert design.field.shape == (len(mesh.vertices),)
         assert np.isfinite(design.field).all()
         np.testing.assert_allclose(design.field[points], 0.0, atol=1e-2 * mesh.mean_edge_length)
-    assert again.iterations < first.iterations
+    assert len(predictions) == 1
     np.testing.assert_array_equal(mesh.vertices, before[0])
     np.testing.assert_array_equal(mesh.faces, before[1])
 
