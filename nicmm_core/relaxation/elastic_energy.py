@@ -225,7 +225,8 @@ def _linearised(
     by_before = cross(flat_before, normal) / squared_before
     by_after = cross(normal, flat_after) / squared_after
     by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
-    by_normal = (by_normal + cosine * dot(product, turn)) / (squared_before * squared_after)
+    # One after the other: the product of two steps that are almost nothing may be nothing.
+    by_normal = (by_normal + cosine * dot(product, turn)) / squared_before / squared_after
     turning_by = np.stack(
         [
             dot(by_before, before_by[0]),
