@@ -28,6 +28,7 @@ MEASUREMENTS = (
     "runtime",
     "dragging",
     "stages",
+    "obstacles",
     "peers",
     "degraded",
     "resolution",

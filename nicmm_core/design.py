@@ -27,9 +27,10 @@ from .arguments import (
 from .design_result import Design
 from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
+from .mesh_copy import MeshCopy
 from .path.via_points import ViaPoints, located_via_points
 from .request import Progress, Request
-from .sound_copy import SoundCopy, sound_copies
+from .sound_copy import sound_copies
 from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, locate_control_points
 
@@ -61,7 +62,7 @@ class Designer:
             )
         self.mesh = mesh
         self._copies = sound_copies(mesh)
-        self._designers: list[tuple[SoundCopy, SurfaceDesigner]] = []
+        self._designers: list[tuple[MeshCopy, SurfaceDesigner]] = []
 
     def forget(self) -> None:
         """Start the next design anew."""
@@ -106,7 +107,7 @@ class Designer:
         copy, designer, request = self._on_sound_copy(request)
         return copy.design(designer.design(request, method, progress, started))
 
-    def _on_sound_copy(self, request: Request) -> tuple[SoundCopy, SurfaceDesigner, Request]:
+    def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
         """A copy of the mesh without its defects, who designs on it, and the request there."""
         place = 0
         while True:

@@ -14,15 +14,15 @@ from .array_types import BoolArray, FloatArray
 from .errors import UnreachableError
 from .level_set.redistancing import build_distance_surface, spread
 from .mesh import Mesh
+from .mesh_copy import MeshCopy
 from .path.leg_graph import fans
 from .request import Request
-from .sound_copy import SoundCopy
 
 HARD = 1.0
 """Weight from which an obstacle is not to be entered; below, it costs in proportion."""
 
 
-def free_surface(mesh: Mesh, obstacles: FloatArray, clearance: float) -> SoundCopy | None:
+def free_surface(mesh: Mesh, obstacles: FloatArray, clearance: float) -> MeshCopy | None:
     """The surface without its obstacles; None where they do not take a face away.
 
     Parameters
@@ -48,10 +48,10 @@ def free_surface(mesh: Mesh, obstacles: FloatArray, clearance: float) -> SoundCo
         )
     # Parts that meet in nothing but a vertex come apart there: no curve passes between them.
     corners, vertex = fans(Mesh(mesh.vertices, mesh.faces[face]))
-    return SoundCopy(mesh, Mesh(mesh.vertices[vertex], corners), vertex, face)
+    return MeshCopy(mesh, Mesh(mesh.vertices[vertex], corners), vertex, face)
 
 
-def check_reachable(free: SoundCopy, request: Request) -> None:
+def check_reachable(free: MeshCopy, request: Request) -> None:
     """Raise UnreachableError where obstacles enclose control points, or lie between them."""
     sets = {"control_points": request.points}
     sets |= {f"via_points[{key}]": points for key, points in request.via_points.items()}

@@ -15,20 +15,15 @@ is there. Three things may differ:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
-from .crossings import crossing_segments
-from .curve import SurfaceCurve, curve_on_mesh
-from .design_result import Design, Status
 from .mesh import Mesh, unique_edges
-from .request import Request
-from .surface_points import SurfacePoints
+from .mesh_copy import MeshCopy
 
 FLAT = 1e-10
 """Sine between the longest and the shortest edge of a face below which it has no area."""
@@ -49,132 +44,7 @@ SEED = 0
 """Of the ways in which vertices are moved; the same mesh has the same copy."""
 
 
-@dataclass(frozen=True)
-class SoundCopy:
-    """A mesh, its copy, and what in it belongs to what.
-
-    Attributes
-    ----------
-    original : Mesh
-    mesh : Mesh
-        The copy; the same object where nothing differs.
-    vertex : (v,) int array
-        The original of each of its vertices. The first ones are the mesh's own, in their order.
-    face : (f,) int array
-        The original of each of its faces.
-    """
-
-    original: Mesh
-    mesh: Mesh
-    vertex: IntArray
-    face: IntArray
-
-    @property
-    def differs(self) -> bool:
-        """Whether the mesh has defects."""
-        return self.mesh is not self.original
-
-    def request(self, request: Request) -> Request | None:
-        """The same request on the copy; None where cuts separate its points."""
-        if not self.differs:
-            return request
-        sets = [request.points, *request.via_points.values()]
-        candidates = [self.candidates(points) for points in sets]
-        common = self._common_component([each for of_set in candidates for each in of_set])
-        if common is None:
-            return None
-        points, *via_points = (
-            self._points(points, of_set, common)
-            for points, of_set in zip(sets, candidates, strict=True)
-        )
-        return replace(
-            request,
-            points=points,
-            via_points=dict(zip(request.via_points, via_points, strict=True)),
-            obstacles=None if request.obstacles is None else request.obstacles[self.vertex],
-            alignment=None if request.alignment is None else request.alignment[self.vertex],
-        )
-
-    def design(self, design: Design) -> Design:
-        """A design on the copy as one on the mesh."""
-        if not self.differs:
-            return design
-        curves = [self._curve(curve) for curve in design.curves]
-        status = design.status
-        # Strands that pass different copies of one vertex touch there.
-        if len(self.vertex) > len(self.original.vertices) and not all(map(self._is_simple, curves)):
-            status = Status.NOT_ONE_CURVE
-        return replace(
-            design, status=status, curves=curves, find_field=partial(self._field, design)
-        )
-
-    def _is_simple(self, curve: SurfaceCurve) -> bool:
-        polyline = SurfacePoints(curve.faces, curve.barycentric)
-        return not len(crossing_segments(self.original, polyline, curve.closed))
-
-    def _curve(self, curve: SurfaceCurve) -> SurfaceCurve:
-        faces = self.face[curve.faces]
-        index = curve.control_index
-        return curve_on_mesh(self.original, curve.closed, faces, curve.barycentric, index)
-
-    def _field(self, design: Design) -> FloatArray:
-        """φ at the vertices of the mesh; the copy of a vertex nearest to the curve counts."""
-        field = np.full(len(self.original.vertices), np.inf)
-        order = np.argsort(-np.abs(design.field), kind="stable")
-        field[self.vertex[order]] = design.field[order]
-        # What the copy does not have is outside.
-        field[np.isinf(field)] = design.field.max()
-        return field
-
-    @cached_property
-    def _copies(self) -> IntArray:
-        """The face of the copy that each face is, (F,), or -1."""
-        copies = np.full(len(self.original.faces), -1)
-        copies[self.face] = np.arange(len(self.face))
-        return copies
-
-    def candidates(self, points: SurfacePoints) -> list[IntArray]:
-        """Faces of the copy that each point lies in, its own first."""
-        around = self.original.vertex_faces
-        found = []
-        for face, barycentric in zip(points.faces, points.barycentric, strict=True):
-            corners = self.original.faces[face][barycentric > 0.0]
-            shared = None
-            for corner in corners:
-                here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
-                shared = here if shared is None else np.intersect1d(shared, here)
-            copies = self._copies[np.concatenate([[face], shared])]
-            found.append(copies[copies >= 0])
-        return found
-
-    def _common_component(self, candidates: list[IntArray]) -> int | None:
-        """The largest component of the copy that has all points; None where there is none."""
-        component = self.mesh.face_component
-        common = set(component[candidates[0]].tolist())
-        for faces in candidates:
-            common &= set(component[faces].tolist())
-        areas = np.bincount(component, weights=self.mesh.face_areas)
-        return max(common, key=lambda label: float(areas[label]), default=None)
-
-    def _points(
-        self, points: SurfacePoints, candidates: list[IntArray], component: int
-    ) -> SurfacePoints:
-        """Points in faces of one component of the copy."""
-        faces, barycentric = [], []
-        for place, of_point in enumerate(candidates):
-            chosen = of_point[self.mesh.face_component[of_point] == component][0]
-            corners = self.original.faces[points.faces[place]].tolist()
-            weights = dict(zip(corners, points.barycentric[place], strict=True))
-            own = self.original.faces[self.face[chosen]].tolist()
-            faces.append(chosen)
-            barycentric.append([weights.get(corner, 0.0) for corner in own])
-        shape = (len(faces), 3)
-        return SurfacePoints(
-            np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
-        )
-
-
-def sound_copies(mesh: Mesh) -> Iterator[SoundCopy]:
+def sound_copies(mesh: Mesh) -> Iterator[MeshCopy]:
     """The copy of a mesh, and another where that separates points that are connected.
 
     The first goes straight on where more than two faces share an edge. The second joins as many
@@ -348,13 +218,13 @@ class _Sides:
         return corners, np.concatenate([vertex, added]), True
 
 
-def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> SoundCopy:
+def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> MeshCopy:
     """A copy with these faces, in which every face has an area where that is possible."""
     vertices = mesh.vertices[vertex]
     short = SHORT * mesh.diagonal
     flat = _flat(vertices, faces, short)
     if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
-        return SoundCopy(mesh, mesh, vertex, face)
+        return MeshCopy(mesh, mesh, vertex, face)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
         vertices = vertices - vertices[faces[0, 0]]
@@ -369,7 +239,7 @@ def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -
             still = _flat(vertices, faces, short)
             if not still.any():
                 break
-    return SoundCopy(mesh, Mesh(vertices, faces), vertex, face)
+    return MeshCopy(mesh, Mesh(vertices, faces), vertex, face)
 
 
 def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:

@@ -25,6 +25,7 @@ from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
 from .mesh import Mesh
+from .mesh_copy import MeshCopy
 from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
 from .relaxation.curve_field import curve_field
@@ -34,7 +35,6 @@ from .relaxation.exact_curve import ExactCurve
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
 from .request import Progress, Request, same_course, same_request
-from .sound_copy import SoundCopy
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
@@ -59,7 +59,7 @@ class _Free:
 
     obstacles: FloatArray
     clearance: float
-    copy: SoundCopy | None
+    copy: MeshCopy | None
     designer: SurfaceDesigner
 
 
