@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
@@ -86,6 +87,53 @@ def respaced(surface: CurveSurface, curve: ExactCurve, count: int) -> ExactCurve
     """Another number of nodes, or the same at equal distances, on the same polyline."""
     at_controls = curve.node_place[curve.control_nodes]
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
+
+
+def rounded(surface: CurveSurface, coarse: ExactCurve, fine: ExactCurve) -> ExactCurve:
+    """Fine nodes on a smooth curve through the coarse ones of the same polyline.
+
+    Between two coarse nodes the polyline is straight, so all of its turning is at a quarter of the
+    fine nodes, and costs four times as much there. A cubic spline through the coarse nodes says
+    how far the fine ones have to move across.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    coarse : ExactCurve
+        Simple.
+    fine : ExactCurve
+        More nodes on its polyline.
+
+    Returns
+    -------
+    ExactCurve
+        Simple; nodes that could not move are where they were, all if a leg has no length.
+    """
+    at, total = _arc_lengths(surface.mesh, coarse)
+    through = coarse.nodes.positions
+    if coarse.closed:
+        at, through = np.append(at, total), np.concatenate([through, through[:1]])
+    if (np.diff(at) <= 0.0).any():
+        return fine  # A leg of no length has no slope.
+    chord = np.diff(through, axis=0) / np.diff(at)[:, None]
+    slope = 0.5 * (np.concatenate([chord[:1], chord]) + np.concatenate([chord, chord[-1:]]))
+    if coarse.closed:
+        slope[[0, -1]] = 0.5 * (chord[0] + chord[-1])
+    along = _arc_lengths(surface.mesh, fine)[0]
+    straight = make_interp_spline(at, through, k=1)(along)
+    aside = CubicHermiteSpline(at, through, slope)(along) - straight
+    step = (aside * fine.nodes.sideways).sum(axis=1)
+    step[fine.control_nodes] = 0.0
+    return redrawn(surface, fine, sideways(surface, fine.nodes, step)[0])[0]
+
+
+def _arc_lengths(mesh: Mesh, curve: ExactCurve) -> tuple[FloatArray, float]:
+    """Arc length at the nodes, (n,), and of the whole curve."""
+    positions = curve.polyline.positions(mesh)
+    if curve.closed:
+        positions = np.concatenate([positions, positions[:1]])
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
+    return arc[curve.node_place], float(arc[-1])
 
 
 def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:

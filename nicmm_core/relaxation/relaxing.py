@@ -35,7 +35,16 @@ from .elastic_energy import (
     feature_energy,
     predicted_fall,
 )
-from .exact_curve import ExactCurve, drawn, exact_curve, is_simple, redrawn, respaced, sideways
+from .exact_curve import (
+    ExactCurve,
+    drawn,
+    exact_curve,
+    is_simple,
+    redrawn,
+    respaced,
+    rounded,
+    sideways,
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,8 @@ class RelaxationConfig:
     levels : tuple of int
         Numbers of nodes, rising.
     longest_move : float
-        Farthest that a node moves at once.
+        Farthest that the linearised energy is trusted; the curve may move twice as far if that is
+        seen to lower the energy further.
     damping : float
         At the start of a level of 128 nodes, relative to the greatest diagonal entry. Far below 1,
         because that measures the stiffness of a zigzag from node to node, against which a slow
@@ -70,7 +80,7 @@ class RelaxationConfig:
     longest_move: float = 4.0
     damping: float = 1e-6
     most_damping: float = 1e2
-    least_decrease: float = 3e-4
+    least_decrease: float = 2e-3
     least_decrease_before: float = 3e-2
     stretch: float = 1.6
     iterations: int = 100
@@ -92,7 +102,7 @@ HELD_TRIES = 3
 SURELY = 0.1
 """Share of the least decrease below which a step is not tried: damping makes forecasts small."""
 
-STRAIGHT = 1e-2
+STRAIGHT = 2e-3
 """Share of bending in the energy below which a curve is straight enough not to go on for it."""
 
 SMALL_MOVE = 0.1
@@ -319,8 +329,15 @@ class _Relaxation:
                 return None
             if farthest > config.longest_move:
                 move *= config.longest_move / farthest
+                farthest = config.longest_move
             moved, stayed = sideways(surface, nodes, move)
-            lowered = elastic_energy(moved, weights) < energy
+            reached = elastic_energy(moved, weights)
+            lowered = reached < energy
+            if lowered:
+                # Gauss-Newton's matrix is too stiff where the curve bends a lot.
+                farther, also_stayed = sideways(surface, nodes, 2.0 * move)
+                if elastic_energy(farther, weights) < reached:
+                    moved, stayed, farthest = farther, also_stayed, 2.0 * farthest
             if lowered and simple:
                 drawn_curve, kept = redrawn(surface, curve, moved)
                 if kept.any() and tries < HELD_TRIES:
@@ -333,7 +350,7 @@ class _Relaxation:
                     curve = drawn_curve
             if lowered:
                 damping = max(damping / DAMPING_FACTOR, self._least_damping(len(free)))
-                return _Step(curve, moved, stayed, damping, min(farthest, config.longest_move))
+                return _Step(curve, moved, stayed, damping, farthest)
             damping *= DAMPING_FACTOR
         return None
 
@@ -352,4 +369,12 @@ class _Relaxation:
         changed = respaced(self.surface, curve, level)
         if simple and not is_simple(self.surface, changed):
             return curve
-        return changed
+        return changed if alike else self._rounded(curve, changed)
+
+    def _rounded(self, coarse: ExactCurve, fine: ExactCurve) -> ExactCurve:
+        """The fine nodes on a smooth curve through the coarse ones, if that bends less."""
+        if len(fine.nodes.positions) < len(coarse.nodes.positions):
+            return fine
+        changed = rounded(self.surface, coarse, fine)
+        less = bending_energy(changed.nodes) < bending_energy(fine.nodes)
+        return changed if less else fine

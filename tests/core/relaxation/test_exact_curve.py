@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.exact_curve import (
     drawn,
     exact_curve,
@@ -15,6 +16,7 @@ from nicmm_core.relaxation.exact_curve import (
     is_simple,
     redrawn,
     respaced,
+    rounded,
     sideways,
 )
 from nicmm_core.surface_points import SurfacePoints
@@ -265,3 +267,17 @@ def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
         beyond = in_faces(mesh, points, mesh.face_neighbours[:, side])
         np.testing.assert_allclose(beyond.positions(mesh), points.positions(mesh), atol=1e-15)
         np.testing.assert_array_equal(beyond.faces, mesh.face_neighbours[:, side])
+
+
+def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(flat_disc):
+    """∮ κ² ds of a circle is 2π / r; a polygon has more than twice that."""
+    surface = surface_of(flat_disc)
+    ring = exact_curve(surface, ring_on(flat_disc), 48)
+    polygon = drawn(surface, ring, ring.nodes)
+    finer = respaced(surface, polygon, 144)
+    assert bending_energy(finer.nodes) > 2.0 * 2.0 * np.pi / 0.6
+    smooth = rounded(surface, polygon, finer)
+    assert is_simple(surface, smooth)
+    assert bending_energy(smooth.nodes) == pytest.approx(2.0 * np.pi / 0.6, rel=0.1)
+    controls = ring.nodes.positions[ring.control_nodes]
+    assert np.allclose(smooth.nodes.positions[smooth.control_nodes], controls, atol=1e-12)
