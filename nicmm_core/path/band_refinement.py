@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..array_types import BoolArray, FloatArray
+from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 
 PIECES = 64
@@ -76,6 +77,7 @@ def refine_along(
         return size, (size > longest) & (distance < half_width + 0.5 * size)
 
     working, renumbered = split.assemble(component)
+    checkpoint()
     original = np.flatnonzero(renumbered >= 0)
     edges = working.edges[working.edge_lengths > longest]
     size, wanted = too_long(*working.vertices[edges].transpose(1, 0, 2))
