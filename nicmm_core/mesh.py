@@ -151,8 +151,7 @@ class Mesh:
         edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]]])
         ones = np.ones(len(edges), dtype=np.int8)
         checkpoint()
-        graph = sparse.csr_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
-        checkpoint()
+        graph = sparse.coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
         _, label = csgraph.connected_components(graph, directed=False)
         checkpoint()
         return label[self.faces[:, 0]]

@@ -8,8 +8,8 @@ is there. Three things may differ:
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
   off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
   there are doubled.
-- Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge that has a length,
-  each its own way, so that every face has an area.
+- Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
+  that has a length, each its own way, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ ATTEMPTS = 4
 
 ROUNDS = 8
 """Of cutting one edge further where a cut does not come apart."""
+
+BLOCK = 50_000
+"""Faces that are looked at together."""
 
 SEED = 0
 """Of the ways in which vertices are moved; the same mesh has the same copy."""
@@ -193,8 +196,7 @@ class _Sides:
         rows = np.concatenate([self._low[one], self._high[one]])
         columns = np.concatenate([self._low[other], self._high[other]])
         checkpoint()
-        graph = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
-        checkpoint()
+        graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
         n_labels, label = csgraph.connected_components(graph, directed=False)
         checkpoint()
         source = np.zeros(n_labels, dtype=np.int64)
@@ -276,16 +278,17 @@ def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
 
     Needles have an area, however thin: their shortest edge stands across the longest.
     """
-    checkpoint()
-    corner = vertices[faces]
-    checkpoint()
-    sides = np.roll(corner, -1, axis=1) - corner
-    checkpoint()
-    lengths = np.sqrt(np.einsum("fcd,fcd->fc", sides, sides))
-    shortest, longest = lengths.min(axis=1), lengths.max(axis=1)
-    checkpoint()
-    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return (shortest <= short) | (twice_area <= FLAT * shortest * longest)
+    flat = np.zeros(len(faces), dtype=bool)
+    for first in range(0, len(faces), BLOCK):
+        checkpoint()
+        block = slice(first, first + BLOCK)
+        corner = vertices[faces[block]]
+        sides = np.roll(corner, -1, axis=1) - corner
+        lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        flat[block] = lengths[:, 0] <= short
+        flat[block] |= twice_area <= FLAT * lengths[:, 0] * lengths[:, 2]
+    return flat
 
 
 def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
