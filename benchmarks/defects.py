@@ -39,10 +39,13 @@ def defective_meshes() -> Iterator[tuple[str, Mesh]]:
     yield "components", _together(ball, Mesh(0.5 * vertices + 3.0, faces))
     yield "through itself", _together(ball, Mesh(vertices + [0.7, 0, 0], faces))
     yield "needles", Mesh(vertices * [1.0, 1.0, 1e-7], faces)
-    yield "hardly any angle", Mesh(*_slivers(vertices, faces, 1e-13))
+    for height in (1e-13, 1e-10, 1e-7, 1e-4):
+        yield f"caps of height {height:g}", Mesh(*_slivers(vertices, faces, height))
     yield "millionths", Mesh(1e-6 * vertices, faces)
     yield "millions", Mesh(1e6 * vertices, faces)
     yield "far away", Mesh(vertices + 1e6, faces)
+    caps, capped = _with_caps(vertices, faces, faces[::9])
+    yield "caps far away", Mesh(caps + 1e5, capped)
     yield "loose vertices", Mesh(np.concatenate([[[1e9, 0, 0]], vertices]), faces + 1)
 
 

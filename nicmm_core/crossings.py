@@ -33,15 +33,18 @@ def crossing_segments(mesh: Mesh, polyline: SurfacePoints, closed: bool) -> IntA
     count = np.unique(faces, return_counts=True)[1]
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
+    # Boxes first: they part most pairs, and collinear segments pass the other tests wherever they
+    # lie on their common line.
+    low, high = np.minimum(start, end), np.maximum(start, end) + TOUCHING
+    for axis in range(2):
+        overlap = low[first, axis] <= high[second, axis]
+        overlap &= low[second, axis] <= high[first, axis]
+        first, second = first[overlap], second[overlap]
     apart = np.abs(first - second)
     neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
     first, second = first[~neighbours], second[~neighbours]
     a, b, c, d = start[first], end[first], start[second], end[second]
     meets = _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
-    # Collinear segments pass both tests wherever they lie on their common line.
-    overlap = np.minimum(a, b) <= np.maximum(c, d) + TOUCHING
-    overlap &= np.minimum(c, d) <= np.maximum(a, b) + TOUCHING
-    meets &= overlap.all(axis=1)
     in_faces = np.stack([first[meets], second[meets]], axis=1)
     return np.concatenate([in_faces, _vertices_passed_twice(mesh, polyline, n_segments)])
 

@@ -12,7 +12,10 @@ curve is lifted from there (`coarsening`).
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
+from collections.abc import Iterator
 
 from numpy.typing import ArrayLike
 
@@ -24,13 +27,14 @@ from .arguments import (
     checked_map,
     checked_smoothness,
 )
-from .design_result import Design
+from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
 from .mesh_copy import MeshCopy
 from .path.via_points import ViaPoints, located_via_points
-from .request import Progress, Request
-from .sound_copy import sound_copies
+from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
+from .request import Request
+from .sound_copy import sound_copy
 from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, locate_control_points
 
@@ -48,7 +52,7 @@ class Designer:
     smoothness: then the cost follows the curve and not the mesh, which is what
     dragging a point needs. Such a curve keeps the course and the order of points that it has, so
     it may differ from what `design_curve` finds from nothing; `forget` makes the next design
-    start anew. A Designer serves one thread at a time.
+    start anew. Threads may share a Designer: it draws one curve after the other.
 
     Parameters
     ----------
@@ -61,13 +65,15 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._copies = sound_copies(mesh)
         self._designers: list[tuple[MeshCopy, SurfaceDesigner]] = []
+        # A progress function may ask the same Designer for another curve.
+        self._lock = threading.RLock()
 
     def forget(self) -> None:
         """Start the next design anew."""
-        for _, designer in self._designers:
-            designer.forget()
+        with self._lock:
+            for _, designer in self._designers:
+                designer.forget()
 
     def design(
         self,
@@ -91,28 +97,43 @@ class Designer:
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method == "nicmm-paper":
             check_torch()
-        points = locate_control_points(self.mesh, control_points, closed)
-        via = {} if via_points is None else via_points
-        avoided = checked_map("obstacles", obstacles, self.mesh)
-        request = Request(
-            points=points,
-            closed=closed,
-            order=order,
-            via_points=located_via_points(self.mesh, points, via, order, closed),
-            obstacles=avoided,
-            alignment=checked_map("alignment", alignment, self.mesh),
-            clearance=checked_clearance(clearance, avoided),
-            smoothness=checked_smoothness(smoothness),
-        )
-        copy, designer, request = self._on_sound_copy(request)
-        return copy.design(designer.design(request, method, progress, started))
+        try:
+            with watched(progress), self._its_turn():
+                points = locate_control_points(self.mesh, control_points, closed)
+                via = {} if via_points is None else via_points
+                avoided = checked_map("obstacles", obstacles, self.mesh)
+                request = Request(
+                    points=points,
+                    closed=closed,
+                    order=order,
+                    via_points=located_via_points(self.mesh, points, via, order, closed),
+                    obstacles=avoided,
+                    alignment=checked_map("alignment", alignment, self.mesh),
+                    clearance=checked_clearance(clearance, avoided),
+                    smoothness=checked_smoothness(smoothness),
+                )
+                copy, designer, request = self._on_sound_copy(request)
+                with displaced(copy.origin):
+                    return copy.design(designer.design(request, method, started))
+        except CancelledError:
+            return cancelled_design(time.perf_counter() - started)
+
+    @contextlib.contextmanager
+    def _its_turn(self) -> Iterator[None]:
+        """Wait until no other thread uses this Designer, or the caller has enough of waiting."""
+        while not self._lock.acquire(timeout=INTERVAL):
+            checkpoint()
+        try:
+            yield
+        finally:
+            self._lock.release()
 
     def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
         """A copy of the mesh without its defects, who designs on it, and the request there."""
         place = 0
         while True:
             if place == len(self._designers):
-                copy = next(self._copies, None)
+                copy = sound_copy(self.mesh, place)
                 if copy is None:
                     raise UnreachableError(PARTS)
                 self._designers.append((copy, SurfaceDesigner(copy.mesh)))
@@ -166,8 +187,9 @@ def design_curve(
     smoothness : float, default 1
         Larger gives a fairer curve that follows the shortest way less closely.
     progress : callable, optional
-        Called with the fraction done and the points of the curve so far, a few times a second at
-        most; the design stops when it returns False.
+        Called a few times a second with the fraction done and the points of the curve so far, of
+        which there are none at first. The design stops when it returns False, with the last curve
+        that it had or with none.
 
     Returns
     -------

@@ -10,6 +10,7 @@ from functools import cached_property
 
 from .array_types import FloatArray
 from .curve import SurfaceCurve
+from .errors import CurveError
 
 
 class Status(enum.Enum):
@@ -28,7 +29,10 @@ class Status(enum.Enum):
         "strands of the curve are so close to one another that it is returned as the level set "
         "gives it; use a finer mesh, fewer points or another order"
     )
-    CANCELLED = "cancelled by the progress function; the curve is the best one so far"
+    CANCELLED = (
+        "cancelled by the progress function; the curve, if there was one already, is the best so "
+        "far, and the same request gives the whole one"
+    )
     NOT_ONE_CURVE = (
         "the level set is not one simple curve through all control points; the mesh may branch "
         "there (edges of three faces): repair it, or move the control points"
@@ -47,13 +51,13 @@ class Design:
     ----------
     status : Status
     curves : list of SurfaceCurve
-        One entry when all is well.
+        One entry when all is well; none where a design was cancelled before there was a curve.
     iterations : int
         Of the network's training, of the solver, or of the relaxation.
     seconds : float
     energy : dict of str to float
         The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
-        square roots of the surface's area.
+        square roots of the surface's area; empty where there is no curve.
     breaking_vertices : int
         Vertices whose predicted sign would have split the curve or missed a point, so that the
         initial level set replaces the predicted one around them; 0 when it was one loop by itself.
@@ -76,6 +80,11 @@ class Design:
         Negative inside, or the distance without sign where the curve is open or bounds no region.
         Vertices that are not connected to the control points get the largest value: they are
         outside.
+
+        Raises
+        ------
+        CurveError
+            If the design was cancelled before there was a curve.
         """
         return self.find_field()
 
@@ -88,6 +97,26 @@ STATUS = {
     "unrelaxed": Status.UNRELAXED,
 }
 """What the reason of a solver's stop means for the design."""
+
+
+def cancelled_design(seconds: float) -> Design:
+    """A design that was cancelled before there was a curve."""
+
+    def no_field() -> FloatArray:
+        raise CurveError(
+            "design.field belongs to no curve: the progress function cancelled the design before "
+            "there was one; ask for it again"
+        )
+
+    return Design(
+        status=Status.CANCELLED,
+        curves=[],
+        iterations=0,
+        seconds=seconds,
+        energy={},
+        breaking_vertices=0,
+        find_field=no_field,
+    )
 
 
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:

@@ -12,6 +12,7 @@ from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
 from .errors import MeshError
+from .progress import checkpoint
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
@@ -68,6 +69,7 @@ class Mesh:
         """Unit normal of each face, shape (F, 3); zero where it has no area."""
         corner = self.vertices[self.faces]
         normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        checkpoint()
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return normal / np.where(length > 0.0, length, 1.0)
 
@@ -78,10 +80,14 @@ class Mesh:
         -1 where there is none, or where more than two faces have the side.
         """
         n_faces = len(self.faces)
-        low, high = np.sort(self.faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1).T
+        checkpoint()
+        low, high = _sorted_ends(self.faces[:, [1, 2, 0]], self.faces[:, [2, 0, 1]])
+        checkpoint()
         keys = low * (int(self.faces.max()) + 1) + high  # side 3 f + j of face f, corner j
         order = np.argsort(keys, kind="stable")
+        checkpoint()
         _, first, count = np.unique(keys[order], return_index=True, return_counts=True)
+        checkpoint()
         one, other = order[first[count == 2]], order[first[count == 2] + 1]
         neighbours = np.full(3 * n_faces, -1)
         neighbours[one], neighbours[other] = other // 3, one // 3
@@ -92,6 +98,7 @@ class Mesh:
         """Undirected edges, shape (E, 2), in no particular order."""
         sides = self.faces[:, [[1, 2], [2, 0], [0, 1]]]  # (F, 3, 2), opposite each corner
         across = self.face_neighbours
+        checkpoint()
         of_two = sides[across > np.arange(len(self.faces))[:, None]]
         others = np.unique(np.sort(sides[across < 0], axis=1), axis=0)
         return np.concatenate([of_two, others])
@@ -100,6 +107,7 @@ class Mesh:
     def branches(self) -> bool:
         """Whether more than two faces share some edge."""
         sides = np.sort(self.faces[:, [[1, 2], [2, 0], [0, 1]]][self.face_neighbours < 0], axis=1)
+        checkpoint()
         return len(np.unique(sides, axis=0)) < len(sides)
 
     @cached_property
@@ -113,6 +121,7 @@ class Mesh:
     def mean_edge_length(self) -> float:
         """Mean length of the edges, in mesh units."""
         start, end = self.edges.T
+        checkpoint()
         return float(np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1).mean())
 
     @cached_property
@@ -122,6 +131,7 @@ class Mesh:
         rows = self.faces.ravel()
         columns = np.repeat(np.arange(n_faces), 3)
         ones = np.ones(rows.size, dtype=np.int8)
+        checkpoint()
         return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
 
     def faces_at(self, vertices: IntArray) -> IntArray:
@@ -140,8 +150,10 @@ class Mesh:
         n_vertices = len(self.vertices)
         edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]]])
         ones = np.ones(len(edges), dtype=np.int8)
+        checkpoint()
         graph = sparse.coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
         _, label = csgraph.connected_components(graph, directed=False)
+        checkpoint()
         return label[self.faces[:, 0]]
 
     @cached_property
@@ -171,8 +183,10 @@ def real_array(values: ArrayLike) -> FloatArray:
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
+    checkpoint()
     corner = vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    checkpoint()
     return 0.5 * np.linalg.norm(normal, axis=1)
 
 
@@ -187,15 +201,22 @@ def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
         1 on the boundary, 2 inside, more where the surface branches.
     """
     size = int(faces.max()) + 1
-    low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
+    low, high = _sorted_ends(faces, faces[:, [1, 2, 0]])
+    checkpoint()
     # One key an edge: unique rows of a two-column array would take several times as long.
     keys, count = np.unique(low * size + high, return_counts=True)
     return np.stack([keys // size, keys % size], axis=1), count
 
 
+def _sorted_ends(start: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
+    """The smaller and the larger ends of sides of faces, each in one row."""
+    return np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
+
+
 def unoriented_vertices(faces: IntArray) -> IntArray:
     """Vertices of edges that two faces run along in the same direction, ascending."""
     size = int(faces.max()) + 1
+    checkpoint()
     start, end = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
     directed, count = np.unique(start * size + end, return_counts=True)
     twice = directed[count > 1]

@@ -8,6 +8,7 @@ one on the original. `sound_copy` mends a mesh so, and `free_surface` takes obst
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from functools import cached_property, partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from .crossings import crossing_segments
 from .curve import SurfaceCurve, curve_on_mesh
 from .design_result import Design, Status
 from .mesh import Mesh
+from .progress import checkpoint
 from .request import Request
 from .surface_points import SurfacePoints
 
@@ -34,12 +36,15 @@ class MeshCopy:
         The original of each of its vertices.
     face : (f,) int array
         The original of each of its faces.
+    origin : (3,) float array
+        Where the copy's origin is in the space of the original.
     """
 
     original: Mesh
     mesh: Mesh
     vertex: IntArray
     face: IntArray
+    origin: FloatArray = dataclass_field(default_factory=lambda: np.zeros(3))
 
     @property
     def differs(self) -> bool:
@@ -110,6 +115,7 @@ class MeshCopy:
         """Faces of the copy that each point lies in, its own first."""
         around = self.original.vertex_faces
         found = []
+        checkpoint()
         for face, barycentric in zip(points.faces, points.barycentric, strict=True):
             corners = self.original.faces[face][barycentric > 0.0]
             shared = None

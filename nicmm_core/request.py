@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,6 @@ import numpy as np
 from .array_types import FloatArray
 from .path.via_points import LocatedViaPoints
 from .surface_points import SurfacePoints
-
-Progress = Callable[[float, FloatArray], object]
-"""Called with the fraction done and the points of the curve so far, (n, 3); False stops."""
 
 
 @dataclass(frozen=True)

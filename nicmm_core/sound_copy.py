@@ -8,13 +8,12 @@ is there. Three things may differ:
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
   off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
   there are doubled.
-- Vertices of faces without area are moved by a thousandth of their shortest edge that has a length,
-  each its own way, so that every face has an area.
+- Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
+  that has a length, each its own way, so that every face has an area.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -24,9 +23,14 @@ from scipy.sparse import csgraph
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, unique_edges
 from .mesh_copy import MeshCopy
+from .progress import checkpoint
 
-FLAT = 1e-10
-"""Sine between the longest and the shortest edge of a face below which it has no area."""
+FLAT = 1e-4
+"""Sine between the longest and the shortest edge of a face below which it counts as without area.
+
+Cotangents are found from lengths of edges, with which no sine below 1e-8 can be told from none, and
+a bending energy with cotangents of a millionth degree is no energy of the surface any more.
+"""
 
 SHORT = 1e-12
 """Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
@@ -40,25 +44,39 @@ ATTEMPTS = 4
 ROUNDS = 8
 """Of cutting one edge further where a cut does not come apart."""
 
+BLOCK = 50_000
+"""Faces that are looked at together."""
+
 SEED = 0
 """Of the ways in which vertices are moved; the same mesh has the same copy."""
 
 
-def sound_copies(mesh: Mesh) -> Iterator[MeshCopy]:
-    """The copy of a mesh, and another where that separates points that are connected.
+def sound_copy(mesh: Mesh, number: int) -> MeshCopy | None:
+    """A copy of a mesh, the first or one for points that those before separate.
 
-    The first goes straight on where more than two faces share an edge. The second joins as many
-    parts of the surface as it can.
+    Parameters
+    ----------
+    mesh : Mesh
+    number : int
+        0: where more than two faces share an edge the surface goes straight on. 1: as many parts
+        of it are joined there as can be.
+
+    Returns
+    -------
+    MeshCopy or None
+        None where there is no further one.
     """
-    sides = _Sides(mesh.faces)
+    kept = np.arange(len(mesh.faces))
     if mesh.branches:
         kept = _without_twins(mesh.faces)
-        sides = _Sides(mesh.faces[kept])
-        for joined in (sides.straight_on, sides.linked):
-            yield _with_areas(mesh, *sides.cut(joined(mesh.vertices), len(mesh.vertices)), kept)
-    else:
-        every = np.arange(len(mesh.faces))
-        yield _with_areas(mesh, *sides.cut(sides.plain_pairs, len(mesh.vertices)), every)
+    elif number > 0:
+        return None
+    sides = _Sides(mesh.faces[kept])
+    joinings = (sides.straight_on, sides.linked)
+    if number == len(joinings):
+        return None
+    pairs = joinings[number](mesh.vertices)
+    return _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -79,11 +97,14 @@ class _Sides:
         swapped = faces.ravel()[first] > faces.ravel()[second]
         self._low, self._high = np.where(swapped, [second, first], [first, second])
         vertices = faces.ravel()
+        checkpoint()
         keys = vertices[self._low] * (int(vertices.max()) + 1) + vertices[self._high]
         self._order = np.argsort(keys, kind="stable")
+        checkpoint()
         _, self._first, self._count = np.unique(
             keys[self._order], return_index=True, return_counts=True
         )
+        checkpoint()
 
     def _corners(self, step: int) -> IntArray:
         corner = np.arange(self._faces.size)
@@ -108,6 +129,7 @@ class _Sides:
         """Pairs of sides that are joined, shape (p, 2): those that go on most straightly."""
         pairs = [self.plain_pairs]
         for sides in self._branching:
+            checkpoint()
             pairs.append(self._straightest(sides, vertices))
         return np.concatenate(pairs)
 
@@ -126,6 +148,7 @@ class _Sides:
             groups.setdefault(parts, []).append(sides)
         pairs = [self.plain_pairs]
         for parts, edges in groups.items():
+            checkpoint()
             if len(parts) == 1:
                 pairs += [self._straightest(sides, vertices) for sides in edges]
                 continue
@@ -172,12 +195,15 @@ class _Sides:
         one, other = pairs.T
         rows = np.concatenate([self._low[one], self._high[one]])
         columns = np.concatenate([self._low[other], self._high[other]])
+        checkpoint()
         graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
         n_labels, label = csgraph.connected_components(graph, directed=False)
+        checkpoint()
         source = np.zeros(n_labels, dtype=np.int64)
         source[label] = corner
         # One of the copies keeps the number of the vertex.
         first = np.unique(source, return_index=True)[1]
+        checkpoint()
         number = np.full(n_labels, -1)
         number[first] = source[first]
         new = np.flatnonzero(number < 0)
@@ -185,6 +211,7 @@ class _Sides:
         corners = number[label]
         vertex = np.concatenate([np.arange(n_vertices), source[new]])
         for _ in range(ROUNDS):
+            checkpoint()
             corners, vertex, changed = self._slit(pairs, corners, vertex)
             if not changed:
                 break
@@ -202,6 +229,7 @@ class _Sides:
         partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
         own = []
         for sides in self._branching:
+            checkpoint()
             ends = np.sort(corners[np.stack([self._low[sides], self._high[sides]])], axis=0)
             for edge in np.unique(ends, axis=1).T:
                 here = sides[(ends == edge[:, None]).all(axis=0)]
@@ -225,13 +253,16 @@ def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -
     flat = _flat(vertices, faces, short)
     if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
         return MeshCopy(mesh, mesh, vertex, face)
+    origin = np.zeros(3)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
-        vertices = vertices - vertices[faces[0, 0]]
+        origin = vertices[faces[0, 0]]
+        vertices = vertices - origin
         start, still = vertices, flat
         reach = MOVED * _shortest_edges(vertices, faces, short)
         generator = np.random.default_rng(SEED)
         for _ in range(ATTEMPTS):
+            checkpoint()
             moving = np.zeros(len(vertices), dtype=bool)
             moving[faces[still]] = True
             moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
@@ -239,7 +270,7 @@ def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -
             still = _flat(vertices, faces, short)
             if not still.any():
                 break
-    return MeshCopy(mesh, Mesh(vertices, faces), vertex, face)
+    return MeshCopy(mesh, Mesh(vertices, faces), vertex, face, origin)
 
 
 def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
@@ -247,11 +278,17 @@ def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
 
     Needles have an area, however thin: their shortest edge stands across the longest.
     """
-    corner = vertices[faces]
-    sides = np.roll(corner, -1, axis=1) - corner
-    lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
-    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return (lengths[:, 0] <= short) | (twice_area <= FLAT * lengths[:, 0] * lengths[:, 2])
+    flat = np.zeros(len(faces), dtype=bool)
+    for first in range(0, len(faces), BLOCK):
+        checkpoint()
+        block = slice(first, first + BLOCK)
+        corner = vertices[faces[block]]
+        sides = np.roll(corner, -1, axis=1) - corner
+        lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        flat[block] = lengths[:, 0] <= short
+        flat[block] |= twice_area <= FLAT * lengths[:, 0] * lengths[:, 2]
+    return flat
 
 
 def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:

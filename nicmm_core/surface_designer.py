@@ -6,10 +6,8 @@ The main path for one checked request; `design` is the front of it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from .design_result import STATUS, Design, Status
 from .free_surface import check_reachable, free_surface
 from .level_set import variational
 from .level_set.features import feature_map
-from .level_set.losses import LossWeights, balanced
+from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
@@ -28,18 +26,20 @@ from .mesh import Mesh
 from .mesh_copy import MeshCopy
 from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
+from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.exact_curve import ExactCurve
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
-from .request import Progress, Request, same_course, same_request
+from .request import Request, same_course, same_request
 
-PROGRESS_INTERVAL = 0.25
-"""Least seconds between two calls of a caller's progress function."""
+STARTED = 0.6
+"""About how much of the time is over when relaxation begins."""
 
-State = TypeVar("State")
+SOON_DONE = 5
+"""The cap of a relaxation, in numbers of iterations that most need."""
 
 
 @dataclass(frozen=True)
@@ -93,16 +93,13 @@ class SurfaceDesigner:
         if self._free is not None and self._free.copy is not None:
             self._free.designer.forget()
 
-    def design(
-        self, request: Request, method: str, progress: Progress | None, started: float
-    ) -> Design:
+    def design(self, request: Request, method: str, started: float) -> Design:
         """Design a curve.
 
         Parameters
         ----------
         request : Request
         method : {"nicmm", "nicmm-paper", "variational"}
-        progress : callable or None
         started : float
             When the design began, by `time.perf_counter`.
 
@@ -116,12 +113,21 @@ class SurfaceDesigner:
             check_reachable(free.copy, request)
             there = free.copy.request(replace(request, clearance=0.0))
             assert there is not None  # as it has just been checked
-            return free.copy.design(free.designer.design(there, method, progress, started))
+            return free.copy.design(free.designer.design(there, method, started))
         if method == "nicmm":
-            return self._designed(request, progress, started)
-        problem = requested_problem(self.mesh, request)
-        solution = self._solution(problem, request, method, progress)
-        zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
+            return self._designed(request, started)
+        with part(0.0, 0.3):
+            problem = requested_problem(self.mesh, request)
+        watch = _FieldWatch(self.mesh, problem)
+        try:
+            with part(0.3, 0.9):
+                solution = self._solution(problem, request, method, watch)
+            zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
+        except CancelledError:
+            if watch.shown is None:
+                raise
+            design = self._level_set_design(problem, watch.solution, watch.shown, started)
+            return replace(design, iterations=watch.shown_after)
         return self._level_set_design(problem, solution, zeros, started)
 
     def _without_obstacles(self, request: Request) -> _Free | None:
@@ -136,28 +142,30 @@ class SurfaceDesigner:
             last = self._free = _Free(request.obstacles, request.clearance, copy, designer)
         return last
 
-    def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
+    def _designed(self, request: Request, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
         last = self._last
         if last is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
         start = self._start_from_last(request)
         if start is not None:
-            return self._relaxed(request, start, WARM, progress, started)
-        start = self._start_from_coarse(request)
-        if start is None:
-            found = predicted(self.mesh, request)
-            problem, zeros = found.problem, found.zeros
-            if not zeros.is_simple_curve(self.mesh, request.closed):
-                return self._level_set_design(problem, found.solution, zeros, started)
-            start = _Start(
-                curve=zeros.curves[0],
-                visited=problem.loop.order,
-                surface=self._curve_surface(request),
-                unit=problem.unit,
-                breaking=zeros.breaking_vertices,
-            )
-        return self._relaxed(request, start, RelaxationConfig(), progress, started)
+            return self._relaxed(request, start, WARM, started)
+        with part(0.0, STARTED):
+            start = self._start_from_coarse(request)
+            if start is None:
+                found = predicted(self.mesh, request)
+                problem, zeros = found.problem, found.zeros
+                if not zeros.is_simple_curve(self.mesh, request.closed):
+                    return self._level_set_design(problem, found.solution, zeros, started)
+                start = _Start(
+                    curve=zeros.curves[0],
+                    visited=problem.loop.order,
+                    surface=self._curve_surface(request),
+                    unit=problem.unit,
+                    breaking=zeros.breaking_vertices,
+                )
+        with part(STARTED, 1.0):
+            return self._relaxed(request, start, RelaxationConfig(), started)
 
     def _start_from_last(self, request: Request) -> _Start | None:
         """The last curve with its control points moved; None where the request is too different."""
@@ -188,11 +196,14 @@ class SurfaceDesigner:
         request: Request,
         start: _Start,
         config: RelaxationConfig,
-        progress: Progress | None,
         started: float,
     ) -> Design:
         """The design that relaxation makes of a curve; it is kept for the next request."""
-        watch = None if progress is None else _seldom(progress, lambda points: points)
+
+        def watch(done: float, points: FloatArray) -> bool:
+            checkpoint(1.0 - (1.0 - done) ** SOON_DONE, lambda: points)
+            return True
+
         surface, unit = start.surface, start.unit
         relaxed = relax(surface, start.curve, request.smoothness, config, watch)
         feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
@@ -227,10 +238,9 @@ class SurfaceDesigner:
         )
 
     def _solution(
-        self, problem: Problem, request: Request, method: str, progress: Progress | None
+        self, problem: Problem, request: Request, method: str, watch: _FieldWatch
     ) -> Solution:
         """The level set that a method other than "nicmm" finds."""
-        watch = None if progress is None else self._field_watcher(problem, progress)
         weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
@@ -264,31 +274,34 @@ class SurfaceDesigner:
     def _coarse_starts(self) -> CoarseStarts:
         return CoarseStarts(self.mesh, self._normals)
 
-    def _field_watcher(
-        self, problem: Problem, progress: Progress
-    ) -> Callable[[float, FloatArray], bool]:
-        def points(field: FloatArray) -> FloatArray:
-            curves = zero_set(self.mesh, problem, field).curves
-            return curves[0].points if curves else np.zeros((0, 3))
 
-        return _seldom(progress, points)
+class _FieldWatch:
+    """Shows the zero set of a level set that is being solved for, and keeps the last one shown."""
 
+    def __init__(self, mesh: Mesh, problem: Problem) -> None:
+        self._mesh, self._problem = mesh, problem
+        self._iterations = 0
+        self.shown: ZeroSet | None = None
+        self.shown_after = 0
 
-def _seldom(
-    progress: Progress, points: Callable[[State], FloatArray]
-) -> Callable[[float, State], bool]:
-    """Call a progress function with the points of a state, but not too often."""
-    last_call = -np.inf
+    def __call__(self, done: float, field: FloatArray) -> bool:
+        self._iterations += 1
+        checkpoint(done, partial(self._show, field, self._iterations))
+        return True
 
-    def watch(fraction: float, state: State) -> bool:
-        nonlocal last_call
-        if time.perf_counter() - last_call < PROGRESS_INTERVAL:
-            return True
-        last_call = time.perf_counter()
-        # A copy, with which the caller may do as it likes.
-        return progress(fraction, points(state).copy()) is not False
+    @property
+    def solution(self) -> Solution:
+        """The level set that was shown last, of a solver that has been cancelled."""
+        assert self.shown is not None  # as the caller has asked
+        field = self.shown.field
+        terms = loss_terms(energy_surface(self._problem), field)
+        terms = {name: float(value) for name, value in terms.items()}
+        return Solution(field, terms, [], "cancelled")
 
-    return watch
+    def _show(self, field: FloatArray, iteration: int) -> FloatArray:
+        zeros = zero_set(self._mesh, self._problem, field)
+        self.shown, self.shown_after = zeros, iteration
+        return zeros.curves[0].points if zeros.curves else np.zeros((0, 3))
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:

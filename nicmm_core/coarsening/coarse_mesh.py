@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
 from ..mesh import Mesh
+from ..progress import checkpoint
 from ..surface_points import SurfacePoints, nearest_points
 
 CANDIDATES = 8
@@ -88,6 +89,7 @@ class CoarseMesh:
         positions = points.positions(fine)
         faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
         for number, vertex in enumerate(self.cell[corner]):
+            checkpoint()
             around = self.mesh.faces_at(self.cells_around(vertex[None]))
             if not len(around):
                 raise UnreachableError("a cell of the coarse mesh has no face")
@@ -117,16 +119,22 @@ def build_coarse_mesh(
     """
     faces = mesh.faces[mesh.face_component == component]
     areas = np.zeros(len(mesh.vertices))
+    checkpoint()
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
+    checkpoint()
     seed = _seeds(mesh, vertex_normals, areas, count)
+    graph = _edge_graph(mesh)
+    checkpoint()
     _, _, nearest = csgraph.dijkstra(
-        _edge_graph(mesh), directed=False, indices=seed, min_only=True, return_predecessors=True
+        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
     )
+    checkpoint()
     cell_of = np.full(len(mesh.vertices), -1)
     cell_of[seed] = np.arange(len(seed))
     cell = np.where(nearest >= 0, cell_of[np.maximum(nearest, 0)], -1)
     corners = cell[faces]
     apart = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    checkpoint()
     corners = corners[apart]
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
@@ -137,7 +145,9 @@ def build_coarse_mesh(
 def _edge_graph(mesh: Mesh) -> sparse.csr_array:
     """Lengths of the edges, each in one place, shape (V, V)."""
     start, end = mesh.edges.T
+    checkpoint()
     length = np.linalg.norm(mesh.vertices[start] - mesh.vertices[end], axis=1)
+    checkpoint()
     size = len(mesh.vertices)
     return sparse.csr_array((length, (start, end)), shape=(size, size))
 
@@ -160,6 +170,7 @@ def _seeds(mesh: Mesh, normals: FloatArray, areas: FloatArray, count: int) -> In
     free = np.ones(size, dtype=bool)
     chosen = []
     for place in range(size):
+        checkpoint()
         if free[place]:
             chosen.append(place)
             free[graph.indices[graph.indptr[place] : graph.indptr[place + 1]]] = False

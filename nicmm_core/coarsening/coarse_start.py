@@ -11,6 +11,7 @@ from ..curve import SurfaceCurve
 from ..errors import NicmmError
 from ..mesh import Mesh
 from ..network.single_pass import predicted
+from ..progress import part
 from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
 from ..request import Request
 from ..surface_points import SurfacePoints, locate_control_points
@@ -28,6 +29,10 @@ SMALL = 3_000
 
 GROWTH = 4
 """Growth of the number of cells from one coarse mesh that gives no curve to the next."""
+
+
+COARSE_SHARE = 0.3
+"""About how much of the time to the first start on a mesh its coarse mesh takes."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +104,8 @@ class CoarseStarts:
     def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        zeros = predicted(coarse.mesh, on_coarse).zeros
+        with part(COARSE_SHARE, 0.9):
+            zeros = predicted(coarse.mesh, on_coarse).zeros
         if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None
         curve = zeros.curves[0]

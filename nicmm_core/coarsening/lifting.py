@@ -17,6 +17,7 @@ from scipy.sparse import csgraph
 from ..array_types import IntArray
 from ..curve import SurfaceCurve
 from ..mesh import Mesh, unique_edges
+from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
 from ..relaxation.face_walks import strictly_inside
@@ -56,6 +57,7 @@ def lifted(
         Simple and exactly through its control points; None where that does not come out.
     """
     for count in NODES:
+        checkpoint()
         exact = exact_curve(coarse_surface, curve, count)
         result = _lifted_nodes(surface, coarse, exact, controls)
         if result is not None and is_simple(surface, result):
@@ -78,6 +80,7 @@ def _lifted_nodes(
     polyline, node_place, lost = straight_ways(fine, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
+        checkpoint()
         following = (node + 1) % len(cell)
         around = coarse.cells_around(np.unique(cell[[node, following]]))
         bridge = _way_along_edges(fine, coarse.faces_of_cells(fine, around), nodes, node, following)
@@ -95,6 +98,7 @@ def _nearest_points(
     cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
     faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
     for one in np.unique(cell).tolist():
+        checkpoint()
         here = np.flatnonzero(cell == one)
         found, _ = nearest_points(
             fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))

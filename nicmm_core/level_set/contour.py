@@ -15,6 +15,7 @@ from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve, curve_on_mesh
 from ..mesh import Mesh
 from ..path.virtual_splits import WorkingMesh
+from ..progress import checkpoint
 from .sign_bundle import SignBundle, local_signs
 from .vertex_links import VertexLinks
 
@@ -105,6 +106,7 @@ def _passed_vertices(
     taken = set(control_vertices.tolist())
     passed = []
     for vertex in near[np.argsort(farthest[near], kind="stable")].tolist():
+        checkpoint()
         if taken.isdisjoint(links.neighbours(vertex)) and links.is_simple(vertex, sign):
             taken.add(vertex)
             passed.append(vertex)
@@ -224,6 +226,7 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
 
     irregular = [node for node in range(n_nodes) if len(at_node[node]) != 2]
     for start in [*irregular, *range(n_nodes)]:
+        checkpoint()
         for segment in at_node[start]:
             if unused[segment]:
                 chain, along = walk(start, segment)

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..array_types import FloatArray, IntArray
+from ..progress import checkpoint
 
 BASE_CHANNELS = 8
 """Position 3, normal 3, φ_p, φ₀."""
@@ -67,6 +68,7 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Unit normals weighted by corner angle, shape (n, 3); zero where they cancel."""
+    checkpoint()
     normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
     return np.nan_to_num(normals)
 
@@ -109,6 +111,7 @@ def _spread(vertices: FloatArray, weights: FloatArray | None, edge_length: float
     levels = np.linspace(0.0, 1.0, WEIGHT_LEVELS + 1)[1:]
     level_of = np.searchsorted(levels, weights[painted], side="left").clip(max=WEIGHT_LEVELS - 1)
     for index in np.unique(level_of):
+        checkpoint()
         sigma = levels[index] * FEATURE_WIDTH * edge_length
         tree = cKDTree(vertices[painted[level_of == index]])
         distance, _ = tree.query(vertices, distance_upper_bound=4.0 * sigma)

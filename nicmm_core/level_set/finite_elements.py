@@ -11,6 +11,7 @@ from scipy import sparse
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
 from ..mesh import triangle_areas
+from ..progress import checkpoint
 from .sign_bundle import SignBundle, corner_matrix
 from .sparse_solver import DEGENERATE
 
@@ -69,6 +70,7 @@ def build_finite_elements(
     thirds = np.full(3 * n_faces, 1.0 / 3.0)
     plain_centroid = sparse.csr_array((thirds, corners), shape=(n_faces, n_vertices))
     vertex_areas = plain_centroid.T @ face_areas
+    checkpoint()
     if bundle is None:
         centroid = plain_centroid
         stiffness = sparse.csr_array(-igl.cotmatrix(vertices, faces))
@@ -82,6 +84,7 @@ def build_finite_elements(
         at_corners = vertices[faces].reshape(-1, 3)
         stiffness = sparse.csr_array(reading.T @ (-igl.cotmatrix(at_corners, apart)) @ reading)
         gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
+    checkpoint()
     if not (vertex_areas > 0.0).all():
         raise MeshError(DEGENERATE)
     inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)

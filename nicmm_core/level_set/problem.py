@@ -18,6 +18,7 @@ from ..path.band_refinement import PIECES
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
+from ..progress import checkpoint, part
 from ..request import Request
 from ..surface_points import SurfacePoints
 from .features import (
@@ -47,6 +48,10 @@ END_RADIUS = 3.0
 
 φ is a cone about the end, whose Laplacian grows without bound and says nothing of the curve.
 """
+
+
+PATH_SHARE, SMOOTHED_SHARE = 0.6, 0.9
+"""About how much of the time is over when the path is there, and when φ₀ is."""
 
 
 @dataclass(frozen=True)
@@ -137,12 +142,17 @@ def build_problem(
     importance = None
     if obstacles is not None or alignment is not None:
         importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
-    working, loop = build_initial_loop(mesh, points, order, importance, closed, via_points, pieces)
+    with part(0.0, PATH_SHARE):
+        working, loop = build_initial_loop(
+            mesh, points, order, importance, closed, via_points, pieces
+        )
+    checkpoint(PATH_SHARE, lambda: working.vertices[loop.vertices])
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
     edge_length = loop.edge_length / unit
     elements = build_finite_elements(vertices, working.faces, working.on_boundary)
     plain, bundle = elements, None
+    checkpoint()
     side = bounding_side(working, elements, loop) if closed else None
     if side is None:
         bundle = build_sign_bundle(working, loop)
@@ -154,6 +164,7 @@ def build_problem(
     smoother = build_smoother(
         elements, loop.control_vertices, length, None if bundle is None else plain
     )
+    checkpoint(SMOOTHED_SHARE)
     initial_distance, _ = keep_topology(
         working, loop, distance, smoother.smoothed(distance), bundle
     )

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from ..array_types import FloatArray, IntArray
+from ..progress import checkpoint
 from .contour import segment_ends, signs_with_zeros
 from .sign_bundle import SignBundle
 from .signed_distance import LEAST_DISTANCE
@@ -119,6 +120,7 @@ def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None
     changed = np.flatnonzero(settled)
     least_gain = SETTLED * surface.edge_length
     while len(changed):
+        checkpoint()
         faces = surface.faces[np.unique(surface.faces_around[changed].indices)]
         # Each corner in turn is reached from the other two.
         reached, first, second = (np.roll(faces, k, axis=1).ravel() for k in range(3))

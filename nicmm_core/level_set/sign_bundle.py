@@ -24,6 +24,7 @@ from scipy.sparse import csgraph
 from ..array_types import IntArray
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
+from ..progress import checkpoint
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,7 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
     before: dict[int, int] = {}
     for place in inner:
         vertex = int(loop.vertices[place])
+        checkpoint()
         around = at_corners[[vertex]].indices // 3
         side_of = _sides(faces, around, vertex, loop.neighbours(place))
         # Sides at one vertex of the path go on as those at the next one.
@@ -116,6 +118,7 @@ def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray
         return_predecessors=True,
     )
     for vertex in np.argsort(distance, kind="stable").tolist():
+        checkpoint()
         if side[vertex] == 0:
             side[vertex] = side[previous[vertex]] if previous[vertex] >= 0 else 1
     return side

@@ -15,8 +15,12 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from ..array_types import FloatArray, IntArray
+from ..progress import checkpoint
 from .finite_elements import FiniteElements
 from .sparse_solver import factorise
+
+AT_ONCE = 8
+"""Systems that are solved together; many at once would be one long call."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,11 @@ def build_smoother(
     response_factor = factor if plain is None else factorise(_bending_operator(plain, length))
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
-    fields = response_factor.solve(loads)
+    fields = np.empty_like(loads)
+    for first in range(0, len(control_vertices), AT_ONCE):
+        checkpoint()
+        columns = slice(first, first + AT_ONCE)
+        fields[:, columns] = response_factor.solve(loads[:, columns])
     response = np.linalg.solve(fields[control_vertices].T, fields.T).T
     return Smoother(factor, elements.vertex_areas, control_vertices, response)
 

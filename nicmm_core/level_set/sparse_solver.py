@@ -10,6 +10,7 @@ from scipy.sparse import csgraph, linalg
 
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError
+from ..progress import checkpoint
 
 DEGENERATE = (
     "faces: the part of the mesh with the control points has faces without area, on which no "
@@ -52,11 +53,14 @@ def factorise(matrix: sparse.sparray) -> Factors:
     """
     if not np.isfinite(matrix.data).all():
         raise MeshError(DEGENERATE)
+    checkpoint()
     order = None
     if matrix.shape[0] >= PREORDERED_FROM:
         rows = sparse.csr_array(matrix)
         order = csgraph.reverse_cuthill_mckee(rows, symmetric_mode=True).astype(np.int64)
+        checkpoint()
         matrix = rows[order][:, order]
+        checkpoint()
     try:
         factors = linalg.splu(
             sparse.csc_array(matrix),

@@ -19,6 +19,7 @@ from scipy.sparse import csgraph
 from ..array_types import FloatArray, IntArray
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
+from ..progress import checkpoint
 from .contour import signs_with_zeros
 from .sign_bundle import SignBundle
 from .vertex_links import VertexLinks
@@ -70,6 +71,7 @@ def keep_topology(
     for attempt in range(FALLBACK_ATTEMPTS):
         if not len(breaking):
             return field, n_breaking
+        checkpoint()
         radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
         share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
         field = start + share * (wanted - start)
@@ -102,6 +104,7 @@ def breaking_vertices(
     queue = deque(np.flatnonzero(sign != goal).tolist())
     queued = sign != goal
     while queue:
+        checkpoint()
         vertex = queue.popleft()
         queued[vertex] = False
         if not links.is_simple(vertex, sign):

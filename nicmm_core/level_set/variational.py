@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from ..array_types import BoolArray, FloatArray
+from ..progress import checkpoint
 from .losses import LossWeights, energy_surface, loss_terms
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
 from .problem import Problem
@@ -160,6 +161,7 @@ def gauss_newton_step(
     beside = np.abs(values) < config.beside * h
     free = np.ones(len(values), dtype=bool)
     for _ in range(config.trials):
+        checkpoint()
         step = _damped_step(band, hessian, gradient, weights.sdf * damping, free)
         farthest = np.abs(step[beside]).max(initial=0.0)
         if farthest > config.longest_move * h:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..array_types import Array
+from ..progress import checkpoint
 
 POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)
 INDICATOR_CHANNEL, DISTANCE_CHANNEL = 6, 7
@@ -171,6 +172,7 @@ def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operatio
     hidden = linear(parameters, "stem", given.features * seen, operations)  # (n, C)
     hidden = operations.tanh(hidden)  # (n, C)
     for number in range(config.depth):
+        checkpoint()
         hidden = block(weights, f"blocks.{number}", hidden, given.area_share, operations)  # (n, C)
     correction = linear(parameters, "head", hidden, operations)[:, 0]  # (n,)
     at_controls = correction[given.control_vertices]  # (k,)

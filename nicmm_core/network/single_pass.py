@@ -13,6 +13,7 @@ from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, zero_set
 from ..mesh import Mesh
 from ..path.band_refinement import PIECES_TO_START
+from ..progress import part
 from ..request import Request
 from .forward_pass import NetworkInput, NetworkWeights, Operations, level_set
 from .weights_file import shipped_weights
@@ -44,9 +45,11 @@ def predicted(mesh: Mesh, request: Request) -> Predicted:
     UnreachableError
         If no simple path passes the points in this order.
     """
-    problem = requested_problem(mesh, request, PIECES_TO_START)
-    solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
-    return Predicted(problem, solution, zero_set(mesh, problem, solution.field))
+    with part(0.0, 0.8):
+        problem = requested_problem(mesh, request, PIECES_TO_START)
+    with part(0.8, 1.0):
+        solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
+        return Predicted(problem, solution, zero_set(mesh, problem, solution.field))
 
 
 def predict_once(weights: NetworkWeights, problem: Problem) -> Solution:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..array_types import BoolArray, FloatArray
+from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 
 PIECES = 64
@@ -27,7 +28,7 @@ BAND_SHARE = 0.05
 It holds what the curve may move. Farther out, the longest edge grows with twice the distance.
 """
 
-MOST_SPLITS = 20_000
+MOST_SPLITS = 8_000
 """Edges that are halved at most; needle-shaped faces side by side would ask for many times more.
 
 The longest edges come first, so that stopping leaves the band evenly coarser.
@@ -76,6 +77,7 @@ def refine_along(
         return size, (size > longest) & (distance < half_width + 0.5 * size)
 
     working, renumbered = split.assemble(component)
+    checkpoint()
     original = np.flatnonzero(renumbered >= 0)
     edges = working.edges[working.edge_lengths > longest]
     size, wanted = too_long(*working.vertices[edges].transpose(1, 0, 2))

@@ -11,6 +11,7 @@ from scipy.sparse import csgraph
 
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
+from ..progress import checkpoint
 
 Node = int | tuple[int, int]
 """A vertex of the split mesh, or an edge of it for its midpoint."""
@@ -76,6 +77,7 @@ class Patch:
         )
         # Two faces with the same corners give arcs twice, whose numbers must not be added.
         entries.has_canonical_format = True
+        checkpoint()
         matrix = entries.tocsr()
         return matrix.data, matrix.indices, matrix.indptr
 
@@ -117,11 +119,14 @@ def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
     vertex = np.concatenate([faces.ravel(), faces.ravel()])
     other = np.concatenate([np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()])
     node = np.concatenate([corner.ravel(), corner.ravel()])
+    checkpoint()
     by_edge = np.argsort(vertex * n_vertices + other, kind="stable")
+    checkpoint()
     vertex, other, node = vertex[by_edge], other[by_edge], node[by_edge]
     same = (vertex[1:] == vertex[:-1]) & (other[1:] == other[:-1])
     entries = (np.ones(same.sum(), dtype=np.int8), (node[:-1][same], node[1:][same]))
     graph = sparse.coo_array(entries, shape=(faces.size, faces.size))
+    checkpoint()
     n_fans, fan = csgraph.connected_components(graph, directed=False)
     vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
     vertex_of_fan[fan] = faces.ravel()

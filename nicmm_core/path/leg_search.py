@@ -14,6 +14,7 @@ from scipy.sparse import csgraph
 
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh, unique_edges
+from ..progress import checkpoint
 from .leg_graph import Node, Patch, pinched_vertices
 from .virtual_splits import SplitMesh
 
@@ -134,6 +135,7 @@ class LegSearch:
         apart += np.linalg.norm(self._mesh.vertices - end, axis=1)
         reach = FIRST_REACH * float(np.linalg.norm(end - start))
         while True:
+            checkpoint()
             near = apart <= reach + 2.0 * (self._clearance + self._longest_edge)
             inside = self._component & near[self._mesh.faces].any(axis=1)
             whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
@@ -169,11 +171,13 @@ class LegSearch:
         factor = self._branch_factor(patch)
         if factor is not None:
             lengths *= factor[patch.arcs].mean(axis=1)
+        checkpoint()
         avoided = patch.places(np.append(obstacles.vertices, source))
         ends = patch.places(np.append(obstacles.ends, source))
         beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
         lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
 
+        checkpoint()
         (here,), (there,) = (patch.places(np.array([vertex])) for vertex in (source, target))
         free = self._free(patch, obstacles, np.array([here, there]))
         lengths[~free[patch.arcs].all(axis=1)] = np.inf
@@ -205,15 +209,18 @@ class LegSearch:
         the boundary have no arcs: a path along it would cut off what lies beyond.
         """
         vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
+        checkpoint()
         faces = faces.reshape(-1, 3)
         edges, count = unique_edges(faces)
         n_vertices = len(vertices)
         corner = self._split.positions(vertices)
         node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
+        checkpoint()
         sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         keys = edges[:, 0] * n_vertices + edges[:, 1]
         side_node = n_vertices + np.searchsorted(keys, sides[:, 0] * n_vertices + sides[:, 1])
         side_node = side_node.reshape(-1, 3)
+        checkpoint()
         inner = count > 1
         midpoint = n_vertices + np.flatnonzero(inner)
         arcs = np.concatenate(
@@ -313,7 +320,9 @@ def _closeness(
     nearest taken node is not the end itself. So the curve goes on through its control points
     instead of turning back at them.
     """
+    checkpoint()
     to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)
+    checkpoint()
     to_ends = csgraph.dijkstra(graph, indices=ends, min_only=True)
     beside = np.zeros(graph.shape[0])
     near = np.isfinite(to_taken) & (to_taken < to_ends)

@@ -16,7 +16,7 @@ from .leg_graph import Node
 from .leg_search import Leg, LegSearch, Obstacles
 from .virtual_splits import SplitMesh
 
-MOST_PATH_SPLITS = 20_000
+MOST_PATH_SPLITS = 12_000
 """Virtual splits after which a path is given up: each winding needs more than the one before."""
 
 

@@ -34,6 +34,9 @@ MOST_TRIES = 6
 MOST_TRIES_WHILE_CROSSING = 14
 """Paths that are laid at most as long as legs of each would cross."""
 
+MOST_SPLITS_TO_TRY = 40_000
+"""Virtual splits, of all paths that are laid, after which no other is tried."""
+
 SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0
 """How far a try changes which legs come first: standard deviation of the logarithm of lengths."""
 
@@ -90,6 +93,7 @@ def lay_path(
     best: Path | None = None
     failure: UnreachableError | None = None
     sequence: IntArray | None = None
+    splits = 0
     for attempt in range(MOST_TRIES_WHILE_CROSSING):
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
@@ -110,7 +114,8 @@ def lay_path(
         if best is not None and best.length <= LONG * unhindered.sum():
             break
         crossing = best is None and isinstance(failure, CrossingError)
-        if attempt + 1 >= MOST_TRIES and not crossing:
+        splits += split.n_vertices - len(mesh.vertices)
+        if splits > MOST_SPLITS_TO_TRY or (attempt + 1 >= MOST_TRIES and not crossing):
             break
         scale = SHUFFLE_WHILE_CROSSING if crossing else SHUFFLE
         shuffle = generator.normal(scale=scale, size=legs.count) if attempt > 0 else 0.0

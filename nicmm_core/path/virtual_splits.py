@@ -16,6 +16,7 @@ from scipy import sparse
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh, triangle_areas, unique_edges
+from ..progress import checkpoint
 from ..surface_points import SurfacePoints
 
 Weights = dict[int, float]
@@ -225,12 +226,14 @@ class SplitMesh:
         mesh = self._mesh
         kept = np.flatnonzero(self._alive & (mesh.face_component == component))
         new_faces, new_parents = self._living_new_faces()
+        checkpoint()
 
         faces = np.concatenate([mesh.faces[kept], new_faces])
         used = np.unique(faces)
         n_input = len(mesh.vertices)
         renumbered = np.full(n_input + len(self._new_weights), -1, dtype=np.int64)
         renumbered[used] = np.arange(len(used))
+        checkpoint()
         interpolation = self._interpolation(used)
         working = WorkingMesh(
             vertices=interpolation @ mesh.vertices,
@@ -248,6 +251,7 @@ class SplitMesh:
         columns = [used[:n_kept]]
         values = [np.ones(n_kept)]
         for row, vertex in enumerate(used[n_kept:], start=n_kept):
+            checkpoint()
             weights = self._new_weights[vertex - n_input]
             rows.append(np.full(len(weights), row))
             columns.append(np.fromiter(weights.keys(), dtype=np.int64))
@@ -320,6 +324,7 @@ class SplitMesh:
         return faces[new], parents[new]
 
     def _add_vertex(self, weights: Weights) -> int:
+        checkpoint()
         vertex = self.n_vertices
         self._new_weights.append(weights)
         corners = self._mesh.vertices[list(weights)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..array_types import FloatArray, IntArray
+from ..progress import checkpoint
 
 EXACT_UP_TO = 9
 """Tours of more points are improved by exchanges instead of being optimal (2^k states)."""
@@ -51,6 +52,7 @@ def _held_karp(distance: FloatArray) -> IntArray:
     for last in range(k - 1):
         best[1 << last, last] = distance[0, last + 1]
     for subset in range(1, n_subsets):
+        checkpoint()
         for last in range(k - 1):
             rest = subset ^ (1 << last)
             if subset >> last & 1 and rest:
@@ -71,6 +73,7 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
     tour = [0]
     unvisited[0] = False
     while unvisited.any():
+        checkpoint()
         nearest = int(np.where(unvisited, distance[tour[-1]], np.inf).argmin())
         tour.append(nearest)
         unvisited[nearest] = False
@@ -82,6 +85,7 @@ def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
     # Below rounding an exchange could undo itself for ever.
     least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
     while True:
+        checkpoint()
         gain, i, j = _best_reversal(distance, tour)
         if gain > least:
             tour[i + 1 : j + 1] = tour[i + 1 : j + 1][::-1].copy()
@@ -109,6 +113,7 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
     best, moved = 0.0, tour
     for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
         # Row i: the points moved are those at i … i + count - 1; column j: to the leg after j.
+        checkpoint()
         before, first = np.roll(tour, 1), tour
         last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
         saved = distance[before, first] + distance[last, after] - distance[before, after]

@@ -11,6 +11,7 @@ from .. import tolerances
 from ..array_types import FloatArray, IntArray
 from ..level_set.features import vertex_normals
 from ..mesh import Mesh, unoriented_vertices
+from ..progress import checkpoint
 from ..surface_points import SurfacePoints
 
 
@@ -44,6 +45,7 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     """
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = unoriented_vertices(mesh.faces)
+    checkpoint()
     incidence = mesh.vertex_faces[mixed]
     owner = np.repeat(np.arange(len(mixed)), np.diff(incidence.indptr))
     face_normals = mesh.face_normals[incidence.indices]

@@ -19,6 +19,7 @@ from ..array_types import BoolArray, FloatArray, IntArray
 from ..crossings import crossing_segments
 from ..curve import SurfaceCurve, curve_on_mesh
 from ..mesh import Mesh
+from ..progress import checkpoint
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .face_walks import join, moved, strictly_inside
@@ -228,6 +229,7 @@ def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[Exa
     stays = np.zeros(len(old), dtype=bool)
     kept = np.zeros(len(old), dtype=bool)
     while True:
+        checkpoint()
         if stays.any():
             places = SurfacePoints(
                 np.where(stays, old.faces, new.faces),

@@ -17,6 +17,7 @@ import numpy as np
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
+from ..progress import checkpoint
 from ..surface_points import SurfacePoints
 
 MOST_FACES = 4096
@@ -69,6 +70,7 @@ def join(
     for _ in range(MOST_FACES):
         if not len(walkers.index):
             break
+        checkpoint()
         step = walkers.step_lengths()
         walkers.enter_next_faces(step <= longest[walkers.index] - travelled[walkers.index])
         travelled[walkers.index] += walkers.last_step
@@ -131,6 +133,7 @@ def moved(
     for _ in range(MOST_FACES):
         if not len(walkers.index):
             break
+        checkpoint()
         step = walkers.step_lengths()
         index = walkers.index
         beyond = walkers.beyond()

@@ -23,6 +23,7 @@ import numpy as np
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..curve import SurfaceCurve
+from ..progress import CancelledError
 from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
     Balance,
@@ -160,17 +161,22 @@ def relax(
     config : RelaxationConfig
     watch : callable, optional
         Called with the fraction of an attempt's cap that is done and the nodes' positions, (n, 3),
-        after every iteration; relaxation stops when it returns False.
+        after every iteration; relaxation stops when it returns False. It also stops, with the
+        curve as it was last drawn, where `progress` says so.
     """
     relaxation = _Relaxation(surface, smoothness, config, watch)
     if isinstance(start, ExactCurve):
         first, start = start, start.surface_curve(surface.mesh)
     else:
         first = exact_curve(surface, start, config.levels[0])
-    for simple in (False, True) if config.drawn_at_rest else (True,):
-        curve = relaxation.run(first, simple)
-        if relaxation.stopped == "cancelled" or _is_simple(surface, curve):
-            break
+    relaxation.drawn = first
+    try:
+        for simple in (False, True) if config.drawn_at_rest else (True,):
+            curve = relaxation.run(first, simple)
+            if relaxation.stopped == "cancelled" or _is_simple(surface, curve):
+                break
+    except CancelledError:
+        curve, relaxation.stopped = relaxation.drawn, "cancelled"
     if curve is not None and _is_simple(surface, curve):
         result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
     else:
@@ -226,6 +232,7 @@ class _Relaxation:
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
         self.iterations, self.stopped = 0, "converged"
+        self.drawn: ExactCurve | None = None  # the last state, if it is stopped at once
 
     def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
         """Bring a curve to rest level by level; None where it could not be drawn there."""
@@ -254,7 +261,7 @@ class _Relaxation:
         """Steps with one number of nodes until the energy falls by less than the least share."""
         config, least_damping = self.config, self._least_damping(level)
         damping = least_damping
-        curve = self._respaced(curve, level, simple)
+        curve = self.drawn = self._respaced(curve, level, simple)
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
         releases = 0
@@ -272,6 +279,7 @@ class _Relaxation:
                 step = self._step(curve, nodes, held, system, weights, damping, simple)
             if step is not None:
                 curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
+                self.drawn = curve
                 done = 1.0 - (last_iteration - self.iterations) / config.iterations
                 if self.watch is not None and not self.watch(done, nodes.positions):
                     self.stopped = "cancelled"
@@ -285,7 +293,7 @@ class _Relaxation:
                 held = np.zeros(len(held), dtype=bool)
             moved = step is not None and step.farthest > SMALL_MOVE
             if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
-                curve = self._respaced(self._drawn(curve, nodes), level, simple)
+                curve = self.drawn = self._respaced(self._drawn(curve, nodes), level, simple)
                 nodes = curve.nodes
                 held = np.zeros(len(nodes.positions), dtype=bool)
         return self._drawn(curve, nodes)
