@@ -1,9 +1,7 @@
 """What a curve encloses: faces and vertices on one side of it.
 
-Two faces lie on the same side where a way leads from one to the other that crosses the curve an
-even number of times. Where a way round the surface crosses it an odd number of times, the curve
-bounds nothing. The rule is that of the sign of a design's level set, `relaxation.curve_field`; but
-a face of the cut mesh has a side even where no vertex of the input mesh lies inside.
+The rule of `sides`, as for the sign of a design's level set (`relaxation.curve_field`); but a face
+of the cut mesh has a side even where no vertex of the input mesh lies inside.
 """
 
 from __future__ import annotations
@@ -12,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..errors import ControlPointError, CurveError
 from ..mesh import Mesh
+from ..sides import two_sides
 from ..surface_points import SurfacePoints, locate_points
 from .cut import CutMesh
 from .shared_sides import shared_sides
@@ -129,25 +126,17 @@ def _sides(cut: CutMesh) -> IntArray:
     """1 or -1 for faces that are connected to the curve, 0 for others, (F',)."""
     n_faces = len(cut.faces)
     shared = shared_sides(cut.faces, cut.chain_edges)
-    one, other = shared.faces.T
-    crosses = shared.on_chain.astype(np.int64)
-    # Every face stands twice in the graph, for either side.
-    rows = np.concatenate([one, one + n_faces])
-    columns = np.concatenate([other + crosses * n_faces, other + (1 - crosses) * n_faces])
-    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * n_faces,) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
-    here, there = label[:n_faces], label[n_faces:]
-    part = np.minimum(here, there)
+    part, side = two_sides(n_faces, shared.faces, shared.on_chain)
     beside = _faces_beside(cut)
     with_curve = np.isin(part, part[beside])
-    if (here == there)[with_curve].any():
+    if (side == 0)[with_curve].any():
         kind = "It is closed, but leads" if cut.closed else "It is open and leaves a way"
         raise CurveError(
             f"curve bounds no region: a way on the surface leads from one side of it to the other. "
             f"{kind} round a handle, a tube or its ends; cut the mesh along it instead, or design "
             "a closed curve that encloses a part of the surface"
         )
-    return np.where(with_curve, np.where(here < there, 1, -1), 0)
+    return np.where(with_curve, side, 0)
 
 
 def _faces_beside(cut: CutMesh) -> IntArray:

@@ -7,13 +7,12 @@ of all other edges on one. Where that contradicts itself, the curve bounds nothi
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..array_types import FloatArray, IntArray
 from ..curve import SurfaceCurve
 from ..level_set.redistancing import build_distance_surface, distance_to_segments, spread
 from ..mesh import Mesh, unique_edges
+from ..sides import two_sides
 
 
 def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
@@ -55,24 +54,17 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     parity = np.zeros(len(edges), dtype=np.int64)
     np.add.at(parity, np.searchsorted(edges @ size, crossed @ size), 1)
     parity %= 2
-    # Every vertex stands twice in the graph, for either sign.
     off = ~on_curve[edges].any(axis=1)
-    (start, end), odd = edges[off].T, parity[off]
-    rows = np.concatenate([start, start + n_vertices])
-    columns = np.concatenate([end + odd * n_vertices, end + (1 - odd) * n_vertices])
-    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * n_vertices,) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
-    positive, negative = label[:n_vertices], label[n_vertices:]
-    if (positive == negative)[~on_curve].any():
+    part, side = two_sides(n_vertices, edges[off], parity[off] == 1)
+    if (side == 0)[~on_curve].any():
         return None
     # What only vertices on the curve join to the rest counts as outside.
-    part = np.minimum(positive, negative)
     here = np.zeros(n_vertices, dtype=bool)
     here[mesh.faces[mesh.face_component == mesh.face_component[curve.faces[0]]]] = True
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n_vertices)
     largest = np.bincount(part, np.where(here & ~on_curve, area, 0.0)).argmax()
     here &= part == largest
-    side = np.where(here & (positive > negative), -1, 1)
+    side = np.where(here, side, 1)
     inside, outside = (area[here & (side == sign)].sum() for sign in (-1, 1))
     if inside > outside:
         side[here] *= -1
