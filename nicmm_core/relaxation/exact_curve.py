@@ -30,6 +30,12 @@ DETOUR = 1.5
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, at which an old point gives way to a new node."""
 
+SHORT = 0.05
+"""Longest segment, relative to the mean step from node to node, that a result goes without.
+
+A tube drawn along the curve would show it as a notch.
+"""
+
 FEWEST_OF_A_LEG = 6
 """Nodes of a leg at least, with the control point at its start."""
 
@@ -65,6 +71,27 @@ class ExactCurve:
         at_controls = self.node_place[self.control_nodes]
         polyline = self.polyline
         return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
+
+
+def without_short_segments(mesh: Mesh, curve: ExactCurve) -> SurfaceCurve:
+    """The polyline as a result, where that leaves it simple without nodes close beside edges.
+
+    The neighbours of a node inside a face can be joined in the same face.
+    """
+    polyline = curve.polyline
+    inside = np.zeros(len(polyline), dtype=bool)
+    inside[np.delete(curve.node_place, curve.control_nodes)] = True
+    inside &= (polyline.barycentric > 0.0).all(axis=1)
+    inside[1:] &= ~inside[:-1]  # One of two nodes in a row stays.
+    positions = polyline.positions(mesh)
+    length = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
+    short = length < SHORT * float(curve.nodes.lengths.mean())
+    kept = ~(inside & (short | np.roll(short, 1)))
+    if kept.all() or len(crossing_segments(mesh, polyline[kept], curve.closed)):
+        return curve.surface_curve(mesh)
+    at_controls = (np.cumsum(kept) - 1)[curve.node_place[curve.control_nodes]]
+    polyline = polyline[kept]
+    return curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
 def exact_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> ExactCurve:

@@ -45,6 +45,7 @@ from .exact_curve import (
     respaced,
     rounded,
     sideways,
+    without_short_segments,
 )
 
 
@@ -178,7 +179,7 @@ def relax(
     except CancelledError:
         curve, relaxation.stopped = relaxation.drawn, "cancelled"
     if curve is not None and _is_simple(surface, curve):
-        result, stopped = curve.surface_curve(surface.mesh), relaxation.stopped
+        result, stopped = without_short_segments(surface.mesh, curve), relaxation.stopped
     else:
         curve, result = first, start
         stopped = "cancelled" if relaxation.stopped == "cancelled" else "unrelaxed"

@@ -18,6 +18,7 @@ from nicmm_core.relaxation.exact_curve import (
     respaced,
     rounded,
     sideways,
+    without_short_segments,
 )
 from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import (
@@ -281,3 +282,23 @@ def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(
     assert bending_energy(smooth.nodes) == pytest.approx(2.0 * np.pi / 0.6, rel=0.1)
     controls = ring.nodes.positions[ring.control_nodes]
     assert np.allclose(smooth.nodes.positions[smooth.control_nodes], controls, atol=1e-12)
+
+
+def test_a_node_close_beside_an_edge_makes_no_short_segment(flat_disc):
+    """Nodes are moved along the curve to a hundredth of a step behind the crossing before them."""
+    surface = surface_of(flat_disc)
+    ring = exact_curve(surface, ring_on(flat_disc), 64)
+    ring = drawn(surface, ring, ring.nodes)
+    places = ring.nodes.places
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    beside = np.setdiff1d(np.arange(64), ring.control_nodes)
+    before = in_faces(flat_disc, ring.polyline[ring.node_place[beside] - 1], faces[beside])
+    barycentric[beside] = 0.99 * before.barycentric + 0.01 * barycentric[beside]
+    moved = drawn(surface, ring, nodes_at(surface, SurfacePoints(faces, barycentric), True))
+    result = without_short_segments(flat_disc, moved)
+    assert len(result.points) < len(moved.polyline) - 20
+    assert_valid_curve(flat_disc, result, ring.nodes.positions[ring.control_nodes])
+    steps = np.linalg.norm(np.diff(result.points, axis=0, append=result.points[:1]), axis=1)
+    before = np.linalg.norm(np.diff(moved.polyline.positions(flat_disc), axis=0), axis=1)
+    short = 0.05 * moved.nodes.lengths.mean()
+    assert (steps < short).sum() < 0.5 * (before < short).sum()
