@@ -29,6 +29,7 @@ MEASUREMENTS = (
     "dragging",
     "stages",
     "obstacles",
+    "lanes",
     "peers",
     "degraded",
     "resolution",

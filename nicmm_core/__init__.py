@@ -15,6 +15,14 @@ from .errors import (
     NicmmError,
     UnreachableError,
 )
+from .feature_maps import (
+    curvature_map,
+    edge_map,
+    principal_curvatures,
+    sharp_edge_map,
+    sharp_edges,
+    value_map,
+)
 from .mesh import Mesh
 from .outputs.cut import CutMesh, cut_mesh
 from .outputs.parts import PartedMesh, part_mesh
@@ -38,8 +46,14 @@ __all__ = [
     "SurfaceCurve",
     "SurfacePoints",
     "UnreachableError",
+    "curvature_map",
     "cut_mesh",
     "design_curve",
+    "edge_map",
     "enclosed_region",
     "part_mesh",
+    "principal_curvatures",
+    "sharp_edge_map",
+    "sharp_edges",
+    "value_map",
 ]

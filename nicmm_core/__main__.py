@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
 from . import Status, design_curve
 from .arguments import METHODS
+from .array_types import FloatArray
 from .errors import ArgumentError, NicmmError
+from .feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .files import check_curve_path, read_mesh, write_curve, write_mesh
+from .mesh import Mesh
 from .path.initial_loop import ORDERS
 from .path.via_points import parse_via_points
+
+AUTOMATIC = ("sharp", "curvature")
+"""Maps that a mesh gives by itself."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -46,6 +53,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     design.add_argument("--method", choices=METHODS, default="nicmm")
     design.add_argument("--smoothness", type=float, default=1.0)
+    for option, what in (("--align", "follow"), ("--avoid", "keep off")):
+        design.add_argument(
+            option, choices=AUTOMATIC, help=f"{what} sharp edges, or where the surface bends most"
+        )
+    design.add_argument("--angle", type=float, help="degrees from which edges are sharp, 30")
     design.set_defaults(run=_design)
 
     pretrain = commands.add_parser("pretrain", help="train the network (stage 1 of the paper)")
@@ -82,10 +94,18 @@ def _design(options: argparse.Namespace) -> None:
         via_points=parse_via_points(options.via) or None,
         method=options.method,
         smoothness=options.smoothness,
+        alignment=_automatic_map(mesh, options.align, options.angle),
+        obstacles=_automatic_map(mesh, options.avoid, options.angle),
     )
     if design.status is Status.NOT_ONE_CURVE:
         raise NicmmError(str(design.status))
     write_curve(options.output, design.curves[0])
+
+
+def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> FloatArray | None:
+    if kind == "sharp":
+        return sharp_edge_map(mesh, SHARP_ANGLE if degrees is None else math.radians(degrees))
+    return None if kind is None else curvature_map(mesh)
 
 
 def _pretrain(options: argparse.Namespace) -> None:

@@ -43,6 +43,26 @@ def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int 
     return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
 
 
+def cube(pieces: int = 8) -> Mesh:
+    """Cube with corners at ±1, each of its edges in equal pieces."""
+    grid = np.linspace(-1.0, 1.0, pieces + 1)
+    u, v = (axis.ravel() for axis in np.meshgrid(grid, grid, indexing="ij"))
+    index = np.arange(u.size).reshape(pieces + 1, pieces + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    side = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    side = side.reshape(-1, 3)
+    points: list[FloatArray] = []
+    faces: list[IntArray] = []
+    for axis in range(3):
+        for end in (1.0, -1.0):
+            # Seen from outside, the second side of each pair is reversed.
+            points.append(np.roll(np.stack([np.full_like(u, end), u, v], axis=1), axis, axis=1))
+            faces.append((side if end > 0.0 else side[:, ::-1]) + len(faces) * len(u))
+    every = np.concatenate(points)
+    vertices, place = np.unique(every, axis=0, return_inverse=True)
+    return Mesh(vertices, place.reshape(-1)[np.concatenate(faces)])
+
+
 def disc(rings: int = 24) -> Mesh:
     """Flat unit disc in the xy plane: rings of 6, 12, 18 … vertices round a centre."""
     points = [np.zeros((1, 2))]

@@ -17,7 +17,7 @@ from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status
 from .free_surface import check_reachable, free_surface
 from .level_set import variational
-from .level_set.features import feature_map
+from .level_set.guidance import component_unit, feature_map
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
@@ -187,7 +187,7 @@ class SurfaceDesigner:
             curve=found.curve,
             visited=found.visited,
             surface=self._curve_surface(request),
-            unit=float(np.sqrt(self._area(request))),
+            unit=self._unit(request),
             breaking=found.breaking_vertices,
         )
 
@@ -255,16 +255,12 @@ class SurfaceDesigner:
         """The surface that curves move on."""
         if not request.has_maps:
             return CurveSurface(self.mesh, self._normals)
-        maps = request.obstacles, request.alignment
-        importance = feature_map(self.mesh.vertices, *maps, self.mesh.mean_edge_length)
-        return CurveSurface(
-            self.mesh, self._normals, importance, FEATURE_TENSION / self._area(request)
-        )
+        unit = self._unit(request)
+        importance = feature_map(self.mesh, request.obstacles, request.alignment, unit)
+        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / unit**2)
 
-    def _area(self, request: Request) -> float:
-        """Of the component that the curve is on."""
-        component = self.mesh.face_component == self.mesh.face_component[request.points.faces[0]]
-        return float(self.mesh.face_areas[component].sum())
+    def _unit(self, request: Request) -> float:
+        return component_unit(self.mesh, int(request.points.faces[0]))
 
     @cached_property
     def _normals(self) -> FloatArray:

@@ -20,5 +20,8 @@ BARYCENTRIC_SUM = 1e-6
 INSIDE = 1e-6
 """Least barycentric coordinate of a point that has to lie strictly inside its face."""
 
+FLAT = 1e-6
+"""Curvature up to which a surface is a plane, in one over bounding-box diagonals."""
+
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor; what is divided by it is zero too."""

@@ -21,14 +21,9 @@ from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint, part
 from ..request import Request
 from ..surface_points import SurfacePoints
-from .features import (
-    control_indicator,
-    feature_map,
-    in_principal_frame,
-    input_features,
-    vertex_normals,
-)
+from .features import control_indicator, in_principal_frame, input_features, vertex_normals
 from .finite_elements import FiniteElements, build_finite_elements
+from .guidance import component_unit, feature_map
 from .sign_bundle import SignBundle, build_sign_bundle
 from .signed_distance import bounding_side, signed_distance
 from .smoothing import Smoother, build_smoother
@@ -141,7 +136,8 @@ def build_problem(
         raise MeshError(DEGENERATE)
     importance = None
     if obstacles is not None or alignment is not None:
-        importance = feature_map(mesh.vertices, obstacles, alignment, mesh.mean_edge_length)
+        width = component_unit(mesh, int(points.faces[0]))
+        importance = feature_map(mesh, obstacles, alignment, width)
     with part(0.0, PATH_SHARE):
         working, loop = build_initial_loop(
             mesh, points, order, importance, closed, via_points, pieces

@@ -38,8 +38,12 @@ They can be passed once only and belong to several sheets, so they are left to a
 other way.
 """
 
-LEAST_WEIGHT = 0.1
-"""Least factor that alignment gives to a length; at 0 any detour inside a region would be free."""
+LEAST_WEIGHT = 1.0 / 3.0
+"""Least factor that alignment gives to a length: a leg goes that much out of its way for a lane.
+
+At 0.1 legs that run elsewhere come over to a lane as to a motorway, and two share one; at 0.5 more
+lanes are left aside that lie 5 % of the diagonal beside a leg.
+"""
 
 FIRST_REACH = 3.0
 """Length up to which a leg is looked for first, relative to the distance of its ends in space."""

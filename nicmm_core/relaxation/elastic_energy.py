@@ -2,12 +2,14 @@
 
 There |∇φ| = 1, the level-set term vanishes and the integrals over the surface run along the curve:
 
-    E = ∮ κ_g² ds + τ ∮ φ_fea² ds.
+    E = ∮ κ_g² ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds.
 
-With maps τ is λ_fea / λ_smooth, which is `FEATURE_TENSION` here. Without, φ_fea is 1 and the second
-term is the length; it keeps far points from being joined by ever larger bows. There τ = (2π / L)²,
-with which a circle in the plane neither grows nor shrinks, so that the balance has no length of its
-own. Where strands of the curve may not cross, a third term keeps them apart (`strand_contact`).
+The length keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a
+circle in the plane neither grows nor shrinks, so that the balance has no length of its own. φ_fea
+is 1 where no map has a say, and there the curve is what it would be without any. An obstacle, where
+φ_fea is more, adds to the tension. Along a lane it is less; there only where the curve runs counts
+and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of length.
+Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).
 
 The unknowns are sideways moves of nodes in their tangent planes. A node's residuals know only its
 two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
@@ -16,7 +18,7 @@ nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import linalg, sparse
@@ -28,7 +30,7 @@ from .curve_nodes import CurveSurface, Nodes, after_each, before_each, cross, do
 from .strand_contact import contacts_between
 
 FEATURE_TENSION = 600.0
-"""λ_fea / λ_smooth for lengths in square roots of the surface's area.
+"""τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
 
 It sets how tightly the curve may bend to follow a map: about 1/√600, 4 % of that length. The ratio
 of the level set's energy, 30, leaves the curve too stiff for what people paint.
@@ -48,45 +50,64 @@ class Balance:
         τ, in 1/length².
     contact : float
         Weight of a node's contact, in 1/length; 0 where strands may cross.
+    feature : float
+        τ_fea, in 1/length²; 0 without a map.
+    held : (n,) float array or None
+        ds at each node as far as lanes are concerned, where there is a map.
     """
 
     tension: float
     contact: float
+    feature: float = 0.0
+    held: FloatArray | None = None
 
 
 def balance(surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool) -> Balance:
     """The weights at a curve; ``apart`` keeps its strands apart."""
-    tension = surface.feature_weight
-    if surface.feature_map is None:
-        tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2)
-    tension /= smoothness
+    tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2) / smoothness
+    weights = Balance(tension, 0.0)
+    if surface.feature_map is not None:
+        weights = Balance(tension, 0.0, surface.feature_weight / smoothness, _ds(nodes))
     if not apart:
-        return Balance(tension, 0.0)
-    energy = elastic_energy(nodes, Balance(tension, 0.0))
-    return Balance(tension, CONTACT * energy / len(nodes.positions))
+        return weights
+    return replace(weights, contact=CONTACT * elastic_energy(nodes, weights) / len(nodes.positions))
 
 
 def bending_energy(nodes: Nodes) -> float:
     """∮ κ_g² ds, in 1/length."""
-    return float(_terms(nodes)[0].sum())
+    return float(_bending(nodes).sum())
 
 
 def feature_energy(nodes: Nodes) -> float:
     """∮ φ_fea² ds, in units of length."""
-    return float(_terms(nodes)[1].sum())
+    return float((nodes.importance**2 * _ds(nodes)).sum())
 
 
 def elastic_energy(nodes: Nodes, weights: Balance) -> float:
     """E, with contact where that has a weight."""
-    bending, feature = _terms(nodes)
-    energy = float(bending.sum() + weights.tension * feature.sum())
+    energy = float(_bending(nodes).sum() + (_tension(nodes, weights) * _ds(nodes)).sum())
+    if weights.held is not None:
+        lane = np.minimum(nodes.importance, 1.0)
+        energy += weights.feature * float(lane**2 @ weights.held)
     if weights.contact:
         energy += 2.0 * weights.contact * float((contacts_between(nodes).overlap ** 2).sum())
     return energy
 
 
-def _terms(nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """κ_g² ds and φ_fea² ds at each node, both (n,); an open curve does not bend at its ends."""
+def _ds(nodes: Nodes) -> FloatArray:
+    """Length of the curve that each node stands for, (n,)."""
+    after = nodes.steps.T
+    lengths = np.sqrt(dot(after, after))
+    return np.maximum(0.5 * (lengths + before_each(lengths)), tolerances.TINY)
+
+
+def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
+    """Energy of the curve's length at each node, (n,): τ, and more in an obstacle."""
+    return weights.tension + weights.feature * np.maximum(nodes.importance**2 - 1.0, 0.0)
+
+
+def _bending(nodes: Nodes) -> FloatArray:
+    """κ_g² ds at each node, (n,); an open curve does not bend at its ends."""
     after = nodes.steps.T
     before = before_each(after)
     normals = nodes.normals.T
@@ -96,9 +117,7 @@ def _terms(nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     )
     if not nodes.closed:
         turning[[0, -1]] = 0.0
-    lengths = np.sqrt(dot(after, after))
-    ds = np.maximum(0.5 * (lengths + before_each(lengths)), tolerances.TINY)
-    return turning**2 / ds, nodes.importance**2 * ds
+    return turning**2 / _ds(nodes)
 
 
 def _no_pairs() -> IntArray:
@@ -139,15 +158,20 @@ class ElasticSystem:
 
 
 def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> ElasticSystem:
-    """Linearise the residuals κ_g √ds, φ_fea √ds and those of contact about a curve."""
+    """Linearise the roots of what is integrated, and those of contact, about a curve."""
     n = len(nodes.positions)
-    bending, stretch, bending_by, stretch_by = _linearised(surface, nodes)
-    bands = _squared(bending_by) + weights.tension * _squared(stretch_by)
-    slope = _transposed(bending_by, bending) + weights.tension * _transposed(stretch_by, stretch)
+    tension = _tension(nodes, weights)
+    bending, stretch, bending_by, stretch_by, drift = _linearised(surface, nodes, weights, tension)
+    bands = _squared(bending_by) + _squared(stretch_by)
+    slope = _transposed(bending_by, bending) + _transposed(stretch_by, stretch)
+    if weights.held is not None:
+        pull = np.where(nodes.importance < 1.0, weights.feature * weights.held * drift, 0.0)
+        bands[0] += pull * drift
+        slope += pull * nodes.importance
     # Residuals do not have all of the length's second derivative: this is a string's stiffness.
     stiffness = np.zeros(n)
-    stiffness[: len(nodes.lengths)] = weights.tension / np.maximum(nodes.lengths, tolerances.TINY)
-    stiffness *= nodes.importance**2
+    count = len(nodes.lengths)
+    stiffness[:count] = tension[:count] / np.maximum(nodes.lengths, tolerances.TINY)
     bands[0] += stiffness + before_each(stiffness)
     # Without an orientation of the surface, neighbours may have opposite moves to one side.
     opposite = dot(nodes.normals.T, after_each(nodes.normals.T)) < 0.0
@@ -192,9 +216,9 @@ def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
 
 
 def _linearised(
-    surface: CurveSurface, nodes: Nodes
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Residuals κ_g √ds and φ_fea √ds of every node, and how moves change them.
+    surface: CurveSurface, nodes: Nodes, weights: Balance, tension: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Residuals κ_g √ds and √(tension ds) of every node, and how moves change them.
 
     Returns
     -------
@@ -204,6 +228,8 @@ def _linearised(
         Derivatives of the first by the sideways moves of nodes i - 1, i and i + 1.
     (3, n) float array
         Of the second.
+    (n,) float array
+        Change of φ_fea with a node's own move.
     """
     here = nodes.sideways.T
     normal_turn, drift = nodes.sideways_derivatives(surface)
@@ -249,9 +275,12 @@ def _linearised(
         ]
     ) / (4.0 * root)
     bending = turning / root
-    stretch_by = nodes.importance * root_by
-    stretch_by[1] += drift * root
-    return bending, nodes.importance * root, (turning_by - bending * root_by) / root, stretch_by
+    pulled = np.sqrt(np.maximum(tension, tolerances.TINY))
+    stretch_by = pulled * root_by
+    rising = np.where(nodes.importance > 1.0, weights.feature * nodes.importance * drift, 0.0)
+    stretch_by[1] += rising / pulled * root
+    bending_by = (turning_by - bending * root_by) / root
+    return bending, pulled * root, bending_by, stretch_by, drift
 
 
 def _solved(bands: FloatArray, right: FloatArray) -> FloatArray:

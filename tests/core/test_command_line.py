@@ -154,3 +154,26 @@ def test_pretrain_refuses_to_train_nothing(mesh_file, tmp_path, capsys, options)
     assert status == 2
     assert capsys.readouterr().err
     assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "arguments"),
+    [
+        (["--align", "sharp", "--angle", "12"], {"alignment": True}),
+        (["--avoid", "sharp", "--angle", "12"], {"obstacles": True}),
+    ],
+)
+def test_automatic_maps_are_those_of_the_functions(mesh_file, tmp_path, options, arguments):
+    """Faces of this ball meet at 15 degrees and more, but for a few."""
+    output = tmp_path / "curve.json"
+    mesh = read_mesh(mesh_file)
+    weights = nicmm.sharp_edge_map(mesh, np.radians(12.0))
+    arguments = {name: weights for name in arguments}
+    try:
+        expected = nicmm.design_curve(mesh, [3, 60, 100], **arguments).curves[0]
+    except nicmm.UnreachableError:
+        expected = None
+    status = main(["design", str(mesh_file), "--points", CHOSEN, "-o", str(output), *options])
+    assert status == (2 if expected is None else 0)
+    if expected is not None:
+        np.testing.assert_array_equal(json.loads(output.read_text())["faces"], expected.faces)

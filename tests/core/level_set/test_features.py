@@ -6,28 +6,16 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.level_set.features import FEATURE_BASELINE, feature_map, vertex_normals
+from nicmm_core.level_set.features import vertex_normals
+from nicmm_core.level_set.guidance import BASELINE
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import random_surface_points
-
-EDGE = 0.15
-
-
-def painted(mesh, vertex, weight):
-    """A map with one painted vertex."""
-    weights = np.zeros(len(mesh.vertices))
-    weights[vertex] = weight
-    return weights
 
 
 def pairwise_distances(points):
     """Between the first points, enough to fix a shape."""
     return np.linalg.norm(points[:60, None] - points[None, :60], axis=2)
-
-
-def map_of(mesh, obstacles=None, alignment=None):
-    return feature_map(mesh.vertices, obstacles, alignment, EDGE)
 
 
 def test_indicator_is_one_at_the_control_points_and_small_elsewhere(ball):
@@ -71,7 +59,7 @@ def test_maps_add_a_ninth_channel(small_ball):
         problem = build_problem(small_ball, points, **maps)
         assert problem.features.shape[1] == 9
         np.testing.assert_array_equal(problem.features[:, 8], problem.feature_map)
-        np.testing.assert_array_equal(problem.feature_map, FEATURE_BASELINE)
+        np.testing.assert_array_equal(problem.feature_map, BASELINE)
 
 
 def test_map_weights_are_interpolated_at_inserted_points(small_ball):
@@ -97,52 +85,6 @@ def test_normals_are_finite_where_they_cancel():
     """Two faces back to back."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     assert np.isfinite(vertex_normals(vertices, np.array([[0, 1, 2], [0, 2, 1]]))).all()
-
-
-def test_neutral_value_where_nothing_is_painted(ball):
-    value = map_of(ball, painted(ball, 100, 1.0), painted(ball, 500, 1.0))
-    offset = ball.vertices[:, None] - ball.vertices[[100, 500]]
-    far = np.linalg.norm(offset, axis=2).min(axis=1) > 10 * EDGE
-    assert far.any()
-    np.testing.assert_array_equal(value[far], FEATURE_BASELINE)
-    np.testing.assert_array_equal(map_of(ball), FEATURE_BASELINE)
-
-
-def test_obstacles_raise_and_alignment_lowers_but_never_below_zero(ball):
-    raised = map_of(ball, obstacles=painted(ball, 100, 1.0))
-    lowered = map_of(ball, alignment=painted(ball, 100, 1.0))
-    assert raised.argmax() == 100 and raised[100] > FEATURE_BASELINE
-    assert lowered.argmin() == 100 and 0.0 <= lowered[100] < FEATURE_BASELINE
-    assert (raised >= FEATURE_BASELINE).all()
-    assert (lowered <= FEATURE_BASELINE).all()
-    everywhere = np.ones(len(ball.vertices))
-    assert map_of(ball, alignment=everywhere).min() >= 0.0
-
-
-def test_effect_decays_with_distance(ball):
-    distance = np.linalg.norm(ball.vertices - ball.vertices[100], axis=1)
-    value = map_of(ball, obstacles=painted(ball, 100, 1.0))[np.argsort(distance)]
-    assert (np.diff(value) <= 1e-12).all()
-    assert value[1] > FEATURE_BASELINE
-
-
-@pytest.mark.parametrize(("kind", "sign"), [("obstacles", 1.0), ("alignment", -1.0)])
-def test_effect_grows_with_the_weight(ball, kind, sign):
-    effects = [
-        sign * (map_of(ball, **{kind: painted(ball, 100, weight)}) - FEATURE_BASELINE)
-        for weight in (0.2, 0.5, 0.8, 1.0)
-    ]
-    for weaker, stronger in zip(effects, effects[1:], strict=False):
-        assert (stronger >= weaker - 1e-12).all()
-        assert stronger[100] > weaker[100]
-        assert stronger.sum() > weaker.sum()
-
-
-def test_effect_does_not_depend_on_how_many_vertices_are_painted(ball):
-    """A region painted densely is no stronger than its strongest vertex."""
-    one = map_of(ball, obstacles=painted(ball, 100, 1.0))
-    near = np.linalg.norm(ball.vertices - ball.vertices[100], axis=1) < 2 * EDGE
-    assert map_of(ball, obstacles=near.astype(float)).max() == pytest.approx(one.max())
 
 
 def test_turned_and_moved_surface_has_the_same_positions_and_normals(body):

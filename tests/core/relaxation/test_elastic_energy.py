@@ -1,5 +1,7 @@
 """The energy of a curve against closed forms, and its linearisation against differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -155,9 +157,45 @@ def test_smoothness_divides_the_tension(flat_disc):
         assert quarter == pytest.approx(whole / 4.0)
 
 
-def test_with_a_map_the_tension_is_that_of_the_surface(flat_disc):
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
+    """The curve's energy rises by a constant, and no move changes that."""
     surface = surface_of(flat_disc, np.ones(len(flat_disc.vertices)), 17.0)
-    assert balance(surface, nodes_on(flat_disc, wobble(40)), 1.0, apart=False).tension == 17.0
+    nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), closed)
+    plain = balance(surface_of(flat_disc), nodes, 1.0, apart=False)
+    mapped = balance(surface, nodes, 1.0, apart=False)
+    assert (mapped.tension, mapped.feature) == (plain.tension, 17.0)
+    one, other = (elastic_system(surface, nodes, weights) for weights in (plain, mapped))
+    scale = np.abs(one.slope).max()
+    np.testing.assert_allclose(one.slope, other.slope, rtol=0, atol=1e-9 * scale)
+    np.testing.assert_allclose(one.bands, other.bands, rtol=1e-9)
+    rise = elastic_energy(nodes, mapped) - elastic_energy(nodes, plain)
+    assert rise == pytest.approx(17.0 * feature_energy(nodes))
+
+
+def test_a_lane_does_not_pay_for_length_in_it(flat_disc):
+    """It would buckle: here a straight line costs less than a wavy one, all in one lane."""
+    lane = np.full(len(flat_disc.vertices), 0.1)
+    x = np.linspace(-0.5, 0.5, 40)
+    straight, wavy = (
+        nodes_on(flat_disc, np.stack([x, h * np.cos(12 * x), 0 * x], axis=1), False, lane)
+        for h in (0.0, 0.02)
+    )
+    weights = balance(surface_of(flat_disc, lane, 1e3), straight, 1.0, apart=False)
+    assert feature_energy(wavy) > feature_energy(straight)
+    bent = bending_energy(wavy) - bending_energy(straight)
+    longer = weights.tension * (wavy.lengths.sum() - straight.lengths.sum())
+    rise = elastic_energy(wavy, weights) - elastic_energy(straight, weights)
+    assert rise == pytest.approx(bent + longer, rel=0.02)
+
+
+def test_an_obstacle_adds_to_the_tension(flat_disc):
+    """Where φ_fea is 2, length costs τ + 3 τ_fea."""
+    twos = np.full(len(flat_disc.vertices), 2.0)
+    nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=twos)
+    weights = balance(surface_of(flat_disc, twos, 5.0), nodes, 1.0, apart=False)
+    length = (weights.tension + 4.0 * 5.0) * nodes.lengths.sum()
+    assert elastic_energy(nodes, weights) == pytest.approx(bending_energy(nodes) + length)
 
 
 def near_strands(count=60):
@@ -184,9 +222,13 @@ CASES = {
 @pytest.mark.parametrize("mapped", [False, True])
 def test_the_slope_is_half_the_derivative_by_moves_on_the_surface(points, closed, weights, mapped):
     mesh = shapes.disc(7)
-    feature_map = 1.5 + mesh.vertices[:, 0] - 0.4 * mesh.vertices[:, 1] if mapped else None
+    # Lanes and obstacles both.
+    feature_map = 1.0 + mesh.vertices[:, 0] - 0.4 * mesh.vertices[:, 1] if mapped else None
     surface = surface_of(mesh, feature_map, 1.0)
     nodes = nodes_at(surface, points_near(mesh, points()), closed)
+    if mapped:
+        held = balance(surface, nodes, 1.0, apart=False).held
+        weights = replace(weights, feature=4.0, held=held)
     slope = elastic_system(surface, nodes, weights).slope
     step = 1e-4 * nodes.lengths.mean()
     expected = np.empty(len(slope))
@@ -291,6 +333,8 @@ def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
     surface = surface_of(flat_disc, feature_map, 1.0)
     nodes = nodes_on(flat_disc, near_strands(), feature_map=feature_map)
     weights = Balance(3.0, 5.0)
+    if mapped:
+        weights = replace(balance(surface, nodes, 1.0, apart=True), contact=5.0)
     system = elastic_system(surface, nodes, weights)
     assert len(system.pairs) > 0
     step = 1e-3 * damped_step(system, np.ones(len(nodes.positions), dtype=bool), 1.0)

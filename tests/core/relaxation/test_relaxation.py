@@ -270,13 +270,38 @@ def test_obstacles_are_avoided(flat_disc):
 
 
 def test_a_flat_map_is_a_tension(flat_disc):
-    """φ_fea = 2 with weight w is tension 4 w: as stiff a string makes the same curve."""
+    """Of (φ_fea² - 1) times the weight, so φ_fea = 1 is none."""
     start = star(flat_disc, controls=[0, 13, 22, 41])
     flat = np.ones(len(flat_disc.vertices))
-    one = relaxed(flat_disc, start, feature=2.0 * flat, weight=5.0)
-    other = relaxed(flat_disc, start, feature=flat, weight=20.0)
+    free, neutral, one, other = (
+        relaxed(flat_disc, start, feature=feature, weight=weight)
+        for feature, weight in (
+            (None, 0.0),
+            (flat, 20.0),
+            (2.0 * flat, 5.0),
+            (1.75**0.5 * flat, 20.0),
+        )
+    )
+    assert apart(free.curve.points, neutral.curve.points) < 1e-9
     assert apart(one.curve.points, other.curve.points) < 2e-3
-    assert one.feature == pytest.approx(4.0 * other.feature, rel=1e-3)
+    assert one.feature == pytest.approx(4.0 / 1.75 * other.feature, rel=1e-3)
+    assert one.curve.length < 0.97 * free.curve.length
+
+
+def test_a_lane_is_followed_and_left_smoothly(flat_disc):
+    """It runs beside the middle of a straight way: the curve lies in it there and nowhere else."""
+    x, y, _ = flat_disc.vertices.T
+    beyond = np.maximum(np.abs(x) - 0.25, 0.0)
+    lane = np.sqrt(1.0 - np.exp(-((y - 0.08) ** 2 + beyond**2) / (2 * 0.05**2)))
+    ends = np.array([-0.7, 0.7])
+    way = np.linspace(*ends, 40)
+    start = curve_through(flat_disc, np.stack([way, 0 * way, 0 * way], axis=1), [0, 39], False)
+    result = relaxed(flat_disc, start, feature=lane, weight=200.0)
+    points = result.curve.points
+    inside = np.abs(points[:, 0]) < 0.2
+    assert np.abs(points[inside, 1] - 0.08).max() < 0.02
+    assert points[:, 1].min() > -0.02 and points[:, 1].max() < 0.1
+    assert result.curve.length < 1.05 * 1.4
 
 
 def test_strands_that_would_cross_stay_apart(flat_disc):

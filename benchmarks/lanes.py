@@ -1,0 +1,163 @@
+"""Lanes painted beside the free curve: how much nearer the curve comes to them, at what price."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import nicmm_core as nicmm
+from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.curve import SurfaceCurve, resample
+from nicmm_core.level_set.features import vertex_normals
+from nicmm_core.mesh import Mesh
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.exact_curve import shifted
+from nicmm_core.surface_points import SurfacePoints
+
+from . import collections, report
+from .checker import judge
+from .measures import bending
+from .samples import random_sets
+from .scale import Scale
+
+SEED = 4
+
+OFFSET = 0.045
+"""How far beside the free curve a lane is laid on the surface, in diagonals."""
+
+LEAST_OFFSET = 0.03
+"""Mean distance in space that it has to keep, in diagonals; one round a limb comes back."""
+
+WIDTH = 0.01
+"""Distance in space from its line up to which a lane is painted, in diagonals, or"""
+
+LEAST_WIDTH = 0.75
+"""in mean edge lengths, where that is more: fewer vertices would be a row of spots."""
+
+STRETCH = (0.25, 0.75)
+"""The part of the longest stretch between two control points that has a lane beside it."""
+
+SAMPLES = 256
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A painted line.
+
+    Attributes
+    ----------
+    line : (n, 3) float array
+        Points of the surface, evenly along the free curve.
+    weights : (V,) float array
+    """
+
+    line: FloatArray
+    weights: FloatArray
+
+    def distance(self, curve: SurfaceCurve) -> float:
+        """Mean distance of the line to a curve."""
+        even, _ = resample(curve.points, 2048, curve.closed)
+        return float(cKDTree(even).query(self.line)[0].mean())
+
+
+def run(scale: Scale) -> None:
+    """Lanes of weight 1 on closed meshes and on people and animals."""
+    if scale is Scale.SMOKE:
+        meshes = collections.creatures(2)
+    else:
+        some = collections.bodies(scale.choose(12, 2))
+        meshes = itertools.chain(collections.clean(scale.choose(36, 4)), some)
+    ratios, bends, times, lengths, faults, n_sets = [], [], [], [], 0, 0
+    for name, mesh, points in random_sets(meshes, 1, SEED):
+        n_sets += 1
+        free, _ = _timed(lambda mesh=mesh, points=points: _design(mesh, points, None))
+        lane = lane_beside(mesh, free.curves[0])
+        if lane is None:
+            print(f"  {name}: no room for a lane", flush=True)
+            continue
+        free, before = _timed(lambda mesh=mesh, points=points: _design(mesh, points, None))
+        led, after = _timed(
+            lambda mesh=mesh, points=points, lane=lane: _design(mesh, points, lane.weights)
+        )
+        curve, other = free.curves[0], led.curves[0]
+        ratios.append(lane.distance(other) / lane.distance(curve))
+        bends.append(bending(mesh, other, SAMPLES) / bending(mesh, curve, SAMPLES))
+        lengths.append(other.length / curve.length)
+        times.append(after / before)
+        wrong = judge(mesh, led, points, True, "shortest").faults
+        faults += bool(wrong)
+        print(
+            f"  {name}: lane {ratios[-1]:.2f}, bending {bends[-1]:.2f}, time {times[-1]:.2f} "
+            f"({before:.2f} s) {wrong or ''}",
+            flush=True,
+        )
+    rows = [
+        ("distance of the lane to the curve", *_quartiles(ratios)),
+        ("bending L ∮ κ_g² ds", *_quartiles(bends)),
+        ("length", *_quartiles(lengths)),
+        ("CPU time", *_quartiles(times)),
+    ]
+    body = (
+        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order. Lanes of weight 1, "
+        f"{2 * WIDTH:.0%} of the diagonal or {2 * LEAST_WIDTH:g} edges wide, beside the middle "
+        "half of the longest stretch between two control points of the free curve, "
+        f"{OFFSET:.1%} of the diagonal away on the surface; {n_sets - len(ratios)} of {n_sets} "
+        "meshes have no room for one. Everything relative to the free curve; the map's own making "
+        "is in the time.\n\n"
+        + report.table(("with the lane, relative", "25 %", "median", "75 %", "90 %"), rows)
+        + f"\n\n{len(ratios) - faults} of {len(ratios)} curves are one simple loop through their "
+        "points in order, by the guarantee's judge."
+    )
+    report.write_section("lanes", "Lanes to follow", body, scale)
+
+
+def _design(mesh: Mesh, points: IntArray, weights: FloatArray | None) -> nicmm.Design:
+    return nicmm.design_curve(mesh, points, order="shortest", alignment=weights)
+
+
+def _timed(work: Callable[[], nicmm.Design]) -> tuple[nicmm.Design, float]:
+    """A design and the seconds of processor time that it took."""
+    started = time.process_time()
+    design = work()
+    return design, time.process_time() - started
+
+
+def lane_beside(mesh: Mesh, curve: SurfaceCurve) -> Lane | None:
+    """A lane on either side of a closed curve; None where both are too near in space."""
+    even, segment = resample(curve.points, 4 * SAMPLES, True)
+    bounds = np.sort([int((segment < index).sum()) for index in curve.control_index])
+    counts = np.diff([*bounds, bounds[0] + len(even)])
+    longest = int(counts.argmax())
+    span = (bounds[longest] + (np.array(STRETCH) * counts[longest])).astype(int)
+    stretch = np.arange(*span) % len(even)
+    surface = CurveSurface(mesh, unsigned_normals(mesh))
+    here = SurfacePoints(curve.faces[segment[stretch]], curve.barycentric[segment[stretch]])
+    nodes = nodes_at(surface, here, closed=False)
+    along = np.gradient(even, axis=0)[stretch]
+    across = np.cross(mesh.face_normals[here.faces], along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    every = cKDTree(even)
+    for side in (1.0, -1.0):
+        length = np.full(len(stretch), OFFSET * mesh.diagonal)
+        there, stuck = shifted(surface, nodes, side * across, length)
+        line = there.positions[~stuck]
+        if len(line) > 1 and every.query(line)[0].mean() > LEAST_OFFSET * mesh.diagonal:
+            return Lane(line, _painted(mesh, line, mesh.face_normals[there.places.faces[~stuck]]))
+    return None
+
+
+def _painted(mesh: Mesh, line: FloatArray, normals: FloatArray) -> FloatArray:
+    """1 at vertices near a line, on the side of the surface that it is on."""
+    width = max(WIDTH * mesh.diagonal, LEAST_WIDTH * mesh.mean_edge_length)
+    distance, nearest = cKDTree(line).query(mesh.vertices)
+    facing = (vertex_normals(mesh.vertices, mesh.faces) * normals[nearest]).sum(axis=1) > 0.0
+    return ((distance < width) & facing).astype(np.float64)
+
+
+def _quartiles(ratios: list[float]) -> list[str]:
+    return [f"{value:.2f}" for value in np.quantile(ratios, [0.25, 0.5, 0.75, 0.9])]

@@ -1,0 +1,333 @@
+"""Weights for `alignment` and `obstacles` from a mesh itself, or from data on it (section 3.3).
+
+Each function returns one weight in [0, 1] for every vertex, (V,), as painting would. What a weight
+does is the same for all of them; see `level_set.features`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from . import tolerances
+from .array_types import BoolArray, FloatArray, IntArray
+from .errors import ArgumentError
+from .mesh import Mesh, real_array, unique_edges
+from .relaxation.curve_nodes import unsigned_normals
+
+SHARP_ANGLE = math.radians(30.0)
+"""Angle between the normals of two faces from which their edge is sharp."""
+
+USUAL, STRIKING = 0.5, 0.95
+"""Quantiles of curvature over the area where a map begins and where it is 1, by default."""
+
+LEAST_CONTRAST = 2.0
+"""Ratio of these two curvatures at least, so that nothing stands out of a ball."""
+
+HUB = 64
+"""Neighbours of a vertex beyond which rings do not go on through it: they would have everything."""
+
+UNDETERMINED = 1e-8
+"""Eigenvalues of a fit, relative to the largest, below which its neighbours say nothing."""
+
+
+def principal_curvatures(mesh: Mesh) -> FloatArray:
+    """Principal curvatures at the vertices, shape (V, 2), in 1/length, the larger one first.
+
+    Quadrics are fitted to the heights of two rings of neighbours over the tangent plane, the
+    nearer ones counting more. Signs are to either side, since a mesh need not be oriented. Where
+    neighbours are too few for a direction, the surface counts as flat there.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Any; open, unoriented and branching surfaces too.
+    """
+    # Not `igl.principal_curvature`, which breaks off on small meshes and needs an orientation.
+    centre, neighbour = _rings(mesh)
+    normals = unsigned_normals(mesh)
+    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), tolerances.TINY)
+    second = np.cross(normals, first)
+    offset = mesh.vertices[neighbour] - mesh.vertices[centre]
+    distance = np.linalg.norm(offset, axis=1)
+    count = np.bincount(centre, minlength=len(mesh.vertices))
+    size = np.bincount(centre, distance, len(mesh.vertices)) / np.maximum(count, 1)
+    apart = distance > tolerances.COINCIDENT * mesh.diagonal
+    centre, offset, distance = centre[apart], offset[apart], distance[apart]
+    # In units of the neighbourhood, so that all fits are conditioned alike.
+    u, v, height = (
+        (offset * axis[centre]).sum(axis=1) / size[centre] for axis in (first, second, normals)
+    )
+    terms = np.stack([0.5 * u * u, u * v, 0.5 * v * v, u, v]) * (size[centre] / distance)
+    height *= size[centre] / distance
+    fit = _least_squares(terms, height, centre, len(mesh.vertices))
+    a, b, c, d, e = fit.T / np.maximum(size, tolerances.TINY) ** np.array([[1, 1, 1, 0, 0]]).T
+    # The surface (u, v, h) has these fundamental forms at its origin.
+    slope = 1.0 + d * d + e * e
+    root = np.sqrt(slope)
+    mean = ((1.0 + d * d) * c - 2.0 * d * e * b + (1.0 + e * e) * a) / (2.0 * slope * root)
+    gauss = (a * c - b * b) / slope**2
+    spread = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
+    return np.stack([mean + spread, mean - spread], axis=1)
+
+
+def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = None) -> FloatArray:
+    """Where the surface is strongly curved: on ridges, in grooves and along sharp edges.
+
+    The weight is the greater of both principal curvatures, without its sign, between two limits.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    low, high : float, optional
+        Curvatures, in 1/length, at which the weight begins and at which it is 1. By default what
+        half of the surface has, and what a twentieth exceeds, but at least twice that; so a
+        ball, a tube and a plane have nothing that stands out.
+
+    Returns
+    -------
+    (V,) float array
+
+    Raises
+    ------
+    ArgumentError
+        If the limits are not numbers, or are the same.
+
+    References
+    ----------
+    Section 3.3 of the paper, after Xu et al., "A variational approach for feature-aware B-spline
+    curve design on surface meshes", 2023.
+    """
+    curvature = np.abs(principal_curvatures(mesh)).max(axis=1)
+    if low is None or high is None:
+        usual, striking = _quantiles_by_area(mesh, curvature, [USUAL, STRIKING])
+        low = usual if low is None else _checked_number("low", low)
+        high = (
+            max(striking, LEAST_CONTRAST * low) if high is None else _checked_number("high", high)
+        )
+        if high <= tolerances.FLAT / mesh.diagonal:
+            return np.zeros(len(mesh.vertices))
+    return value_map(mesh, curvature, low, high)
+
+
+def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
+    """Edges where the surface has a crease.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    angle : float
+        Between the normals of the two faces of an edge, in radians, from which it is sharp; 0 in
+        a plane. Which way faces are turned is of no account.
+
+    Returns
+    -------
+    (n, 2) int array
+        Vertices of edges of two faces or more; edges of the boundary are not sharp, nor is a face
+        without area a reason to be.
+
+    Raises
+    ------
+    ArgumentError
+        If the angle is not in 0 … π.
+    """
+    limit = _checked_number("angle", angle)
+    if not 0.0 <= limit <= math.pi:
+        raise ArgumentError(f"angle is {angle!r}; pass radians in 0 … π")
+    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    forward = sides[:, 0] < sides[:, 1]
+    low, high = np.sort(sides, axis=1).T
+    face = np.repeat(np.arange(len(mesh.faces)), 3)
+    solid = mesh.face_areas[face] > 0.0
+    low, high, face, forward = low[solid], high[solid], face[solid], forward[solid]
+    order = np.lexsort((high, low))
+    low, high, face, forward = low[order], high[order], face[order], forward[order]
+    # At an edge of more than two faces, each with the next one.
+    same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
+    one, other = face[:-1][same], face[1:][same]
+    turned = np.where(forward[:-1][same] == forward[1:][same], -1.0, 1.0)
+    normals = mesh.face_normals
+    cosine = turned * (normals[one] * normals[other]).sum(axis=1)
+    sine = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
+    sharp = np.arctan2(sine, cosine) >= limit
+    pairs = np.stack([low[:-1][same][sharp], high[:-1][same][sharp]], axis=1)
+    return np.unique(pairs, axis=0)
+
+
+def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
+    """1 at the ends of sharp edges and 0 elsewhere, shape (V,); see `sharp_edges`.
+
+    A map has weights at vertices only. Where all three corners of a face lie on sharp edges, as
+    everywhere on a box of twelve triangles, the face counts as a whole; subdivide such a mesh.
+    """
+    return edge_map(mesh, sharp_edges(mesh, angle))
+
+
+def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
+    """1 at the ends of some edges, such as marked seams, and 0 elsewhere, shape (V,).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    edges : (n, 2) array_like of int
+        Vertices of edges of faces of the mesh; none at all are fine.
+
+    Raises
+    ------
+    ArgumentError
+        If they have another shape, or are no edges of the mesh.
+    """
+    pairs = _checked_pairs(edges, len(mesh.vertices))
+    size = len(mesh.vertices)
+    known = unique_edges(mesh.faces)[0] @ [size, 1]
+    foreign = ~np.isin(np.sort(pairs, axis=1) @ [size, 1], known)
+    if foreign.any():
+        first = int(foreign.argmax())
+        raise ArgumentError(
+            f"edges[{first}] = {pairs[first].tolist()} is no edge of a face ({foreign.sum()} are "
+            "none); pass pairs of vertices that a side of a face joins"
+        )
+    weights = np.zeros(size)
+    weights[pairs] = 1.0
+    return weights
+
+
+def value_map(
+    mesh: Mesh, values: ArrayLike, low: float | None = None, high: float | None = None
+) -> FloatArray:
+    """Values at the vertices, as of a texture or an attribute, as weights.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    values : (V,) array_like of float
+        In any unit.
+    low, high : float, optional
+        Values with weight 0 and with weight 1, linear between and constant beyond; ``low`` may be
+        the larger one. By default the least and the greatest value of vertices that faces use.
+
+    Returns
+    -------
+    (V,) float array
+        All zero where the limits are left out and all values are the same.
+
+    Raises
+    ------
+    ArgumentError
+        If values are missing or no numbers, or the limits are the same.
+    """
+    try:
+        checked = real_array(values)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"values cannot be read as numbers ({error})") from error
+    if checked.shape != (len(mesh.vertices),):
+        raise ArgumentError(
+            f"values has shape {checked.shape}; pass one value a vertex, ({len(mesh.vertices)},)"
+        )
+    bad = ~np.isfinite(checked)
+    if bad.any():
+        first = int(bad.argmax())
+        raise ArgumentError(f"values[{first}] is {checked[first]}; pass finite numbers")
+    used = checked[mesh.referenced]
+    start = float(used.min()) if low is None else _checked_number("low", low)
+    end = float(used.max()) if high is None else _checked_number("high", high)
+    if start == end:
+        if low is None and high is None:
+            return np.zeros(len(checked))
+        raise ArgumentError(
+            f"low and high are both {start:g}; pass the values with weight 0 and with weight 1"
+        )
+    # Halves, since the difference of two large numbers may be none.
+    return np.clip((0.5 * checked - 0.5 * start) / (0.5 * end - 0.5 * start), 0.0, 1.0)
+
+
+def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
+    """Pairs of a vertex and one in the two rings round it, both (p,), by the first.
+
+    Fewer rings do not over-determine a quadric; more would round off what is to be found.
+    """
+    start, end = unique_edges(mesh.faces)[0].T
+    size = len(mesh.vertices)
+    entries = (np.ones(len(start), dtype=np.float32), (start, end))
+    beside = sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+    beside = sparse.csr_array(beside + beside.T)
+    onward = beside[np.flatnonzero(np.diff(beside.indptr) <= HUB)]
+    reached = beside + sparse.csr_array(onward.T @ onward)
+    centre, neighbour = sparse.coo_array(reached).coords
+    others = centre != neighbour
+    return centre[others].astype(np.int64), neighbour[others].astype(np.int64)
+
+
+def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: int) -> FloatArray:
+    """Solutions of many small least-squares problems, the shortest where one has several.
+
+    Parameters
+    ----------
+    terms : (k, p) float array
+        What each equation multiplies the k unknowns of its problem with.
+    right : (p,) float array
+    row : (p,) int array
+        The problem of each equation.
+    count : int
+        Problems.
+
+    Returns
+    -------
+    (count, k) float array
+    """
+    k = len(terms)
+    matrix, vector = np.zeros((count, k, k)), np.zeros((count, k))
+    for i in range(k):
+        vector[:, i] = np.bincount(row, terms[i] * right, count)
+        for j in range(i, k):
+            matrix[:, i, j] = matrix[:, j, i] = np.bincount(row, terms[i] * terms[j], count)
+    inverse = np.linalg.pinv(matrix, rcond=UNDETERMINED, hermitian=True)
+    return np.einsum("nij,nj->ni", inverse, vector)
+
+
+def _quantiles_by_area(mesh: Mesh, values: FloatArray, shares: list[float]) -> list[float]:
+    """Values at vertices that some shares of the area do not exceed."""
+    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), len(mesh.vertices))
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(area[order])
+    places = np.searchsorted(below, np.array(shares) * below[-1]).clip(max=len(order) - 1)
+    return [float(value) for value in values[order[places]]]
+
+
+def _checked_number(name: str, value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(f"{name} is {value!r}; pass a number") from error
+    if not math.isfinite(number):
+        raise ArgumentError(f"{name} is {value!r}; pass a finite number")
+    return number
+
+
+def _checked_pairs(edges: ArrayLike, n_vertices: int) -> IntArray:
+    try:
+        given = np.array(edges)
+        if given.size == 0:
+            given = np.zeros((0, 2), dtype=np.int64)
+        if not np.issubdtype(given.dtype, np.integer):
+            raise ValueError(f"their type is {given.dtype}")
+        pairs = given.astype(np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(
+            f"edges cannot be read as vertex indices ({error}); pass an integer array of shape "
+            "(n, 2)"
+        ) from error
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise ArgumentError(f"edges has shape {pairs.shape}; pass vertex indices of shape (n, 2)")
+    outside: BoolArray = ((pairs < 0) | (pairs >= n_vertices)).any(axis=1)
+    if outside.any():
+        first = int(outside.argmax())
+        raise ArgumentError(
+            f"edges[{first}] = {pairs[first].tolist()} refers to vertices that do not exist; "
+            f"indices must lie in 0 … {n_vertices - 1}"
+        )
+    return pairs
