@@ -31,7 +31,7 @@ from .network.weights_file import shipped_weights
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.exact_curve import ExactCurve
+from .relaxation.exact_curve import ExactCurve, exact_curve
 from .relaxation.relaxing import RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along
 from .request import Progress, Request, same_course, same_request
@@ -70,7 +70,7 @@ class _Remembered:
     request: Request
     start: _Start
     exact: ExactCurve  # the design's curve with its nodes
-    design: Design
+    design: Design | None  # None where the curve is not at rest yet
 
 
 class SurfaceDesigner:
@@ -124,6 +124,62 @@ class SurfaceDesigner:
         zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
         return self._level_set_design(problem, solution, zeros, started)
 
+    def follow(self, request: Request, iterations: int, started: float) -> Design | None:
+        """Lead the last curve on by few iterations; None where it cannot be led there.
+
+        Parameters
+        ----------
+        request : Request
+        iterations : int
+            At most so many.
+        started : float
+            When this began, by `time.perf_counter`.
+
+        Raises
+        ------
+        UnreachableError
+            If obstacles leave no way.
+        """
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            check_reachable(free.copy, request)
+            there = free.copy.request(replace(request, clearance=0.0))
+            assert there is not None  # as it has just been checked
+            found = free.designer.follow(there, iterations, started)
+            return None if found is None else free.copy.design(found)
+        last = self._last
+        if last is not None and last.design is not None and same_request(request, last.request):
+            return replace(last.design, seconds=time.perf_counter() - started)
+        start = self._start_from_last(request)
+        if start is None:
+            return None
+        config = replace(WARM, iterations=iterations, drawn_iterations=1)
+        return self._relaxed(request, start, config, None, started)
+
+    def resume(self, request: Request, curve: SurfaceCurve) -> bool:
+        """Go on from a curve as if it were the last one, or forget where it is not on this surface.
+
+        Parameters
+        ----------
+        request : Request
+            That the curve answers.
+        curve : SurfaceCurve
+            Through all its points, in their order.
+        """
+        self.forget()
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            there = free.copy.request(replace(request, clearance=0.0))
+            carried = free.copy.carried(curve)
+            return (
+                there is not None and carried is not None and free.designer.resume(there, carried)
+            )
+        surface, unit = self._curve_surface(request), float(np.sqrt(self._area(request)))
+        start = _Start(curve, np.arange(len(request.points)), surface, unit)
+        exact = exact_curve(surface, curve, WARM.levels[-1])
+        self._last = _Remembered(request, start, exact, None)
+        return True
+
     def _without_obstacles(self, request: Request) -> _Free | None:
         """The surface that obstacles leave, the one of the last request if they are the same."""
         if request.obstacles is None:
@@ -139,7 +195,7 @@ class SurfaceDesigner:
     def _designed(self, request: Request, progress: Progress | None, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
         last = self._last
-        if last is not None and same_request(request, last.request):
+        if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
         start = self._start_from_last(request)
         if start is not None:
@@ -208,7 +264,8 @@ class SurfaceDesigner:
             find_field=partial(curve_field, self.mesh, relaxed.curve),
         )
         if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, relaxed.exact, design)
+            at_rest = design.status is not Status.ITERATION_LIMIT
+            self._last = _Remembered(request, start, relaxed.exact, design if at_rest else None)
         return design
 
     def _level_set_design(
