@@ -33,11 +33,14 @@ from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.exact_curve import ExactCurve, exact_curve
 from .relaxation.relaxing import RelaxationConfig, relax
-from .relaxation.warm_start import WARM, moved_along
+from .relaxation.warm_start import WARM, moved_along, part_of_the_way
 from .request import Progress, Request, same_course, same_request
 
 PROGRESS_INTERVAL = 0.25
 """Least seconds between two calls of a caller's progress function."""
+
+PART_WAYS = (0.06, 0.015)
+"""How far control points are led at once where they cannot be led all the way, in curve lengths."""
 
 State = TypeVar("State")
 
@@ -150,11 +153,17 @@ class SurfaceDesigner:
         last = self._last
         if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        start = self._start_from_last(request)
-        if start is None:
-            return None
         config = replace(WARM, iterations=iterations, drawn_iterations=1)
-        return self._relaxed(request, start, config, None, started)
+        start = self._start_from_last(request)
+        if start is not None:
+            return self._relaxed(request, start, config, None, started)
+        for farthest in PART_WAYS:
+            nearer = self._part_of_the_way(request, farthest)
+            start = None if nearer is None else self._start_from_last(nearer)
+            if nearer is not None and start is not None:
+                design = self._relaxed(nearer, start, config, None, started)
+                return replace(design, status=Status.ITERATION_LIMIT)
+        return None
 
     def resume(self, request: Request, curve: SurfaceCurve) -> bool:
         """Go on from a curve as if it were the last one, or forget where it is not on this surface.
@@ -225,6 +234,19 @@ class SurfaceDesigner:
         if curve is None:
             return None
         return replace(last.start, curve=curve, breaking=0)
+
+    def _part_of_the_way(self, request: Request, farthest: float) -> Request | None:
+        """A request between the last one and one that it cannot be led to at once."""
+        last = self._last
+        if last is None or not same_course(request, last.request):
+            return None
+        visited, surface = last.start.visited, last.start.surface
+        found = part_of_the_way(surface, last.exact, request.points[visited], farthest)
+        if found is None:
+            return None
+        given = np.empty(len(visited), dtype=np.int64)
+        given[visited] = np.arange(len(visited))
+        return replace(request, points=found[given])
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""

@@ -13,6 +13,7 @@ from ..array_types import FloatArray, IntArray
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
+from .face_walks import join, strictly_inside
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
@@ -20,6 +21,9 @@ WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
 
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
+
+WIDEST_DETOUR = 4.0
+"""Longest way of a control point over the faces, relative to its move in space."""
 
 TAKEN_ALONG = 4.0
 """Distance along the curve up to which nodes move with a control point, in moves."""
@@ -61,6 +65,46 @@ def moved_along(
     if changed is None or not is_simple(surface, changed):
         return None
     return changed
+
+
+def part_of_the_way(
+    surface: CurveSurface, curve: ExactCurve, controls: SurfacePoints, farthest: float
+) -> SurfacePoints | None:
+    """Control points between those of a curve and new places, on straight ways over the faces.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    curve : ExactCurve
+    controls : SurfacePoints
+        The new places, in the order visited.
+    farthest : float
+        How far they go, relative to the curve's length; at least to the next edge.
+
+    Returns
+    -------
+    SurfacePoints or None
+        None where there is no such way that is not much of a detour.
+    """
+    mesh, nodes = surface.mesh, curve.nodes
+    longest = farthest * float(nodes.lengths.sum())
+    starts = nodes.places[curve.control_nodes]
+    away = np.linalg.norm(controls.positions(mesh) - starts.positions(mesh), axis=1)
+    faces, barycentric = controls.faces.copy(), controls.barycentric.copy()
+    for far in np.flatnonzero(away > longest):
+        here = np.array([far])
+        start = SurfacePoints(starts.faces[here], strictly_inside(starts.barycentric[here]))
+        normals = nodes.normals[curve.control_nodes[here]]
+        ends = nodes_at(surface, controls[here], curve.closed).normals
+        plane = normals + np.sign((normals * ends).sum() or 1.0) * ends
+        way = join(mesh, start, controls[here], plane, WIDEST_DETOUR)
+        if not way.reached.all() or not len(way.crossings):
+            return None
+        line = np.concatenate([start.positions(mesh), way.crossings.positions(mesh)])
+        gone = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
+        at = max(int(np.searchsorted(gone, longest, side="right")) - 1, 0)
+        faces[far], barycentric[far] = way.crossings.faces[at], way.crossings.barycentric[at]
+    return SurfacePoints(faces, barycentric)
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:

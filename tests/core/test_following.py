@@ -80,16 +80,46 @@ def test_smoothness_may_change(ball):
 
 
 def test_nothing_to_follow(ball):
-    """No curve yet, a far move, another number of points, or another way of closing."""
+    """No curve yet, another number of points, another way of closing, or another map."""
     designer, points = nicmm.Designer(ball), on_ball(ball, START)
     assert designer.follow(points) is None
     designer.design(points)
-    assert designer.follow(on_ball(ball, [0.1, 5.0, 0.15, 0.0, -0.1])) is None
     assert designer.follow(points[np.arange(4)]) is None
     assert designer.follow(points, closed=False) is None
     weights = np.zeros(len(ball.vertices))
     assert designer.follow(points, alignment=weights) is None
     assert designer.follow(points) is not None
+
+
+@pytest.mark.parametrize("height", [1.0, 5.0])
+def test_a_point_that_jumped_is_led_there_in_parts(ball, height):
+    designer = nicmm.Designer(ball)
+    designer.design(on_ball(ball, START))
+    far = on_ball(ball, [0.1, height, 0.15, 0.0, -0.1])
+    first = designer.follow(far)
+    assert first.status is nicmm.Status.ITERATION_LIMIT
+    away = np.linalg.norm(
+        first.curves[0].points[first.curves[0].control_index] - far.positions(ball), axis=1
+    )
+    np.testing.assert_allclose(away[[0, 2, 3, 4]], 0.0, atol=1e-12)
+    assert away[1] > 0.1
+    design, _ = to_rest(designer, far)
+    assert_valid_curve(ball, design.curves[0], far.positions(ball))
+    anew = nicmm.design_curve(ball, far)
+    assert design.curves[0].length < 1.2 * anew.curves[0].length
+
+
+def test_a_way_that_is_none_is_not_followed(flat_disc):
+    """Points of a strip across which no straight way leads stay where they are."""
+    strip = flat_disc.vertices[flat_disc.faces].mean(axis=1)
+    kept = flat_disc.faces[(np.abs(strip[:, 0]) > 0.15) | (strip[:, 1] < -0.6)]
+    mesh = nicmm.Mesh(flat_disc.vertices, kept)
+    places = np.array([[-0.5, 0.5, 0.0], [-0.3, -0.2, 0.0], [-0.7, 0.0, 0.0]])
+    designer = nicmm.Designer(mesh)
+    designer.design(nearest_points(mesh, places)[0])
+    across = nearest_points(mesh, places + [[1.0, 0.0, 0.0], [0, 0, 0], [0, 0, 0]])[0]
+    assert designer.follow(across) is None
+    assert designer.design(across).status is nicmm.Status.CONVERGED
 
 
 @pytest.mark.parametrize("bad", [0, -1, 2.5, None])
