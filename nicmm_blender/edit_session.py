@@ -283,39 +283,44 @@ class EditSession:
 
     def _follow(self) -> None:
         self._steps_left -= 1
-        self._answer(lambda: self.designer.follow(self.points, closed=self.closed, **self._maps()))
-
-    def _design(self) -> None:
-        self.designer.forget()
-        self._steps_left = 0
-        self._answer(lambda: self.designer.design(self.points, closed=self.closed, **self._maps()))
-
-    def _answer(self, work: Callable) -> None:
-        nicmm = self._nicmm
-        try:
-            design = work()
-        except (nicmm.NicmmError, InputError) as error:
-            self._rest()
-            self.state = replace(self.state, problem=self._in_words(error))
-            return
-        self.waiting = design is None
+        design = self._answer(self.designer.follow)
         if design is None:
-            self._steps_left = 0
-            return
-        one = len(design.curves) == 1 and (design.curves[0].control_index >= 0).all()
-        if not one:
+            # There is nothing to follow, unless it has a problem.
             self._rest()
-            self.state = replace(self.state, problem=str(design.status))
-            return
-        if design.status is not nicmm.Status.ITERATION_LIMIT:
+            self.waiting = not self.problem
+        elif design.status is not self._nicmm.Status.ITERATION_LIMIT:
             self._steps_left = 0
         elif not self._steps_left:
             self.waiting = True
+        self._take(design)
+
+    def _design(self) -> None:
+        self._rest()
+        self.designer.forget()
+        self._take(self._answer(self.designer.design))
+
+    def _answer(self, ask: Callable):
+        """The core's design, or None where it has none; `problem` says why if it knows."""
+        self.state = replace(self.state, problem="")
+        try:
+            return ask(self.points, closed=self.closed, **self._maps())
+        except (self._nicmm.NicmmError, InputError) as error:
+            self.state = replace(self.state, problem=self._in_words(error))
+            return None
+
+    def _take(self, design) -> None:
+        """Show what a design brought."""
+        nicmm = self._nicmm
+        if design is None:
+            return
+        if len(design.curves) != 1 or (design.curves[0].control_index < 0).any():
+            self._rest()
+            self.state = replace(self.state, problem=str(design.status))
+            return
         good = (nicmm.Status.CONVERGED, nicmm.Status.ITERATION_LIMIT)
         self.state = replace(
             self.state,
             curve=design.curves[0],
-            problem="",
             notice="" if design.status in good else str(design.status),
             rested=self.resting,
         )

@@ -111,11 +111,10 @@ def watch_tool():
 
     def watched_modal(self, context, event):
         waiting = self._opened.session.waiting
-        before = time.perf_counter(), time.process_time()
+        before = time.thread_time()  # Blender draws in other threads
         result = modal(self, context, event)
-        spent = [1e3 * (time.perf_counter() - before[0]), 1e3 * (time.process_time() - before[1])]
-        grabbed = self._grabbed is not None
-        Helper.frames.append([event.type, grabbed, waiting, *spent])
+        spent = 1e3 * (time.thread_time() - before)
+        Helper.frames.append([event.type, self._grabbed is not None, waiting, spent])
         if result & {"FINISHED", "CANCELLED"}:
             Helper.running.clear()
         return result
