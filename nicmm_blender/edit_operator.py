@@ -268,9 +268,8 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
             return self._finish(context)
         if self._grabbed is not None:
             if event.type == "RIGHTMOUSE":
+                session.drop_back()
                 self._release(context)
-                session.undo()
-                self._show(context)
             return {"RUNNING_MODAL"}
         if event.type == "LEFTMOUSE":
             self._press(context, event)

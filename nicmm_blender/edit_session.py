@@ -83,6 +83,7 @@ class EditSession:
         self._done: list[State] = []
         self._undone: list[State] = []
         self._before_drag: State | None = None
+        self._dragging = False
         if curve is None or not self._resume(curve):
             self._ask()
         else:
@@ -180,7 +181,7 @@ class EditSession:
 
     def grab(self) -> None:
         """Begin to move points; all moves until `drop` are one step of undo."""
-        self._before_drag = self.state
+        self._before_drag, self._dragging = self.state, True
 
     def move(self, number: int, face: int, barycentric) -> None:
         """Move a point that was grabbed."""
@@ -196,6 +197,14 @@ class EditSession:
     def drop(self) -> None:
         """End a move."""
         self._before_drag = None
+        self._dragging = False
+
+    def drop_back(self) -> None:
+        """End a move and take it back."""
+        if self._dragging and self._before_drag is None:
+            self.undo()
+            self._undone.pop()
+        self.drop()
 
     def ask_for(self, **changes) -> None:
         """Change what the curve is asked for, by the names of `Asked`."""

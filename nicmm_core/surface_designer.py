@@ -159,8 +159,10 @@ class SurfaceDesigner:
             return self._relaxed(request, start, config, None, started)
         for farthest in PART_WAYS:
             nearer = self._part_of_the_way(request, farthest)
-            start = None if nearer is None else self._start_from_last(nearer)
-            if nearer is not None and start is not None:
+            if nearer is None:
+                return None
+            start = self._start_from_last(nearer)
+            if start is not None:
                 design = self._relaxed(nearer, start, config, None, started)
                 return replace(design, status=Status.ITERATION_LIMIT)
         return None

@@ -13,7 +13,7 @@ from ..array_types import FloatArray, IntArray
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
-from .face_walks import join, strictly_inside
+from .face_walks import join, moved, strictly_inside
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
@@ -70,7 +70,7 @@ def moved_along(
 def part_of_the_way(
     surface: CurveSurface, curve: ExactCurve, controls: SurfacePoints, farthest: float
 ) -> SurfacePoints | None:
-    """Control points between those of a curve and new places, on straight ways over the faces.
+    """Control points that go from those of a curve towards new places, over the faces.
 
     Parameters
     ----------
@@ -79,32 +79,50 @@ def part_of_the_way(
     controls : SurfacePoints
         The new places, in the order visited.
     farthest : float
-        How far they go, relative to the curve's length; at least to the next edge.
+        How far they go, relative to the curve's length.
 
     Returns
     -------
     SurfacePoints or None
-        None where there is no such way that is not much of a detour.
+        None where one of them comes to a boundary.
     """
     mesh, nodes = surface.mesh, curve.nodes
     longest = farthest * float(nodes.lengths.sum())
     starts = nodes.places[curve.control_nodes]
-    away = np.linalg.norm(controls.positions(mesh) - starts.positions(mesh), axis=1)
+    origins, goals = starts.positions(mesh), controls.positions(mesh)
     faces, barycentric = controls.faces.copy(), controls.barycentric.copy()
-    for far in np.flatnonzero(away > longest):
+    for far in np.flatnonzero(np.linalg.norm(goals - origins, axis=1) > longest):
         here = np.array([far])
         start = SurfacePoints(starts.faces[here], strictly_inside(starts.barycentric[here]))
-        normals = nodes.normals[curve.control_nodes[here]]
-        ends = nodes_at(surface, controls[here], curve.closed).normals
-        plane = normals + np.sign((normals * ends).sum() or 1.0) * ends
-        way = join(mesh, start, controls[here], plane, WIDEST_DETOUR)
-        if not way.reached.all() or not len(way.crossings):
-            return None
-        line = np.concatenate([start.positions(mesh), way.crossings.positions(mesh)])
-        gone = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
-        at = max(int(np.searchsorted(gone, longest, side="right")) - 1, 0)
-        faces[far], barycentric[far] = way.crossings.faces[at], way.crossings.barycentric[at]
+        line = _way_over_faces(surface, curve, start, controls[here], here)
+        if line is None:
+            # No straight way leads there: on in its direction.
+            ahead = goals[here] - origins[here]
+            normal = mesh.face_normals[start.faces]
+            ahead -= (ahead * normal).sum(axis=1, keepdims=True) * normal
+            length = np.maximum(np.linalg.norm(ahead, axis=1), tolerances.TINY)
+            line, stuck = moved(mesh, start, ahead / length[:, None], np.array([longest]))
+            if stuck.any():
+                return None
+        gone = np.linalg.norm(np.diff(line.positions(mesh), axis=0, prepend=origins[here]), axis=1)
+        at = max(int(np.searchsorted(np.cumsum(gone), longest, side="right")) - 1, 0)
+        faces[far], barycentric[far] = line.faces[at], line.barycentric[at]
     return SurfacePoints(faces, barycentric)
+
+
+def _way_over_faces(
+    surface: CurveSurface,
+    curve: ExactCurve,
+    start: SurfacePoints,
+    goal: SurfacePoints,
+    control: IntArray,
+) -> SurfacePoints | None:
+    """Where the straight way of one control point crosses edges; None where none leads there."""
+    normals = curve.nodes.normals[curve.control_nodes[control]]
+    ends = nodes_at(surface, goal, curve.closed).normals
+    plane = normals + np.sign((normals * ends).sum() or 1.0) * ends
+    way = join(surface.mesh, start, goal, plane, WIDEST_DETOUR)
+    return way.crossings if way.reached.all() and len(way.crossings) else None
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:
