@@ -16,15 +16,23 @@ def polyline_object(mesh_object, polylines, thickness: float):
     curve.dimensions = "3D"
     curve.bevel_depth = thickness
     curve.use_fill_caps = True
-    for points, closed in polylines:
+    write_polylines(curve, polylines)
+    return bpy.data.objects.new(name, curve)
+
+
+def write_polylines(curve, polylines) -> None:
+    """Replace the splines of a curve by one for each (points, closed) pair."""
+    materials = [spline.material_index for spline in curve.splines]
+    curve.splines.clear()
+    for number, (points, closed) in enumerate(polylines):
         spline = curve.splines.new("POLY")
         spline.points.add(len(points) - 1)
         homogeneous = np.ones((len(points), 4), dtype=np.float32)
         homogeneous[:, :3] = points
         spline.points.foreach_set("co", homogeneous.ravel())
         spline.use_cyclic_u = closed
-
-    return bpy.data.objects.new(name, curve)
+        if number < len(materials):
+            spline.material_index = materials[number]
 
 
 def place(context, mesh_object, curve_object) -> None:

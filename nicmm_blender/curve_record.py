@@ -2,8 +2,11 @@
 """What a curve object remembers of the surface that it lies on, also in a saved file.
 
 Each point is kept by the three vertices of its triangle and its barycentric coordinates: vertices
-keep their numbers when the mesh is moved or deformed, and when the file is opened again.
+keep their numbers when the mesh is moved or deformed, and when the file is opened again. Control
+points are kept so too, with what else the curve was asked for, so that it can be edited again.
 """
+
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -12,8 +15,35 @@ from .mesh_data import InputError
 KEY = "nicmm_curve"
 
 
-def remember(curve_object, mesh_object, surface, curves) -> None:
-    """Store where the points of curves are on the mesh."""
+@dataclass(frozen=True)
+class Asked:
+    """What a curve is asked for, besides its control points; see `settings.DesignProperties`."""
+
+    closed: bool = True
+    method: str = "NICMM"
+    smoothness: float = 1.0
+    obstacle_group: str = ""
+    clearance: float = 0.0
+    alignment_group: str = ""
+
+
+def asked_by(properties) -> Asked:
+    """The same from an operator's or the scene's properties."""
+    return Asked(**{field.name: getattr(properties, field.name) for field in fields(Asked)})
+
+
+def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=None) -> None:
+    """Store where the points of curves are on the mesh, and what they were asked for.
+
+    The control points are `controls`, the core's SurfacePoints, or by default those on the curves.
+    """
+    if controls is None:
+        found = [curve.control_index[curve.control_index >= 0] for curve in curves]
+        pairs = list(zip(curves, found, strict=True))
+        control_faces = np.concatenate([curve.faces[index] for curve, index in pairs])
+        control_barycentric = np.concatenate([curve.barycentric[index] for curve, index in pairs])
+    else:
+        control_faces, control_barycentric = controls.faces, controls.barycentric
     curve_object[KEY] = {
         "mesh": mesh_object,
         "vertices": len(surface.local),
@@ -23,6 +53,10 @@ def remember(curve_object, mesh_object, surface, curves) -> None:
         "barycentric": np.concatenate([c.barycentric for c in curves]).ravel().tolist(),
         "control_counts": [len(curve.control_index) for curve in curves],
         "control_index": np.concatenate([c.control_index for c in curves]).tolist(),
+        "control_corners": surface.faces[control_faces].ravel().tolist(),
+        "control_barycentric": control_barycentric.ravel().tolist(),
+        "control_positions": surface.points(control_faces, control_barycentric).ravel().tolist(),
+        "asked": asdict(asked),
     }
 
 
@@ -37,21 +71,72 @@ def mesh_of(curve_object):
     return found if found is not None and found.type == "MESH" else None
 
 
+def present_mesh(context, curve_object):
+    """The mesh object that a curve was designed on, which has to be in the scene."""
+    found = mesh_of(curve_object)
+    if found is None or found.name not in context.view_layer.objects:
+        raise InputError(
+            f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
+            "Bring it back, or draw the curve again"
+        )
+    return found
+
+
+def curves_on(context, mesh_object) -> list:
+    """Visible objects of the view layer that were designed on a mesh."""
+    return [
+        found
+        for found in context.view_layer.objects
+        if has_record(found) and mesh_of(found) == mesh_object and found.visible_get()
+    ]
+
+
+def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
+    """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's own space.
+
+    Those whose triangle is gone are left out; a closed curve ends with its first point.
+    """
+    record = curve_object[KEY]
+    found = []
+    for kind in ("control_", ""):
+        names = (f"{kind}corners", f"{kind}barycentric")
+        faces, barycentric = (np.zeros(0, np.int64), np.zeros((0, 3)))
+        if names[0] in record:
+            faces, barycentric = _recalled(record, *names, surface)
+        there = faces >= 0
+        found.append(surface.points(faces[there], barycentric[there]))
+    points, line = found
+    if len(record["closed"]) == 1 and record["closed"][0]:
+        line = np.concatenate([line, line[:1]])
+    return points, line
+
+
+def lies_on(curve_object, surface) -> bool:
+    """Whether all triangles that a curve runs over are still there."""
+    record = curve_object[KEY]
+    return bool((_recalled(record, "corners", "barycentric", surface)[0] >= 0).all())
+
+
+def asked_of(curve_object) -> Asked:
+    """What a curve was asked for."""
+    stored = curve_object[KEY].get("asked")
+    if stored is None:  # drawn before this was remembered
+        return Asked(closed=bool(curve_object[KEY]["closed"][0]))
+    return Asked(**{field.name: field.type(stored[field.name]) for field in fields(Asked)})
+
+
 def recall(curve_object, surface) -> list:
     """The curves of the core that an object remembers, on the mesh as it is now."""
     from .. import nicmm_core as nicmm
 
     record = curve_object[KEY]
-    corners = np.array(record["corners"], dtype=np.int64).reshape(-1, 3)
-    barycentric = np.array(record["barycentric"], dtype=np.float64).reshape(-1, 3)
-    faces, order = _find_triangles(surface.faces, corners)
-    if record["vertices"] > len(surface.local) or (faces < 0).any():
+    faces, barycentric = _recalled(record, "corners", "barycentric", surface)
+    if (faces < 0).any():
         raise InputError(
             f'The mesh has changed since "{curve_object.name}" was drawn: '
             f"{(faces < 0).sum()} of its {len(faces)} points lie on triangles that are gone. "
-            "Draw the curve again"
+            "Draw the curve again, or edit it, which puts its control points on the mesh as it is"
         )
-    barycentric = np.take_along_axis(barycentric, order, axis=1)
     curves, start, control = [], 0, 0
     for count, closed, controls in zip(
         record["counts"], record["closed"], record["control_counts"], strict=True
@@ -63,6 +148,36 @@ def recall(curve_object, surface) -> list:
         curves.append(nicmm.SurfaceCurve(bool(closed), on, weights, points, index))
         start, control = start + count, control + controls
     return curves
+
+
+def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
+    """The control points of a curve as SurfacePoints, and places for those that are none any more.
+
+    Gives the points with the face -1 where the triangle is gone, and the positions in the object's
+    own space where they were when the curve was drawn, (k, 3).
+    """
+    from .. import nicmm_core as nicmm
+
+    record = curve_object[KEY]
+    if "control_corners" not in record:  # drawn before these were remembered
+        (curve,) = recall(curve_object, surface)
+        index = curve.control_index
+        found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
+        return found, surface.points(found.faces, found.barycentric)
+    names = ("control_corners", "control_barycentric")
+    found = nicmm.SurfacePoints(*_recalled(record, *names, surface))
+    return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
+
+
+def _recalled(record, corners_name: str, weights_name: str, surface):
+    """Faces, (n,), -1 where they are gone, and barycentrics, (n, 3), of remembered points."""
+    corners = np.array(record[corners_name], dtype=np.int64).reshape(-1, 3)
+    barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
+    faces, order = _find_triangles(surface.faces, corners)
+    if record["vertices"] > len(surface.local):
+        # Vertices were removed, and the others have other numbers now.
+        faces = np.full(len(corners), -1, dtype=np.int64)
+    return faces, np.take_along_axis(barycentric, order, axis=1)
 
 
 def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,9 +4,11 @@
 import bpy
 
 from . import curve_record, mesh_data, settings
+from .edit_operator import NICMM_OT_edit_curve
 from .operators import NICMM_OT_convert_curve, NICMM_OT_design_curve
 
 ICON = "CURVE_BEZCIRCLE"
+EDIT_ICON = "CURVE_PATH"
 CONVERT_ICON = "MOD_EDGESPLIT"
 
 
@@ -24,6 +26,7 @@ class NICMM_PT_design_curve(bpy.types.Panel):
         operator = self.layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
         for name in settings.PROPERTY_NAMES:
             setattr(operator, name, getattr(properties, name))
+        self.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
         if curve_record.has_record(context.active_object):
             self.layout.separator()
             convert = self.layout.operator(NICMM_OT_convert_curve.bl_idname, icon=CONVERT_ICON)
@@ -34,6 +37,7 @@ class NICMM_PT_design_curve(bpy.types.Panel):
 def draw_in_menu(menu, _context) -> None:
     menu.layout.separator()
     menu.layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
+    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
 
 
 def draw_in_context_menu(menu, context) -> None:
@@ -50,6 +54,7 @@ def draw_conversions(menu, context) -> None:
     menu.layout.operator_menu_enum(
         NICMM_OT_convert_curve.bl_idname, "output", text="Convert Designed Curve", icon=CONVERT_ICON
     )
+    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
 
 
 MENUS = (

@@ -22,6 +22,7 @@ class Triangles:
     `local` and `solved` hold the (V, 3) positions in the object's own space and in the space where
     lengths are what the user sees; `faces` holds the (F, 3) vertex indices, `loops` the (F, 3)
     indices of the mesh's corners and `polygons` the (F,) faces of the mesh that they are parts of.
+    `linear` is the (3, 3) map from the one space to the other.
     """
 
     local: np.ndarray
@@ -29,6 +30,7 @@ class Triangles:
     faces: np.ndarray
     loops: np.ndarray
     polygons: np.ndarray
+    linear: np.ndarray
 
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions in the object's own space of points given by face and barycentrics."""
@@ -73,9 +75,10 @@ def triangles(mesh_object) -> Triangles:
 
     local = positions.astype(np.float64)
     linear = np.array(mesh_object.matrix_world.to_3x3(), dtype=np.float64)
-    solved = local if _keeps_proportions(linear) else local @ linear.T
+    if _keeps_proportions(linear):
+        linear = np.eye(3)
     faces, loops, polygons = (found.astype(np.int64) for found in (faces, loops, polygons))
-    return Triangles(local, solved, faces, loops, polygons)
+    return Triangles(local, local @ linear.T, faces, loops, polygons, linear)
 
 
 def _keeps_proportions(linear: np.ndarray) -> bool:

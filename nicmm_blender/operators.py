@@ -52,7 +52,8 @@ class NICMM_OT_design_curve(
             raise mesh_data.InputError(message) from error
         if not design.curves:
             raise mesh_data.InputError(str(design.status))
-        made = outputs.apply(context, mesh_object, surface, design.curves, self)
+        asked = curve_record.asked_by(self)
+        made = outputs.apply(context, mesh_object, surface, design.curves, self, asked)
         summary = f"{_summary(mesh_object, design, order)}: {made}"
         if design.status == nicmm.Status.CONVERGED:
             self.report({"INFO"}, summary)
@@ -118,15 +119,11 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
     def _execute(self, context):
         original = context.active_object
         name = original.name
-        mesh_object = curve_record.mesh_of(original)
-        if mesh_object is None or mesh_object.name not in context.view_layer.objects:
-            raise mesh_data.InputError(
-                f'The mesh that "{name}" was designed on is not in this scene. Bring it back, or '
-                "draw the curve again"
-            )
+        mesh_object = curve_record.present_mesh(context, original)
         surface = mesh_data.triangles(mesh_object)
         curves = curve_record.recall(original, surface)
-        made = outputs.apply(context, mesh_object, surface, curves, self)
+        asked = curve_record.asked_of(original)
+        made = outputs.apply(context, mesh_object, surface, curves, self, asked)
         if not self.keep_original:
             curve_object.remove(original)
         if self.output not in {"CURVE", "STICKY"}:

@@ -28,10 +28,16 @@ class _Cutting:
     weights: np.ndarray
 
 
-def apply(context, mesh_object, surface, curves, settings) -> str:
-    """Make the output that is chosen and return what was done, in words."""
+def apply(context, mesh_object, surface, curves, settings, asked) -> str:
+    """Make the output that is chosen and return what was done, in words.
+
+    `asked` is the `curve_record.Asked` that the curves answer.
+    """
     if settings.output in {"CURVE", "STICKY"}:
-        return _as_object(context, mesh_object, surface, curves, settings)
+        made = as_object(mesh_object, surface, curves, settings)
+        curve_record.remember(made, mesh_object, surface, curves, asked)
+        curve_object.place(context, mesh_object, made)
+        return f"{sum(len(curve.faces) for curve in curves)} points"
     if len(curves) != 1:
         raise InputError(
             f"There are {len(curves)} curves, and only one can be cut. Choose the output Curve to "
@@ -42,16 +48,24 @@ def apply(context, mesh_object, surface, curves, settings) -> str:
     return changes_mesh[settings.output](context, mesh_object, surface, curves[0], settings)
 
 
-def _as_object(context, mesh_object, surface, curves, settings) -> str:
+def as_object(mesh_object, surface, curves, settings):
+    """Make a curve object, not yet in any collection."""
     thickness = settings.thickness * surface.diagonal
     if settings.output == "STICKY":
-        made = sticky_curves.add(mesh_object, surface, curves, thickness)
+        return sticky_curves.add(mesh_object, surface, curves, thickness)
+    return curve_object.polyline_object(mesh_object, _polylines(surface, curves), thickness)
+
+
+def redraw(drawn, surface, curves) -> None:
+    """Put other curves into a curve object; its thickness, materials and modifiers stay."""
+    if drawn.type == "CURVES":
+        sticky_curves.write(drawn.data, surface, curves)
     else:
-        polylines = [(surface.points(c.faces, c.barycentric), c.closed) for c in curves]
-        made = curve_object.polyline_object(mesh_object, polylines, thickness)
-    curve_record.remember(made, mesh_object, surface, curves)
-    curve_object.place(context, mesh_object, made)
-    return f"{sum(len(curve.faces) for curve in curves)} points"
+        curve_object.write_polylines(drawn.data, _polylines(surface, curves))
+
+
+def _polylines(surface, curves) -> list:
+    return [(surface.points(curve.faces, curve.barycentric), curve.closed) for curve in curves]
 
 
 def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cutting:

@@ -16,6 +16,21 @@ def add(mesh_object, surface, curves, radius: float):
     """Make the object, not yet in any collection."""
     name = f"{mesh_object.name} Curve"
     data = bpy.data.hair_curves.new(name)
+    write(data, surface, curves, radius)
+    curves_object = bpy.data.objects.new(name, data)
+    modifier = curves_object.modifiers.new(GROUP_NAME, "NODES")
+    modifier.node_group = node_group()
+    _set_input(modifier, "Surface", mesh_object)
+    return curves_object
+
+
+def write(data, surface, curves, radius: float | None = None) -> None:
+    """Replace the curves of a hair curves data-block; without a radius they keep that of before."""
+    if radius is None:
+        before = data.attributes.get("radius")
+        radius = before.data[0].value if before is not None and len(before.data) else 0.0
+    if len(data.curves):
+        data.remove_curves()
     data.add_curves([len(curve.faces) for curve in curves])
     faces = np.concatenate([curve.faces for curve in curves])
     barycentric = np.concatenate([curve.barycentric for curve in curves])
@@ -27,12 +42,6 @@ def add(mesh_object, surface, curves, radius: float):
     for corner, attribute in enumerate(CORNERS):
         _set(data, attribute, "INT", "POINT", surface.faces[faces, corner])
     _set(data, "barycentric", "FLOAT_VECTOR", "POINT", barycentric)
-
-    curves_object = bpy.data.objects.new(name, data)
-    modifier = curves_object.modifiers.new(GROUP_NAME, "NODES")
-    modifier.node_group = node_group()
-    _set_input(modifier, "Surface", mesh_object)
-    return curves_object
 
 
 def node_group():

@@ -16,7 +16,9 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import (
@@ -27,10 +29,12 @@ from .arguments import (
     checked_map,
     checked_smoothness,
 )
+from .curve import SurfaceCurve
 from .design_result import Design, cancelled_design
-from .errors import ArgumentError, UnreachableError
+from .errors import ArgumentError, CurveError, UnreachableError
 from .mesh import Mesh
 from .mesh_copy import MeshCopy
+from .outputs.chain import checked_curve
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .request import Request
@@ -42,6 +46,10 @@ PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
     "only, across which no curve is led; join the parts, or choose points on one of them"
 )
+
+
+FOLLOWING = 3
+"""Iterations of `Designer.follow` by default: a frame or two of a live drawing."""
 
 
 class Designer:
@@ -99,18 +107,12 @@ class Designer:
             check_torch()
         try:
             with watched(progress), self._its_turn():
+                maps = self._maps(obstacles, alignment, clearance, smoothness)
                 points = locate_control_points(self.mesh, control_points, closed)
                 via = {} if via_points is None else via_points
-                avoided = checked_map("obstacles", obstacles, self.mesh)
+                located = located_via_points(self.mesh, points, via, order, closed)
                 request = Request(
-                    points=points,
-                    closed=closed,
-                    order=order,
-                    via_points=located_via_points(self.mesh, points, via, order, closed),
-                    obstacles=avoided,
-                    alignment=checked_map("alignment", alignment, self.mesh),
-                    clearance=checked_clearance(clearance, avoided),
-                    smoothness=checked_smoothness(smoothness),
+                    points=points, closed=closed, order=order, via_points=located, **maps
                 )
                 copy, designer, request = self._on_sound_copy(request)
                 with displaced(copy.origin):
@@ -127,6 +129,123 @@ class Designer:
             yield
         finally:
             self._lock.release()
+
+    def resume(
+        self,
+        curve: SurfaceCurve,
+        *,
+        obstacles: ArrayLike | None = None,
+        alignment: ArrayLike | None = None,
+        clearance: float = 0.0,
+        smoothness: float = 1.0,
+    ) -> bool:
+        """Go on from a curve that was designed before, here or in another session.
+
+        Its control points may be fewer or more than it was designed through: `control_index` says
+        which of its points they are. Other arguments are those of `design_curve`.
+
+        Parameters
+        ----------
+        curve : SurfaceCurve
+            Simple, and through its control points in their order.
+
+        Returns
+        -------
+        bool
+            False where the curve enters obstacles; then the next design starts anew.
+
+        Raises
+        ------
+        CurveError
+            If the curve is none on this mesh, or lacks control points.
+        """
+        faces, barycentric, _ = checked_curve(self.mesh, curve)
+        index = np.asarray(curve.control_index)
+        if len(index) == 0 or (index < 0).any():
+            raise CurveError(
+                f"curve has the control_index {index.tolist()}; pass a curve that passes all its "
+                "control points"
+            )
+        found = SurfacePoints(faces[index], barycentric[index])
+        request = Request(
+            points=locate_control_points(self.mesh, found, curve.closed),
+            closed=curve.closed,
+            order="given",
+            via_points={},
+            **self._maps(obstacles, alignment, clearance, smoothness),
+        )
+        with self._its_turn():
+            self.forget()
+            copy, designer, request = self._on_sound_copy(request)
+            carried = copy.carried(curve)
+            return carried is not None and designer.resume(request, carried)
+
+    def follow(
+        self,
+        control_points: ArrayLike | SurfacePoints,
+        *,
+        closed: bool = True,
+        obstacles: ArrayLike | None = None,
+        alignment: ArrayLike | None = None,
+        clearance: float = 0.0,
+        smoothness: float = 1.0,
+        iterations: int = FOLLOWING,
+    ) -> Design | None:
+        """Lead the last curve to control points nearby by a bounded amount of work.
+
+        For live drawing: every call takes a few hundredths of a second on a mesh of any size, and
+        the status is `ITERATION_LIMIT` until the curve is at rest; call again with the same
+        arguments until it is. A point that moved far is led there in several calls, between which
+        the curve passes it where it has come to. Arguments not listed here are those of
+        `design_curve`; the order is "given" and the method "nicmm".
+
+        Parameters
+        ----------
+        iterations : int
+            At most so many in this call.
+
+        Returns
+        -------
+        Design or None
+            None where the last curve cannot be led there, or where anything but control points and
+            smoothness differs; then `design` starts anew.
+
+        Raises
+        ------
+        NicmmError
+            As `design_curve`.
+        """
+        started = time.perf_counter()
+        check_closed(closed)
+        request = Request(
+            points=locate_control_points(self.mesh, control_points, closed),
+            closed=closed,
+            order="given",
+            via_points={},
+            **self._maps(obstacles, alignment, clearance, smoothness),
+        )
+        if not isinstance(iterations, int) or iterations < 1:
+            raise ArgumentError(f"iterations is {iterations!r}; pass a positive whole number")
+        with self._its_turn():
+            copy, designer, request = self._on_sound_copy(request)
+            found = designer.follow(request, iterations, started)
+            return None if found is None else copy.design(found)
+
+    def _maps(
+        self,
+        obstacles: ArrayLike | None,
+        alignment: ArrayLike | None,
+        clearance: float,
+        smoothness: float,
+    ) -> dict[str, Any]:
+        """The checked arguments that are the same for every way of asking."""
+        avoided = checked_map("obstacles", obstacles, self.mesh)
+        return {
+            "obstacles": avoided,
+            "alignment": checked_map("alignment", alignment, self.mesh),
+            "clearance": checked_clearance(clearance, avoided),
+            "smoothness": checked_smoothness(smoothness),
+        }
 
     def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
         """A copy of the mesh without its defects, who designs on it, and the request there."""

@@ -86,6 +86,16 @@ class MeshCopy:
             design, status=status, curves=curves, find_field=partial(self._field, design)
         )
 
+    def carried(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+        """A curve on the mesh as one on the copy; None where that lacks a face of it."""
+        if not self.differs:
+            return curve
+        faces = self._copies[curve.faces]
+        if (faces < 0).any():
+            return None
+        index = curve.control_index
+        return curve_on_mesh(self.mesh, curve.closed, faces, curve.barycentric, index)
+
     def _is_simple(self, curve: SurfaceCurve) -> bool:
         polyline = SurfacePoints(curve.faces, curve.barycentric)
         return not len(crossing_segments(self.original, polyline, curve.closed))

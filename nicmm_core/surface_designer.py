@@ -30,9 +30,9 @@ from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.exact_curve import ExactCurve
+from .relaxation.exact_curve import ExactCurve, exact_curve
 from .relaxation.relaxing import RelaxationConfig, relax
-from .relaxation.warm_start import WARM, moved_along
+from .relaxation.warm_start import WARM, moved_along, part_of_the_way
 from .request import Request, same_course, same_request
 
 STARTED = 0.6
@@ -40,6 +40,9 @@ STARTED = 0.6
 
 SOON_DONE = 5
 """The cap of a relaxation, in numbers of iterations that most need."""
+
+PART_WAYS = (0.06, 0.015)
+"""How far control points are led at once where they cannot be led all the way, in curve lengths."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class _Remembered:
     request: Request
     start: _Start
     exact: ExactCurve  # the design's curve with its nodes
-    design: Design
+    design: Design | None  # None where the curve is not at rest yet
 
 
 class SurfaceDesigner:
@@ -130,6 +133,70 @@ class SurfaceDesigner:
             return replace(design, iterations=watch.shown_after)
         return self._level_set_design(problem, solution, zeros, started)
 
+    def follow(self, request: Request, iterations: int, started: float) -> Design | None:
+        """Lead the last curve on by few iterations; None where it cannot be led there.
+
+        Parameters
+        ----------
+        request : Request
+        iterations : int
+            At most so many.
+        started : float
+            When this began, by `time.perf_counter`.
+
+        Raises
+        ------
+        UnreachableError
+            If obstacles leave no way.
+        """
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            check_reachable(free.copy, request)
+            there = free.copy.request(replace(request, clearance=0.0))
+            assert there is not None  # as it has just been checked
+            found = free.designer.follow(there, iterations, started)
+            return None if found is None else free.copy.design(found)
+        last = self._last
+        if last is not None and last.design is not None and same_request(request, last.request):
+            return replace(last.design, seconds=time.perf_counter() - started)
+        config = replace(WARM, iterations=iterations, drawn_iterations=1)
+        start = self._start_from_last(request)
+        if start is not None:
+            return self._relaxed(request, start, config, started)
+        for farthest in PART_WAYS:
+            nearer = self._part_of_the_way(request, farthest)
+            if nearer is None:
+                return None
+            start = self._start_from_last(nearer)
+            if start is not None:
+                design = self._relaxed(nearer, start, config, started)
+                return replace(design, status=Status.ITERATION_LIMIT)
+        return None
+
+    def resume(self, request: Request, curve: SurfaceCurve) -> bool:
+        """Go on from a curve as if it were the last one, or forget where it is not on this surface.
+
+        Parameters
+        ----------
+        request : Request
+            That the curve answers.
+        curve : SurfaceCurve
+            Through all its points, in their order.
+        """
+        self.forget()
+        free = self._without_obstacles(request)
+        if free is not None and free.copy is not None:
+            there = free.copy.request(replace(request, clearance=0.0))
+            carried = free.copy.carried(curve)
+            return (
+                there is not None and carried is not None and free.designer.resume(there, carried)
+            )
+        surface, unit = self._curve_surface(request), self._unit(request)
+        start = _Start(curve, np.arange(len(request.points)), surface, unit)
+        exact = exact_curve(surface, curve, WARM.levels[-1])
+        self._last = _Remembered(request, start, exact, None)
+        return True
+
     def _without_obstacles(self, request: Request) -> _Free | None:
         """The surface that obstacles leave, the one of the last request if they are the same."""
         if request.obstacles is None:
@@ -145,7 +212,7 @@ class SurfaceDesigner:
     def _designed(self, request: Request, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
         last = self._last
-        if last is not None and same_request(request, last.request):
+        if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
         start = self._start_from_last(request)
         if start is not None:
@@ -177,6 +244,19 @@ class SurfaceDesigner:
         if curve is None:
             return None
         return replace(last.start, curve=curve, breaking=0)
+
+    def _part_of_the_way(self, request: Request, farthest: float) -> Request | None:
+        """A request between the last one and one that it cannot be led to at once."""
+        last = self._last
+        if last is None or not same_course(request, last.request):
+            return None
+        visited, surface = last.start.visited, last.start.surface
+        found = part_of_the_way(surface, last.exact, request.points[visited], farthest)
+        if found is None:
+            return None
+        given = np.empty(len(visited), dtype=np.int64)
+        given[visited] = np.arange(len(visited))
+        return replace(request, points=found[given])
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
@@ -219,7 +299,8 @@ class SurfaceDesigner:
             find_field=partial(curve_field, self.mesh, relaxed.curve),
         )
         if design.status is not Status.CANCELLED:
-            self._last = _Remembered(request, start, relaxed.exact, design)
+            at_rest = design.status is not Status.ITERATION_LIMIT
+            self._last = _Remembered(request, start, relaxed.exact, design if at_rest else None)
         return design
 
     def _level_set_design(

@@ -235,6 +235,32 @@ def nearest_points(
     return SurfacePoints(found, barycentric), np.sqrt(np.atleast_1d(squared))
 
 
+def first_hits(
+    mesh: Mesh, origins: FloatArray, directions: FloatArray
+) -> tuple[SurfacePoints, FloatArray]:
+    """Where rays first meet a mesh, from either side of its faces.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    origins, directions : (k, 3) float array
+
+    Returns
+    -------
+    SurfacePoints
+        The face is -1 where a ray meets nothing.
+    (k,) float array
+        How far along each ray, in lengths of its direction; infinite where it meets nothing.
+    """
+    rays = (np.ascontiguousarray(ends, dtype=np.float64) for ends in (origins, directions))
+    faces, along, places = mesh.face_tree.intersect_ray_first(mesh.vertices, mesh.faces, *rays)
+    hit = faces >= 0
+    places = np.where(hit[:, None], places, 0.0)
+    barycentric = np.stack([1.0 - places.sum(axis=1), *places.T], axis=1).clip(0.0)
+    barycentric /= barycentric.sum(axis=1, keepdims=True)
+    return SurfacePoints(faces, barycentric), np.where(hit, along, np.inf)
+
+
 def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:
     outside = (indices < 0) | (indices >= limit)
     if outside.any():

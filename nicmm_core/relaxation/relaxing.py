@@ -76,6 +76,8 @@ class RelaxationConfig:
         The cap, over all levels of one attempt.
     drawn_at_rest : bool
         Whether to try first without drawing the curve after every step.
+    drawn_iterations : int
+        The cap where it is drawn after every step, if that is lower.
     """
 
     levels: tuple[int, ...] = (128, 512)
@@ -87,6 +89,7 @@ class RelaxationConfig:
     stretch: float = 1.6
     iterations: int = 100
     drawn_at_rest: bool = False
+    drawn_iterations: int = 100
 
 
 DAMPING_NODES = 128
@@ -238,7 +241,8 @@ class _Relaxation:
     def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
         """Bring a curve to rest level by level; None where it could not be drawn there."""
         config = self.config
-        last_iteration = self.iterations + config.iterations
+        cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
+        last_iteration = self.iterations + cap
         self.stopped = "converged"
         try:
             for level in config.levels:

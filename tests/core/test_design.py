@@ -518,17 +518,11 @@ def broken_meshes():
 @pytest.mark.parametrize("name", broken_meshes())
 def test_broken_meshes_give_a_valid_curve_or_a_typed_error(name):
     vertices, faces, chosen = broken_meshes()[name]
-    calls = []
-
-    def stop_soon(fraction, points):
-        calls.append(fraction)
-        return len(calls) < 2
-
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             mesh = nicmm.Mesh(vertices, faces)
-            design = nicmm.design_curve(mesh, chosen, progress=stop_soon)
+            design = nicmm.design_curve(mesh, chosen)
         except nicmm.NicmmError as error:
             assert len(str(error)) > 20
             return

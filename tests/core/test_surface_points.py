@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.surface_points import locate_control_points
+from nicmm_core.surface_points import first_hits, locate_control_points
 from tests.core.checks import joined, random_surface_points
 
 SurfacePoints = nicmm.SurfacePoints
@@ -139,3 +139,18 @@ def test_point_in_a_face_without_area_is_refused_or_placed():
         else:
             assert np.isfinite(found.barycentric).all()
             np.testing.assert_allclose(found.positions(mesh)[0], [0.25, 0, 0], atol=1e-9)
+
+
+def test_first_hits_of_rays(ball):
+    """From outside, from inside, past the mesh, and along a direction that is no unit vector."""
+    origins = np.array([[3.0, 0.1, 0.2], [0.0, 0.0, 0.0], [3.0, 2.0, 0.0]])
+    directions = np.array([[-2.0, 0.0, 0.0], [0.1, 0.2, 0.9], [-1.0, 0.0, 0.0]])
+    points, along = first_hits(ball, origins, directions)
+    np.testing.assert_array_equal(points.faces >= 0, [True, True, False])
+    np.testing.assert_array_equal(np.isinf(along), [False, False, True])
+    assert along[0] == pytest.approx(1.0, abs=0.05)
+    met = origins[:2] + along[:2, None] * directions[:2]
+    hit = points[np.arange(2)]
+    np.testing.assert_allclose(hit.positions(ball), met, atol=1e-6)
+    assert (hit.barycentric >= 0.0).all()
+    np.testing.assert_allclose(hit.barycentric.sum(axis=1), 1.0, atol=1e-15)

@@ -1,0 +1,499 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool that edits a curve live: mouse and keys become changes of an `edit_session`."""
+
+import time
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from . import curve_record, designers, mesh_data, settings
+from .curve_record import Asked
+from .edit_overlay import Overlay
+from .edit_view import view_of
+from .edited_curve import chosen, keep, open_session
+from .operators import reporting
+
+INTERVAL = 1.0 / 60.0
+"""Seconds between two steps of a curve that is coming to rest."""
+
+PAUSE = 0.15
+"""Seconds that the mouse has to rest before a curve is designed anew while a point is dragged."""
+
+POINT_REACH, CURVE_REACH = 12.0, 8.0
+"""How near the mouse has to be to a point and to the curve, in pixels at a scale of 1."""
+
+WHEEL = ("WHEELUPMOUSE", "WHEELDOWNMOUSE")
+
+NAVIGATION = {
+    "MIDDLEMOUSE",
+    *WHEEL,
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+    "MOUSEROTATE",
+    "MOUSESMARTZOOM",
+    "HOME",
+    "ACCENT_GRAVE",
+    "NDOF_MOTION",
+    *(f"NUMPAD_{digit}" for digit in range(10)),
+    "NUMPAD_PERIOD",
+    "NUMPAD_PLUS",
+    "NUMPAD_MINUS",
+    "NUMPAD_SLASH",
+}
+"""Events that Blender itself answers, so that the view can be turned while editing."""
+
+HINTS = (
+    ("MOUSE_LMB", "Add, move, insert on the curve"),
+    ("EVENT_CTRL", ""),
+    ("MOUSE_LMB", "Remove"),
+    ("EVENT_C", "Closed or open"),
+    ("EVENT_O", "Obstacles"),
+    ("EVENT_A", "Alignment"),
+    ("EVENT_UP_ARROW", ""),
+    ("EVENT_DOWN_ARROW", "Smoothness"),
+    ("EVENT_CTRL", ""),
+    ("EVENT_Z", "Undo"),
+    ("EVENT_RETURN", "Keep"),
+    ("EVENT_ESC", "Cancel"),
+)
+
+
+_DESIGN = settings.DesignProperties.__annotations__
+_OUTPUT = settings.OutputProperties.__annotations__
+
+ASKED_NAMES = ("closed", "smoothness", "obstacle_group", "clearance", "alignment_group")
+
+
+class NICMM_PG_control_point(bpy.types.PropertyGroup):
+    """A control point, for scripts"""
+
+    position: bpy.props.FloatVectorProperty(
+        name="Position",
+        description="Place on the surface in the object's own space",
+        subtype="XYZ",
+    )
+
+
+class NICMM_OT_edit_curve(bpy.types.Operator):
+    """Draw a curve on the surface of the mesh point by point, or edit one that was drawn before"""
+
+    bl_idname = "nicmm.edit_curve"
+    bl_label = "Edit Curve on Surface"
+    bl_options = {"REGISTER", "UNDO"}
+
+    closed: _DESIGN["closed"]
+    smoothness: _DESIGN["smoothness"]
+    obstacle_group: _DESIGN["obstacle_group"]
+    clearance: _DESIGN["clearance"]
+    alignment_group: _DESIGN["alignment_group"]
+    output: bpy.props.EnumProperty(
+        name="Output",
+        description="What a new curve becomes",
+        items=(
+            ("CURVE", "Curve", "A curve object of polylines"),
+            ("STICKY", "Sticky Curves", "A hair curves object that follows the mesh"),
+        ),
+        default="CURVE",
+    )
+    thickness: _OUTPUT["thickness"]
+    curve: bpy.props.StringProperty(
+        name="Curve Object",
+        description="The designed curve to edit. Empty for the active one, or for a new curve "
+        "where a mesh is active",
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+    points: bpy.props.CollectionProperty(
+        name="Control Points",
+        description="Control points of the curve, in scripts. Empty for those that it has",
+        type=NICMM_PG_control_point,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+    at_mouse: bpy.props.BoolProperty(
+        name="At Mouse",
+        description="Begin with a click where the mouse is",
+        default=False,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if mesh_data.mesh_object(context) is None:
+            cls.poll_message_set("Make a mesh or a designed curve active")
+            return False
+        if context.mode not in {"OBJECT", "EDIT_MESH"}:
+            cls.poll_message_set("Switch to Object Mode or Edit Mode")
+            return False
+        return True
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        mesh_object = mesh_data.mesh_object(context)
+        for name in ("closed", "smoothness"):
+            layout.prop(self, name)
+        for name in ("obstacle_group", "alignment_group"):
+            layout.prop_search(self, name, mesh_object, "vertex_groups")
+        layout.prop(self, "clearance")
+        if not self.curve:
+            layout.prop(self, "output")
+            layout.prop(self, "thickness")
+
+    # For scripts, and for the redo panel.
+
+    def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        edited = chosen(context, self.curve)
+        opened = open_session(context, edited, self._asked_for(context, edited))
+        session = opened.session
+        if len(self.points):
+            session.set_points(np.array([point.position[:] for point in self.points]))
+        elif edited is None:
+            raise mesh_data.InputError(
+                'There are no control points. Pass points=[{"name": "", "position": (x, y, '
+                "z)}, …], or draw with the mouse in the 3D viewport"
+            )
+        session.settle()
+        return self._keep(context, opened, edited)
+
+    def _asked_for(self, context, edited) -> Asked:
+        """What was set for this call, over what the curve was asked for, or the panel says."""
+        if edited is None:
+            asked = curve_record.asked_by(context.scene.nicmm_curves)
+        else:
+            asked = curve_record.asked_of(edited)
+        given = {
+            name: getattr(self, name)
+            for name in ASKED_NAMES
+            if self.properties.is_property_set(name)
+        }
+        return replace(asked, method="NICMM", **given)
+
+    # In a window.
+
+    def invoke(self, context, event):
+        if context.space_data is None or context.space_data.type != "VIEW_3D":
+            return self.execute(context)
+        return reporting(self, lambda: self._invoke(context, event))
+
+    def _invoke(self, context, event):
+        self._area = context.area
+        self._grabbed, self._grip = None, np.zeros(2)
+        self._last_move = 0.0
+        edited = chosen(context, self.curve)
+        if self.at_mouse:
+            clicked = self._clicked(context, event)
+            if clicked is None:
+                # Beside the mesh a click selects, as with Blender's own tools.
+                bpy.ops.view3d.select("INVOKE_DEFAULT")
+                return {"CANCELLED"}
+            edited = clicked[0]
+        self._opened = opened = open_session(context, edited, self._asked_for(context, edited))
+        self._edited_name = "" if edited is None else edited.name
+        self._curtain = _Curtain(opened.mesh_object, edited)
+        self._overlay = Overlay(opened.mesh_object, opened.session)
+        self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        self._say(context)
+        if self.at_mouse:
+            self._press(context, event)
+        self._redraw(context)
+        return {"RUNNING_MODAL"}
+
+    def _clicked(self, context, event) -> tuple | None:
+        """The designed curve under the mouse, or None for a new one; nothing beside the mesh."""
+        mesh_object = mesh_data.mesh_object(context)
+        mesh_data.synchronise(mesh_object)
+        surface = mesh_data.triangles(mesh_object)
+        mesh = designers.designer_for(surface.solved, surface.faces).mesh
+        view, pixel = self._view_on(context, event, mesh_object, surface, mesh)
+        if view is None:
+            return None
+        scale = context.preferences.system.ui_scale
+        for drawn in curve_record.curves_on(context, mesh_object):
+            points, line = curve_record.places(drawn, surface)
+            if (
+                view.nearest_point(pixel, points, POINT_REACH * scale) is not None
+                or view.nearest_on_line(pixel, line, CURVE_REACH * scale) is not None
+            ):
+                return (drawn,)
+        return None if view.place_at(pixel) is None else (None,)
+
+    def modal(self, context, event):
+        try:
+            result = self._modal(context, event)
+        except Exception:
+            self._end(context)
+            raise
+        if result & {"FINISHED", "CANCELLED"}:
+            self._redraw(context)
+        return result
+
+    def cancel(self, context):
+        """Called by Blender where the tool cannot end by itself, as when it quits."""
+        self._end(context)
+
+    def _modal(self, context, event):
+        session = self._opened.session
+        if event.type == "TIMER":
+            idle = time.monotonic() - self._last_move > PAUSE
+            # A new design takes longer than a frame: not while the mouse moves.
+            if not session.resting and (
+                idle or not (session.waiting and self._grabbed is not None)
+            ):
+                session.step()
+                self._show(context)
+            return {"RUNNING_MODAL"}
+        if event.type == "MOUSEMOVE":
+            self._last_move = time.monotonic()
+            if self._grabbed is None:
+                self._hover(context, event)
+            else:
+                self._drag(context, event)
+            return {"RUNNING_MODAL"}
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._release(context)
+            return {"RUNNING_MODAL"}
+        if event.type in NAVIGATION and not (event.type in WHEEL and event.ctrl):
+            return {"PASS_THROUGH"}
+        if event.value not in {"PRESS", "DOUBLE_CLICK"}:
+            return {"RUNNING_MODAL"}
+        if event.type == "ESC":
+            self._end(context)
+            return {"CANCELLED"}
+        if event.type in {"RET", "NUMPAD_ENTER"}:
+            return self._finish(context)
+        if self._grabbed is not None:
+            if event.type == "RIGHTMOUSE":
+                session.drop_back()
+                self._release(context)
+            return {"RUNNING_MODAL"}
+        if event.type == "LEFTMOUSE":
+            self._press(context, event)
+        elif event.type in WHEEL:
+            session.smoother(1 if event.type == "WHEELUPMOUSE" else -1)
+        else:
+            self._key(context, event)
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def _key(self, context, event) -> None:
+        session, key = self._opened.session, event.type
+        if key == "Z" and (event.ctrl or event.oskey):
+            if event.shift:
+                session.redo()
+            else:
+                session.undo()
+            self._overlay.hover = None
+        elif key == "C":
+            session.ask_for(closed=not session.asked.closed)
+        elif key in {"O", "A"}:
+            name = "obstacle_group" if key == "O" else "alignment_group"
+            groups = ["", *(group.name for group in self._opened.mesh_object.vertex_groups)]
+            now = getattr(session.asked, name)
+            at = groups.index(now) if now in groups else 0
+            session.ask_for(**{name: groups[(at + (-1 if event.shift else 1)) % len(groups)]})
+        elif key in {"UP_ARROW", "DOWN_ARROW"}:
+            session.smoother(1 if key == "UP_ARROW" else -1)
+        elif key in {"X", "DEL", "BACK_SPACE"} and len(session.points):
+            last = len(session.points) - 1
+            session.remove(last if self._overlay.hover is None else self._overlay.hover)
+            self._overlay.hover = None
+
+    def _press(self, context, event) -> None:
+        view, pixel = self._view(context, event)
+        if view is None:
+            return
+        session = self._opened.session
+        scale = context.preferences.system.ui_scale
+        number = view.nearest_point(pixel, session.positions(), POINT_REACH * scale)
+        if event.ctrl:
+            if number is not None:
+                session.remove(number)
+                self._overlay.hover = None
+            return
+        self._grip = np.zeros(2)
+        if number is not None:
+            self._grip = view.project(session.positions())[number] - pixel
+        elif (found := self._on_curve(view, pixel, scale)) is not None:
+            number = session.insert(*found)
+        elif (place := view.place_at(pixel)) is not None:
+            number = session.add(*place)
+        if number is not None:
+            session.grab()
+            self._grabbed = self._overlay.hover = number
+
+    def _on_curve(self, view, pixel, scale: float):
+        line = self._opened.session.polyline()
+        if not len(line) or self._opened.session.problem:
+            return None
+        return view.nearest_on_line(pixel, line, CURVE_REACH * scale)
+
+    def _drag(self, context, event) -> None:
+        view, pixel = self._view(context, event, anywhere=True)
+        place = None if view is None else view.place_at(pixel + self._grip)
+        if place is not None:
+            self._opened.session.move(self._grabbed, *place)
+            self._show(context)
+
+    def _hover(self, context, event) -> None:
+        view, pixel = self._view(context, event)
+        found = None
+        if view is not None:
+            reach = POINT_REACH * context.preferences.system.ui_scale
+            found = view.nearest_point(pixel, self._opened.session.positions(), reach)
+        if found != self._overlay.hover:
+            self._overlay.hover = found
+            self._redraw(context)
+
+    def _release(self, context) -> None:
+        self._opened.session.drop()
+        self._grabbed = None
+        self._show(context)
+
+    def _finish(self, context):
+        session = self._opened.session
+        if session.untouched:
+            self._end(context)
+            return {"CANCELLED"}
+        self._release(context)
+        session.settle()
+        if session.what_is_missing():
+            self._show(context)
+            return {"RUNNING_MODAL"}
+        self._end(context)
+        return reporting(self, lambda: self._keep(context, self._opened, self._edited()))
+
+    def _edited(self):
+        return bpy.data.objects.get(self._edited_name) if self._edited_name else None
+
+    def _end(self, context) -> None:
+        """Leave everything in the window as it was."""
+        self._overlay.remove()
+        self._curtain.open()
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+        if self._area is not None:
+            self._area.header_text_set(None)
+        self._redraw(context)
+
+    def _keep(self, context, opened, edited):
+        """Write the curve of a session, and remember how it was made for the redo panel."""
+        session = opened.session
+        missing = session.what_is_missing()
+        if missing:
+            raise mesh_data.InputError(missing)
+        made = keep(context, opened, edited, self)
+        for name in ASKED_NAMES:
+            setattr(self, name, getattr(session.asked, name))
+        self.points.clear()
+        for position in session.positions():
+            self.points.add().position = position
+        count = len(session.points)
+        self.report({"INFO"}, f'"{made.name}" through {count} points{opened.remark}')
+        return {"FINISHED"}
+
+    # What the user sees.
+
+    def _view(self, context, event, anywhere: bool = False):
+        opened = self._opened
+        surface, mesh = opened.session.surface, opened.session.designer.mesh
+        return self._view_on(context, event, opened.mesh_object, surface, mesh, anywhere)
+
+    def _view_on(self, context, event, mesh_object, surface, mesh, anywhere: bool = False):
+        """The view under the mouse and the pixel in its region; None over panels and elsewhere.
+
+        With `anywhere` also beyond the edge of the region where the mouse was pressed.
+        """
+        for region in self._area.regions:
+            inside = (
+                0 <= event.mouse_x - region.x < region.width
+                and 0 <= event.mouse_y - region.y < region.height
+            )
+            if region.type != "WINDOW" and inside and region.height > 1 and not anywhere:
+                return None, None
+        under = None
+        for region in self._area.regions:
+            if region.type != "WINDOW":
+                continue
+            x, y = event.mouse_x - region.x, event.mouse_y - region.y
+            if (0 <= x < region.width and 0 <= y < region.height) or (
+                anywhere and region == context.region
+            ):
+                under = region, np.array([x, y], dtype=np.float64)
+        if under is None:
+            return None, None
+        region, pixel = under
+        return view_of(region, region.data, mesh_object, surface, mesh), pixel
+
+    def _show(self, context) -> None:
+        self._say(context)
+        self._redraw(context)
+
+    def _redraw(self, context) -> None:
+        for window in context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()
+
+    def _say(self, context) -> None:
+        session = self._opened.session
+        self._area.header_text_set(in_words(session) + self._opened.remark)
+        problem = session.problem or session.state.notice
+        context.workspace.status_text_set(lambda header, _context: _draw_hints(header, problem))
+
+
+class _Curtain:
+    """Hides what would be in the way while editing: the old curve, and modifiers of the mesh."""
+
+    def __init__(self, mesh_object, edited) -> None:
+        self._modifiers = [each for each in mesh_object.modifiers if each.show_viewport]
+        for modifier in self._modifiers:
+            modifier.show_viewport = False
+        self._edited = edited if edited is not None and not edited.hide_get() else None
+        if self._edited is not None:
+            self._edited.hide_set(True)
+
+    def open(self) -> None:
+        for modifier in self._modifiers:
+            modifier.show_viewport = True
+        if self._edited is not None:
+            self._edited.hide_set(False)
+
+
+def _draw_hints(header, problem: str) -> None:
+    layout = header.layout
+    if problem:
+        layout.label(text=problem, icon="ERROR")
+        return
+    for icon, text in HINTS:
+        layout.label(text=text, icon=icon)
+
+
+def in_words(session) -> str:
+    """One line on what the curve is asked for."""
+    asked = session.asked
+    count = len(session.points)
+    parts = [
+        f"{count} point{'' if count == 1 else 's'}",
+        "closed" if asked.closed else "open",
+        f"smoothness {asked.smoothness:.2g}",
+        f"obstacles: {asked.obstacle_group or 'none'}",
+        f"alignment: {asked.alignment_group or 'none'}",
+    ]
+    if asked.closed and count == 2:
+        parts[1] = "closed from three points on"
+    return ", ".join(parts)
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_PG_control_point)
+    bpy.utils.register_class(NICMM_OT_edit_curve)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_edit_curve)
+    bpy.utils.unregister_class(NICMM_PG_control_point)

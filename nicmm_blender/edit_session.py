@@ -1,0 +1,398 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A curve while it is edited: its control points, what it is asked for, and what can be taken back.
+
+Nothing here knows of windows and events. Every change is answered by a bounded amount of work:
+the last curve is led on by a few iterations, and `step` goes on until it is at rest. Where it
+cannot be led, as after a long jump of a point, `waiting` says that the curve has to be designed
+anew, which takes longer; `step` does that too. A request that cannot be met leaves the last curve
+that could, and `problem` says why.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .curve_record import Asked
+from .mesh_data import InputError
+
+MOST_STEPS = 60
+"""Steps from a change until the curve is taken as it is; most need fewer than five."""
+
+SMOOTHER = 1.25
+"""Factor of one step of smoothness."""
+
+SMOOTHNESS_LIMITS = (0.01, 100.0)
+
+FEWEST_CLOSED, FEWEST_OPEN = 3, 2
+
+
+@dataclass(frozen=True)
+class State:
+    """What one step of undo brings back.
+
+    `points` are the core's SurfacePoints, `curve` is the last curve that could be drawn, or None,
+    and `problem` says in words why it is not the one that was asked for; `notice` is what else is
+    to be said of it. `rested` says whether the curve is the final one for these points.
+    """
+
+    points: object
+    asked: Asked
+    curve: object = None
+    problem: str = ""
+    notice: str = ""
+    rested: bool = False
+
+
+class EditSession:
+    """An editing session on one mesh.
+
+    Parameters
+    ----------
+    surface : mesh_data.Triangles
+    designer : nicmm_core.Designer
+        Of the same triangles.
+    weights : callable
+        From the name of a vertex group to its weights, None for no name.
+    asked : Asked
+    points, curve : optional
+        Control points and curve to go on from.
+    """
+
+    def __init__(
+        self,
+        surface,
+        designer,
+        weights: Callable[[str], np.ndarray | None],
+        asked: Asked,
+        points=None,
+        curve=None,
+    ) -> None:
+        from .. import nicmm_core as nicmm
+
+        self._nicmm = nicmm
+        self.surface, self.designer = surface, designer
+        self._read_weights = weights
+        self._weights: dict[str, np.ndarray | None] = {}
+        if points is None:
+            points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+        self.state = State(points, asked)
+        self.waiting = False
+        self._steps_left = 0
+        self._done: list[State] = []
+        self._undone: list[State] = []
+        self._before_drag: State | None = None
+        self._dragging = False
+        if curve is None or not self._resume(curve):
+            self._ask()
+        else:
+            self.state = replace(self.state, curve=curve, rested=True)
+
+    @property
+    def points(self):
+        """The control points, the core's SurfacePoints."""
+        return self.state.points
+
+    @property
+    def asked(self) -> Asked:
+        return self.state.asked
+
+    @property
+    def curve(self):
+        """The curve as it is now, the core's SurfaceCurve, or None before there is one."""
+        return self.state.curve
+
+    @property
+    def problem(self) -> str:
+        """Why the curve is not the one that was asked for; empty where it is."""
+        return self.state.problem
+
+    @property
+    def closed(self) -> bool:
+        """Whether the points ask for a closed curve now: two of them can only be joined."""
+        return self.asked.closed and len(self.points) >= FEWEST_CLOSED
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing is left to be done by `step`."""
+        return not self.waiting and not self._steps_left
+
+    @property
+    def untouched(self) -> bool:
+        """Whether nothing was done that undo could take back."""
+        return not self._done
+
+    def positions(self) -> np.ndarray:
+        """Where the control points are in the object's own space, (k, 3)."""
+        return self.surface.points(self.points.faces, self.points.barycentric)
+
+    def polyline(self) -> np.ndarray:
+        """The curve's points in the object's own space, (n, 3); the first again if closed."""
+        if self.curve is None:
+            return np.zeros((0, 3))
+        line = self.surface.points(self.curve.faces, self.curve.barycentric)
+        return np.concatenate([line, line[:1]]) if self.curve.closed else line
+
+    # Changes; each can be taken back.
+
+    def add(self, face: int, barycentric) -> int:
+        """Put a point after the last one, and return its number."""
+        self._keep()
+        return self._insert(len(self.points), face, barycentric)
+
+    def set_points(self, positions: np.ndarray) -> None:
+        """Replace all points by places on the surface in the object's own space, (k, 3)."""
+        from ..nicmm_core.surface_points import locate_points
+
+        solved = positions @ self.surface.linear.T
+        points = locate_points(self.designer.mesh, solved, "points")
+        self._keep()
+        self.state = replace(self.state, points=points)
+        self._ask()
+
+    def insert(self, segment: int, share: float) -> int:
+        """Put a point on the curve, between two of its points; return the new one's number.
+
+        The curve stays as it is. Parameters: which segment of `polyline`, and how far along it.
+        """
+        self._keep()
+        curve, number = _with_point(self._nicmm, self.designer.mesh, self.curve, segment, share)
+        at = int(curve.control_index[number])
+        self._insert(number, curve.faces[at], curve.barycentric[at], ask=False)
+        if self._resume(curve):
+            self.state = replace(self.state, curve=curve, problem="", rested=True)
+        else:
+            self._ask()
+        return number
+
+    def remove(self, number: int) -> None:
+        """Take a point away."""
+        self._keep()
+        left = np.delete(np.arange(len(self.points)), number)
+        self.state = replace(self.state, points=self.points[left])
+        curve = self.curve
+        fits = curve is not None and len(curve.control_index) == len(left) + 1
+        if fits and self.closed == curve.closed and (self.closed or 0 < number < len(left)):
+            curve = replace(curve, control_index=curve.control_index[left])
+            if self._resume(curve):
+                self.state = replace(self.state, curve=curve)
+        self._ask()
+
+    def grab(self) -> None:
+        """Begin to move points; all moves until `drop` are one step of undo."""
+        self._before_drag, self._dragging = self.state, True
+
+    def move(self, number: int, face: int, barycentric) -> None:
+        """Move a point that was grabbed."""
+        if self._before_drag is not None:
+            self._keep(self._before_drag)
+            self._before_drag = None
+        faces, weights = self.points.faces.copy(), self.points.barycentric.copy()
+        faces[number], weights[number] = face, barycentric
+        points = self._nicmm.SurfacePoints(faces, weights)
+        self.state = replace(self.state, points=points)
+        self._ask()
+
+    def drop(self) -> None:
+        """End a move."""
+        self._before_drag = None
+        self._dragging = False
+
+    def drop_back(self) -> None:
+        """End a move and take it back."""
+        if self._dragging and self._before_drag is None:
+            self.undo()
+            self._undone.pop()
+        self.drop()
+
+    def ask_for(self, **changes) -> None:
+        """Change what the curve is asked for, by the names of `Asked`."""
+        asked = replace(self.asked, **changes)
+        if asked != self.asked:
+            self._keep()
+            self.state = replace(self.state, asked=asked)
+            self._ask()
+
+    def smoother(self, steps: int) -> None:
+        """Raise the smoothness by some steps, or lower it by a negative number of them."""
+        wanted = self.asked.smoothness * SMOOTHER**steps
+        self.ask_for(smoothness=float(np.clip(wanted, *SMOOTHNESS_LIMITS)))
+
+    def undo(self) -> bool:
+        """Take the last change back; False where there is none."""
+        return self._go(self._done, self._undone)
+
+    def redo(self) -> bool:
+        """Make the last change that was taken back again; False where there is none."""
+        return self._go(self._undone, self._done)
+
+    # Work.
+
+    def step(self) -> bool:
+        """Do a bounded amount of work, or design anew where `waiting`; whether something was."""
+        if self.resting:
+            return False
+        if self.waiting:
+            self._design()
+        else:
+            self._follow()
+        return True
+
+    def settle(self) -> None:
+        """Work until the curve rests."""
+        while self.step():
+            pass
+
+    def what_is_missing(self) -> str:
+        """Why there is no curve to keep, in words; empty where there is."""
+        if self.problem:
+            return self.problem
+        if self.curve is None:
+            return "A curve needs two points at least, a closed one three. Click on the surface"
+        return ""
+
+    def _keep(self, state: State | None = None) -> None:
+        self._done.append(self.state if state is None else state)
+        self._undone.clear()
+
+    def _go(self, source: list, target: list) -> bool:
+        if not source:
+            return False
+        target.append(self.state)
+        self.state = source.pop()
+        self.drop()
+        resumed = self.curve is not None and self._resume(self.curve)
+        if not (self.problem or (self.state.rested and resumed)):
+            self._ask()
+        return True
+
+    def _insert(self, number: int, face: int, barycentric, ask: bool = True) -> int:
+        points = self._nicmm.SurfacePoints(
+            np.insert(self.points.faces, number, face),
+            np.insert(self.points.barycentric, number, barycentric, axis=0),
+        )
+        self.state = replace(self.state, points=points)
+        if ask:
+            self._ask()
+        return number
+
+    def _rest(self) -> None:
+        self.waiting, self._steps_left = False, 0
+
+    def _ask(self) -> None:
+        """Answer a change: at once as far as bounded work goes."""
+        self._rest()
+        if len(self.points) < FEWEST_OPEN:
+            self.state = replace(self.state, curve=None, problem="", notice="", rested=True)
+            return
+        self.state = replace(self.state, rested=False)
+        self._steps_left = MOST_STEPS
+        self._follow()
+
+    def _follow(self) -> None:
+        self._steps_left -= 1
+        design = self._answer(self.designer.follow)
+        if design is None:
+            # There is nothing to follow, unless it has a problem.
+            self._rest()
+            self.waiting = not self.problem
+        elif design.status is not self._nicmm.Status.ITERATION_LIMIT:
+            self._steps_left = 0
+        elif not self._steps_left:
+            self.waiting = True
+        self._take(design)
+
+    def _design(self) -> None:
+        self._rest()
+        self.designer.forget()
+        self._take(self._answer(self.designer.design))
+
+    def _answer(self, ask: Callable):
+        """The core's design, or None where it has none; `problem` says why if it knows."""
+        self.state = replace(self.state, problem="")
+        try:
+            return ask(self.points, closed=self.closed, **self._maps())
+        except (self._nicmm.NicmmError, InputError) as error:
+            self.state = replace(self.state, problem=self._in_words(error))
+            return None
+
+    def _take(self, design) -> None:
+        """Show what a design brought."""
+        nicmm = self._nicmm
+        if design is None:
+            return
+        if len(design.curves) != 1 or (design.curves[0].control_index < 0).any():
+            self._rest()
+            self.state = replace(self.state, problem=str(design.status))
+            return
+        good = (nicmm.Status.CONVERGED, nicmm.Status.ITERATION_LIMIT)
+        self.state = replace(
+            self.state,
+            curve=design.curves[0],
+            notice="" if design.status in good else str(design.status),
+            rested=self.resting,
+        )
+
+    def _resume(self, curve) -> bool:
+        """Whether the designer can go on from a curve, which it then does."""
+        self._rest()
+        try:
+            return self.designer.resume(curve, **self._maps())
+        except (self._nicmm.NicmmError, InputError):
+            # What is wrong is said by the design that has to follow.
+            return False
+
+    def _maps(self) -> dict:
+        obstacles = self._weights_of(self.asked.obstacle_group)
+        return {
+            "obstacles": obstacles,
+            "alignment": self._weights_of(self.asked.alignment_group),
+            "clearance": 0.0 if obstacles is None else self.asked.clearance,
+            "smoothness": self.asked.smoothness,
+        }
+
+    def _weights_of(self, name: str) -> np.ndarray | None:
+        if name not in self._weights:
+            self._weights[name] = self._read_weights(name)
+        return self._weights[name]
+
+    def _in_words(self, error: Exception) -> str:
+        """The core's message, with its points numbered as the user counts them."""
+        text = re.sub(
+            r"control_points\[(\d+)\]", lambda found: f"point {int(found[1]) + 1}", str(error)
+        )
+        text = text.replace("control_points", "the points")
+        if isinstance(error, self._nicmm.UnreachableError) and self.asked.obstacle_group:
+            text += f' (obstacles: the vertex group "{self.asked.obstacle_group}")'
+        return text[:1].upper() + text[1:]
+
+
+def _with_point(nicmm, mesh, curve, segment: int, share: float):
+    """A curve with one more control point on a segment, and the number of that."""
+    from ..nicmm_core.surface_points import nearest_points
+
+    start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
+    place = ((1.0 - share) * start + share * end)[None]
+    # In the face of the segment, which both of its ends have in common.
+    corners = [
+        set(mesh.faces[curve.faces[at]][curve.barycentric[at] > 0.0].tolist())
+        for at in (segment, (segment + 1) % len(curve.points))
+    ]
+    around = mesh.vertex_faces[sorted(corners[0] | corners[1])].indices
+    candidates = np.unique(np.concatenate([curve.faces[[segment]], around]))
+    needed = list(corners[0] | corners[1])
+    common = [face for face in candidates if np.isin(needed, mesh.faces[face]).all()]
+    found, _ = nearest_points(mesh, place, np.array(common, dtype=np.int64))
+    at = segment + 1
+    longer = replace(
+        curve,
+        faces=np.insert(curve.faces, at, found.faces[0]),
+        barycentric=np.insert(curve.barycentric, at, found.barycentric[0], axis=0),
+        points=np.insert(curve.points, at, found.positions(mesh)[0], axis=0),
+    )
+    index = curve.control_index + (curve.control_index >= at)
+    # Legs begin at control points; the one that runs over the end of the list is the last.
+    before = int(np.searchsorted(np.sort(index), at)) - 1
+    number = int(np.argsort(index, kind="stable")[before]) + 1
+    return replace(longer, control_index=np.insert(index, number, at)), number

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Between curve objects in the file and editing sessions: opens one, and keeps what it made."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import curve_object, curve_record, designers, mesh_data, outputs
+from .curve_record import Asked
+from .edit_session import EditSession
+from .mesh_data import InputError
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A session, the mesh object that it is on, and what is to be said of them."""
+
+    mesh_object: object
+    session: EditSession
+    remark: str
+
+
+def chosen(context, name: str):
+    """The designed curve with a name, or the active one; None where a new curve is wanted."""
+    import bpy
+
+    if not name:
+        active = context.active_object
+        return active if curve_record.has_record(active) else None
+    found = bpy.data.objects.get(name)
+    if not curve_record.has_record(found):
+        raise InputError(
+            f'There is no designed curve "{name}". Give the name of a curve object that was drawn '
+            "on a mesh, or none for a new curve"
+        )
+    return found
+
+
+def open_session(context, edited, asked: Asked) -> Opened:
+    """A session on the mesh of a curve with its points, or without points on the active mesh."""
+    if edited is None:
+        mesh_object = mesh_data.mesh_object(context)
+    else:
+        mesh_object = curve_record.present_mesh(context, edited)
+        _check_editable(edited)
+    mesh_data.synchronise(mesh_object)
+    surface = mesh_data.triangles(mesh_object)
+    if not len(surface.faces):
+        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
+    designer = designers.designer_for(surface.solved, surface.faces)
+    designer.forget()
+    remarks = []
+    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
+        remarks.append("on the mesh without its modifiers")
+    for name in ("obstacle_group", "alignment_group"):
+        group = getattr(asked, name)
+        if edited is not None and group and group not in mesh_object.vertex_groups:
+            asked = replace(asked, **{name: ""})
+            remarks.append(f'without the vertex group "{group}", which is gone')
+    points = curve = None
+    if edited is not None:
+        points, moved = _points_of(edited, surface, designer.mesh)
+        if moved:
+            remarks.append(f"the mesh has changed: {moved} points are at the nearest place")
+        elif asked == replace(curve_record.asked_of(edited), method=asked.method):
+            curve = _curve_of(edited, surface)
+
+    def weights(name: str) -> np.ndarray | None:
+        return mesh_data.group_weights(mesh_object, name)
+
+    session = EditSession(surface, designer, weights, asked, points, curve)
+    return Opened(mesh_object, session, "".join(f"; {remark}" for remark in remarks))
+
+
+def keep(context, opened: Opened, edited, settings):
+    """Write a session's curve into the object that was edited, or a new one; return that.
+
+    `settings` has the `output` and the `thickness` of a new one.
+    """
+    session, mesh_object = opened.session, opened.mesh_object
+    surface, curves = session.surface, [session.curve]
+    made = edited
+    if edited is None:
+        made = outputs.as_object(mesh_object, surface, curves, settings)
+    else:
+        outputs.redraw(edited, surface, curves)
+    curve_record.remember(made, mesh_object, surface, curves, session.asked, session.points)
+    if edited is None:
+        curve_object.place(context, mesh_object, made)
+    return made
+
+
+def _check_editable(edited) -> None:
+    library = edited.library or edited.data.library
+    if library is not None:
+        raise InputError(
+            f'"{edited.name}" is linked from {library.filepath}. Make it local '
+            "(Object > Relations > Make Local) first"
+        )
+
+
+def _points_of(edited, surface, mesh) -> tuple[object, int]:
+    """The control points of a curve on the mesh as it is, and how many had to be looked for."""
+    from .. import nicmm_core as nicmm
+    from ..nicmm_core.surface_points import nearest_points
+
+    found, positions = curve_record.recall_controls(edited, surface)
+    lost = found.faces < 0
+    if not lost.any():
+        return found, 0
+    nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
+    faces, barycentric = found.faces.copy(), found.barycentric.copy()
+    faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
+    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
+
+
+def _curve_of(edited, surface):
+    """The curve that an object remembers; None where it has to be designed anew."""
+    if not curve_record.lies_on(edited, surface):
+        return None
+    curves = curve_record.recall(edited, surface)
+    whole = len(curves) == 1 and (curves[0].control_index >= 0).all()
+    return curves[0] if whole else None

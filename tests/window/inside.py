@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs inside the Blender that `drive.py` drives: does what it is told and says how things stand.
+
+Commands are Python files in a folder, done one after another from a timer, as Blender's own thread
+needs it; after each the answer, or the error, lies beside it as JSON. Mouse and keys come from
+outside, as from a user.
+"""
+
+import json
+import sys
+import time
+import traceback
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
+MODULE = "bl_ext.user_default.nicmm_curves.nicmm_blender"
+
+
+class Helper:
+    """What commands may use."""
+
+    frames: list = []
+
+    @staticmethod
+    def area():
+        return next(area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D")
+
+    @classmethod
+    def region(cls):
+        return next(region for region in cls.area().regions if region.type == "WINDOW")
+
+    @classmethod
+    def in_view(cls):
+        return bpy.context.temp_override(area=cls.area(), region=cls.region())
+
+    @staticmethod
+    def suzanne():
+        """The monkey in the middle of an empty scene, 15,744 triangles, seen from the front."""
+        for found in list(bpy.data.objects):
+            bpy.data.objects.remove(found)
+        bpy.ops.mesh.primitive_monkey_add()
+        monkey = bpy.context.active_object
+        monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        bpy.ops.object.modifier_apply(modifier="Subdivision")
+        bpy.ops.object.shade_smooth()
+        monkey.data.calc_loop_triangles()
+        return len(monkey.data.loop_triangles)
+
+    @classmethod
+    def look(cls, x=0.15, y=-1.0, z=0.3, distance=3.6):
+        """Look at the origin from a direction."""
+        from mathutils import Vector
+
+        view = cls.area().spaces.active.region_3d
+        view.view_rotation = Vector((x, y, z)).to_track_quat("Z", "Y")
+        view.view_location = (0.0, 0.0, 0.0)
+        view.view_distance = distance
+        view.view_perspective = "PERSP"
+        view.update()
+
+    @classmethod
+    def pixels(cls, places):
+        """Pixels of the screen, from its top left, of places in the monkey's own space."""
+        from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+        region = cls.region()
+        monkey = bpy.data.objects["Suzanne"]
+        found = []
+        for place in np.atleast_2d(places).tolist():
+            flat = location_3d_to_region_2d(
+                region, cls.area().spaces.active.region_3d, monkey.matrix_world @ _vector(place)
+            )
+            found.append([region.x + flat.x, bpy.context.window.height - 1 - (region.y + flat.y)])
+        return found
+
+    @staticmethod
+    def in_front(pairs):
+        """Where Suzanne is met from the front at x and z."""
+        monkey = bpy.data.objects["Suzanne"]
+        found = [monkey.ray_cast((x, -5.0, z), (0.0, 1.0, 0.0)) for x, z in pairs]
+        return [list(location) for _hit, location, _normal, _face in found]
+
+    @staticmethod
+    def session():
+        """The session of the running tool, or None."""
+        return Helper.running[0]._opened.session if Helper.running else None
+
+    running: list = []
+
+
+def _vector(place):
+    from mathutils import Vector
+
+    return Vector(place)
+
+
+def watch_tool():
+    """Measure every event of the tool, and know which one runs."""
+    operator = import_module(f"{MODULE}.edit_operator").NICMM_OT_edit_curve
+    modal, invoke = operator.modal, operator.invoke
+
+    def watched_invoke(self, context, event):
+        result = invoke(self, context, event)
+        if "RUNNING_MODAL" in result:
+            Helper.running[:] = [self]
+        return result
+
+    def watched_modal(self, context, event):
+        waiting = self._opened.session.waiting
+        before = time.thread_time()  # Blender draws in other threads
+        result = modal(self, context, event)
+        spent = 1e3 * (time.thread_time() - before)
+        Helper.frames.append([event.type, self._grabbed is not None, waiting, spent])
+        if result & {"FINISHED", "CANCELLED"}:
+            Helper.running.clear()
+        return result
+
+    operator.invoke, operator.modal = watched_invoke, watched_modal
+
+
+def answer():
+    """Do the next command, if there is one."""
+    for command in sorted(FOLDER.glob("*.command")):
+        reply = {}
+        scope = {"bpy": bpy, "np": np, "helper": Helper, "watch_tool": watch_tool}
+        try:
+            exec(command.read_text(), scope)
+            reply["value"] = scope.get("value")
+        except Exception:
+            reply["error"] = traceback.format_exc()
+        command.unlink()
+        partial = command.with_suffix(".partial")
+        partial.write_text(json.dumps(reply))
+        partial.rename(command.with_suffix(".reply"))
+    return 0.05
+
+
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(answer, first_interval=1.0, persistent=True)
