@@ -163,7 +163,7 @@ def _points(
     """Random vertices; None where there are too few."""
     faces = mesh.faces
     if of_one_part:
-        part = edge_connected_parts(faces)
+        part = edge_connected_parts(mesh)
         faces = faces[part == part[generator.integers(len(faces))]]
     vertices = np.unique(faces)
     fewest = 3 if closed else 2
@@ -173,13 +173,23 @@ def _points(
     return generator.choice(vertices, count, replace=False)
 
 
-def edge_connected_parts(faces: IntArray) -> IntArray:
-    """Which part each face belongs to, shape (F,), where faces join that have a common edge."""
+def edge_connected_parts(mesh: nicmm.Mesh) -> IntArray:
+    """Which part each face belongs to, shape (F,).
+
+    Faces are joined that have a common edge, or open edges between the same two places.
+    """
+    faces = mesh.faces
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, edge = np.unique(sides, axis=0, return_inverse=True)
+    _, edge, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1)
+    _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
+    ends = np.sort(place.reshape(-1)[sides], axis=1)
+    is_open = (count[edge] == 1) & (ends[:, 0] != ends[:, 1])
+    _, joint = np.unique(ends[is_open], axis=0, return_inverse=True)
+    edge[is_open] = len(count) + joint.reshape(-1)
     face = np.repeat(np.arange(len(faces)), 3)
     shape = (len(faces), int(edge.max()) + 1)
-    incidence = sparse.csr_array((np.ones(len(face)), (face, edge.reshape(-1))), shape=shape)
+    incidence = sparse.csr_array((np.ones(len(face)), (face, edge)), shape=shape)
     return csgraph.connected_components(incidence @ incidence.T, directed=False)[1]
 
 
@@ -193,7 +203,7 @@ def not_possible(mesh: nicmm.Mesh, points: IntArray) -> str:
     apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     if (apart[np.triu_indices(len(points), 1)] <= 1e-9 * mesh.diagonal).any():
         return "two points are at one place"
-    part = edge_connected_parts(mesh.faces)
+    part = edge_connected_parts(mesh)
     common = set(part.tolist())
     for point in points:
         common &= set(part[(mesh.faces == point).any(axis=1)].tolist())

@@ -34,9 +34,9 @@ from .mesh_copy import MeshCopy
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .request import Request
-from .sound_copy import sound_copy
+from .sound_copy import SOUND_COPIES, sound_copy
 from .surface_designer import SurfaceDesigner
-from .surface_points import SurfacePoints, locate_control_points
+from .surface_points import SurfacePoints, check_connected, locate_control_points
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
@@ -65,15 +65,16 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._designers: list[tuple[MeshCopy, SurfaceDesigner]] = []
+        self._designers: list[tuple[MeshCopy, SurfaceDesigner] | None] = []
         # A progress function may ask the same Designer for another curve.
         self._lock = threading.RLock()
 
     def forget(self) -> None:
         """Start the next design anew."""
         with self._lock:
-            for _, designer in self._designers:
-                designer.forget()
+            for made in self._designers:
+                if made is not None:
+                    made[1].forget()
 
     def design(
         self,
@@ -99,7 +100,7 @@ class Designer:
             check_torch()
         try:
             with watched(progress), self._its_turn():
-                points = locate_control_points(self.mesh, control_points, closed)
+                points = locate_control_points(self.mesh, control_points, closed, connected=False)
                 via = {} if via_points is None else via_points
                 avoided = checked_map("obstacles", obstacles, self.mesh)
                 request = Request(
@@ -130,18 +131,17 @@ class Designer:
 
     def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
         """A copy of the mesh without its defects, who designs on it, and the request there."""
-        place = 0
-        while True:
-            if place == len(self._designers):
-                copy = sound_copy(self.mesh, place)
-                if copy is None:
-                    raise UnreachableError(PARTS)
-                self._designers.append((copy, SurfaceDesigner(copy.mesh)))
-            copy, designer = self._designers[place]
-            there = copy.request(request)
-            if there is not None:
-                return copy, designer, there
-            place += 1
+        for number in range(SOUND_COPIES):
+            if number == len(self._designers):
+                made = sound_copy(self.mesh, number)
+                new = None if made is None else (made, SurfaceDesigner(made.mesh))
+                self._designers.append(new)
+            found = self._designers[number]
+            there = None if found is None else found[0].request(request)
+            if found is not None and there is not None:
+                return *found, there
+        check_connected(self.mesh, request.points)
+        raise UnreachableError(PARTS)
 
 
 def design_curve(

@@ -8,6 +8,8 @@ is there. Three things may differ:
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
   off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
   there are doubled.
+- Where that leaves points apart, open edges whose ends are at the same places are one edge: the
+  triangles of a soup, or the two sides of a seam. Their vertices are one.
 - Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
   that has a length, each its own way, so that every face has an area.
 """
@@ -44,6 +46,9 @@ ATTEMPTS = 4
 ROUNDS = 8
 """Of cutting one edge further where a cut does not come apart."""
 
+SOUND_COPIES = 4
+"""Ways in which faces are joined, one after the other."""
+
 BLOCK = 50_000
 """Faces that are looked at together."""
 
@@ -52,31 +57,66 @@ SEED = 0
 
 
 def sound_copy(mesh: Mesh, number: int) -> MeshCopy | None:
-    """A copy of a mesh, the first or one for points that those before separate.
+    """A copy of a mesh, for points that the copies before separate.
 
     Parameters
     ----------
     mesh : Mesh
     number : int
-        0: where more than two faces share an edge the surface goes straight on. 1: as many parts
-        of it are joined there as can be.
+        Below `SOUND_COPIES`. 0: where more than two faces share an edge the surface goes straight
+        on. 1: as many parts of it are joined there as can be. 2 and 3: the same, and open edges at
+        the same place are one edge.
 
     Returns
     -------
     MeshCopy or None
-        None where there is no further one.
+        None where it joins no more than those before.
     """
+    linked = number % 2 == 1
+    if number < 2:
+        return _joined_copy(mesh, np.arange(len(mesh.vertices)), linked)
+    welded = welded_vertices(mesh)
+    if (welded == np.arange(len(welded))).all():
+        return None
+    return _joined_copy(mesh, welded, linked)
+
+
+def welded_vertices(mesh: Mesh) -> IntArray:
+    """For vertices of open edges the first one at the same place, others as they are, shape (V,).
+
+    Only places whose coordinates are the same to the last digit are one. Edges that two faces have
+    are closed already, so closed surfaces that touch each other stay apart.
+    """
+    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]
+    checkpoint()
+    edges, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    rim = np.unique(edges[count == 1])
+    welded = np.arange(len(mesh.vertices))
+    if len(rim):
+        # Adding zero makes one zero of both.
+        _, first, place = np.unique(
+            mesh.vertices[rim] + 0.0, axis=0, return_index=True, return_inverse=True
+        )
+        welded[rim] = rim[first[place.ravel()]]
+    return welded
+
+
+def _joined_copy(mesh: Mesh, welded: IntArray, linked: bool) -> MeshCopy | None:
+    """The copy in which sides of faces whose ends are the same welded vertices may be joined."""
+    is_welded = bool((welded != np.arange(len(welded))).any())
     kept = np.arange(len(mesh.faces))
-    if mesh.branches:
-        kept = _without_twins(mesh.faces)
-    elif number > 0:
+    if mesh.branches or is_welded:
+        kept = _without_twins(welded[mesh.faces])
+    sides = _Sides(mesh.faces[kept], welded)
+    if linked and not sides.branches:
         return None
-    sides = _Sides(mesh.faces[kept])
-    joinings = (sides.straight_on, sides.linked)
-    if number == len(joinings):
-        return None
-    pairs = joinings[number](mesh.vertices)
-    return _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
+    joined = sides.linked if linked else sides.straight_on
+    corners, vertex = sides.cut(joined(mesh.vertices), len(mesh.vertices))
+    if is_welded:
+        # A side whose ends have become one has no length, and its face no area.
+        whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+        corners, kept = corners[whole], kept[whole]
+    return _with_areas(mesh, corners, vertex, kept, welded[vertex])
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -88,17 +128,29 @@ class _Sides:
     """The sides of faces, three each, and which of them are one edge.
 
     Side 3 f + j lies opposite corner j of face f.
+
+    Parameters
+    ----------
+    faces : (f, 3) int array
+    welded : (V,) int array
+        Which vertex each counts as where faces are joined.
     """
 
-    def __init__(self, faces: IntArray) -> None:
+    def __init__(self, faces: IntArray, welded: IntArray) -> None:
         self._faces = faces
-        # Corners at the ends of each side, that with the smaller vertex first.
+        # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
+        # welded to one, the vertices themselves decide.
         first, second = self._corners(1), self._corners(2)
-        swapped = faces.ravel()[first] > faces.ravel()[second]
-        self._low, self._high = np.where(swapped, [second, first], [first, second])
         vertices = faces.ravel()
+        one, other = welded[vertices[first]], welded[vertices[second]]
+        swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
+        self._low, self._high = np.where(swapped, [second, first], [first, second])
         checkpoint()
-        keys = vertices[self._low] * (int(vertices.max()) + 1) + vertices[self._high]
+        size = int(vertices.max()) + 1
+        keys = np.minimum(one, other) * size + np.maximum(one, other)
+        nowhere = np.flatnonzero(one == other)  # such a side joins nothing
+        keys[nowhere] = size * size + nowhere
+        del one, other, swapped, first, second
         self._order = np.argsort(keys, kind="stable")
         checkpoint()
         _, self._first, self._count = np.unique(
@@ -109,6 +161,11 @@ class _Sides:
     def _corners(self, step: int) -> IntArray:
         corner = np.arange(self._faces.size)
         return corner - corner % 3 + (corner + step) % 3
+
+    @property
+    def branches(self) -> bool:
+        """Whether some edge has more than two."""
+        return bool((self._count > 2).any())
 
     @cached_property
     def plain_pairs(self) -> IntArray:
@@ -246,13 +303,15 @@ class _Sides:
         return corners, np.concatenate([vertex, added]), True
 
 
-def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> MeshCopy:
+def _with_areas(
+    mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray, place: IntArray
+) -> MeshCopy:
     """A copy with these faces, in which every face has an area where that is possible."""
     vertices = mesh.vertices[vertex]
     short = SHORT * mesh.diagonal
     flat = _flat(vertices, faces, short)
-    if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
-        return MeshCopy(mesh, mesh, vertex, face)
+    if not flat.any() and np.array_equal(faces, mesh.faces):
+        return MeshCopy(mesh, mesh, face, vertex)
     origin = np.zeros(3)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
@@ -270,7 +329,7 @@ def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -
             still = _flat(vertices, faces, short)
             if not still.any():
                 break
-    return MeshCopy(mesh, Mesh(vertices, faces), vertex, face, origin)
+    return MeshCopy(mesh, Mesh(vertices, faces), face, place, origin)
 
 
 def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:

@@ -180,7 +180,7 @@ def shifted(
 
 def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:
     """Whether the curve neither crosses nor touches itself."""
-    return not len(crossing_segments(surface.mesh, curve.polyline, curve.closed))
+    return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
 def drawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> ExactCurve | None:
@@ -238,7 +238,7 @@ def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[Exa
             nodes = nodes_at(surface, places, curve.closed)
         polyline, node_place, bad = _drawn(surface.mesh, curve, nodes, kept)
         if not bad.any():
-            pairs = crossing_segments(surface.mesh, polyline, curve.closed)
+            pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
         if not bad.any():
             return ExactCurve(nodes, curve.control_nodes, polyline, node_place), stays
