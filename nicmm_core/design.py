@@ -30,11 +30,11 @@ from .arguments import (
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .mesh import Mesh
-from .mesh_copy import MeshCopy
+from .mesh_copy import MeshCopy, faces_holding
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .request import Request
-from .sound_copy import SOUND_COPIES, sound_copy
+from .sound_copy import SOUND_COPIES, led_copy, sound_copy
 from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, check_connected, locate_control_points
 
@@ -42,6 +42,10 @@ PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
     "only, across which no curve is led; join the parts, or choose points on one of them"
 )
+
+
+_OnCopy = tuple[MeshCopy, SurfaceDesigner]
+"""A copy of the mesh without its defects, and who designs on it."""
 
 
 class Designer:
@@ -65,14 +69,15 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._designers: list[tuple[MeshCopy, SurfaceDesigner] | None] = []
+        self._designers: list[_OnCopy | None] = []
+        self._led: _OnCopy | None = None  # for the points of the last request that needed it
         # A progress function may ask the same Designer for another curve.
         self._lock = threading.RLock()
 
     def forget(self) -> None:
         """Start the next design anew."""
         with self._lock:
-            for made in self._designers:
+            for made in (*self._designers, self._led):
                 if made is not None:
                     made[1].forget()
 
@@ -130,7 +135,7 @@ class Designer:
             self._lock.release()
 
     def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
-        """A copy of the mesh without its defects, who designs on it, and the request there."""
+        """The first copy on which the points are connected, and the request there."""
         for number in range(SOUND_COPIES):
             if number == len(self._designers):
                 made = sound_copy(self.mesh, number)
@@ -140,6 +145,17 @@ class Designer:
             there = None if found is None else found[0].request(request)
             if found is not None and there is not None:
                 return *found, there
+        there = None if self._led is None else self._led[0].request(request)
+        if self._led is not None and there is not None:
+            return *self._led, there
+        sets = [request.points, *request.via_points.values()]
+        made = led_copy(
+            self.mesh, [faces for points in sets for faces in faces_holding(self.mesh, points)]
+        )
+        there = None if made is None else made.request(request)
+        if made is not None and there is not None:
+            self._led = made, SurfaceDesigner(made.mesh)
+            return *self._led, there
         check_connected(self.mesh, request.points)
         raise UnreachableError(PARTS)
 

@@ -123,18 +123,8 @@ class MeshCopy:
 
     def candidates(self, points: SurfacePoints) -> list[IntArray]:
         """Faces of the copy that each point lies in, its own first."""
-        around = self.original.vertex_faces
-        found = []
-        checkpoint()
-        for face, barycentric in zip(points.faces, points.barycentric, strict=True):
-            corners = self.original.faces[face][barycentric > 0.0]
-            shared = None
-            for corner in corners:
-                here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
-                shared = here if shared is None else np.intersect1d(shared, here)
-            copies = self._copies[np.concatenate([[face], shared])]
-            found.append(copies[copies >= 0])
-        return found
+        copies = [self._copies[faces] for faces in faces_holding(self.original, points)]
+        return [faces[faces >= 0] for faces in copies]
 
     def _common_component(self, candidates: list[IntArray]) -> int | None:
         """The largest component of the copy that has all points; None where there is none."""
@@ -161,3 +151,17 @@ class MeshCopy:
         return SurfacePoints(
             np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
         )
+
+
+def faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
+    """The faces that each point lies in, its own first."""
+    around = mesh.vertex_faces
+    found = []
+    checkpoint()
+    for face, barycentric in zip(points.faces, points.barycentric, strict=True):
+        shared = None
+        for corner in mesh.faces[face][barycentric > 0.0]:
+            here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
+            shared = here if shared is None else np.intersect1d(shared, here)
+        found.append(np.concatenate([[face], shared]).astype(np.int64))
+    return found

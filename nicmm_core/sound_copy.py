@@ -49,6 +49,9 @@ ROUNDS = 8
 SOUND_COPIES = 4
 """Ways in which faces are joined, one after the other."""
 
+STARTS = 8
+"""Faces of the first point from which ways to the others are looked for."""
+
 BLOCK = 50_000
 """Faces that are looked at together."""
 
@@ -81,6 +84,34 @@ def sound_copy(mesh: Mesh, number: int) -> MeshCopy | None:
     return _joined_copy(mesh, welded, linked)
 
 
+def led_copy(mesh: Mesh, points: list[IntArray]) -> MeshCopy | None:
+    """The copy in which faces are joined on a way from point to point, for some points only.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : list of (c,) int array
+        The faces that each point lies in.
+
+    Returns
+    -------
+    MeshCopy or None
+        None where no way was found that passes every side of a face at most once.
+    """
+    welded = welded_vertices(mesh)
+    kept = _without_twins(welded[mesh.faces])
+    sides = _Sides(mesh.faces[kept], welded)
+    if not sides.branches:
+        return None
+    place = np.full(len(mesh.faces), -1)
+    place[kept] = np.arange(len(kept))
+    among = [place[faces][place[faces] >= 0] for faces in points]
+    if not all(map(len, among)):
+        return None
+    pairs = sides.led(mesh.vertices, among)
+    return None if pairs is None else _cut_copy(mesh, sides, pairs, kept, welded)
+
+
 def welded_vertices(mesh: Mesh) -> IntArray:
     """For vertices of open edges the first one at the same place, others as they are, shape (V,).
 
@@ -111,10 +142,17 @@ def _joined_copy(mesh: Mesh, welded: IntArray, linked: bool) -> MeshCopy | None:
     if linked and not sides.branches:
         return None
     joined = sides.linked if linked else sides.straight_on
-    corners, vertex = sides.cut(joined(mesh.vertices), len(mesh.vertices))
-    if is_welded:
-        # A side whose ends have become one has no length, and its face no area.
-        whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return _cut_copy(mesh, sides, joined(mesh.vertices), kept, welded)
+
+
+def _cut_copy(
+    mesh: Mesh, sides: _Sides, pairs: IntArray, kept: IntArray, welded: IntArray
+) -> MeshCopy:
+    """The copy of some faces, joined where pairs of their sides are one."""
+    corners, vertex = sides.cut(pairs, len(mesh.vertices))
+    # A side whose ends have been welded to one has no length, and its face no area.
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if not whole.all():
         corners, kept = corners[whole], kept[whole]
     return _with_areas(mesh, corners, vertex, kept, welded[vertex])
 
@@ -218,6 +256,83 @@ class _Sides:
                     here = [sides[part[sides // 3] == parts[run + step]][0] for step in (0, 1)]
                     pairs.append(np.array([here]))
         return np.concatenate(pairs)
+
+    def led(self, vertices: FloatArray, points: list[IntArray]) -> IntArray | None:
+        """Pairs of sides that join faces on a way to each of some points, shape (p, 2).
+
+        Parameters
+        ----------
+        vertices : (V, 3) float array
+        points : list of (c,) int array
+            The faces that each point lies in.
+
+        Returns
+        -------
+        (p, 2) int array or None
+            Each side at most once; None where no such way was found.
+        """
+        pairs = [self.plain_pairs]
+        for sides in self._branching:
+            pairs.append(np.stack(np.triu_indices(len(sides), 1), axis=1))
+            pairs[-1] = sides[pairs[-1]]
+        every = np.concatenate(pairs)
+        centre = vertices[self._faces].mean(axis=1)
+        faces = every // 3
+        length = np.linalg.norm(centre[faces[:, 0]] - centre[faces[:, 1]], axis=1)
+        length = np.maximum(length, np.finfo(float).tiny)  # a zero would not be an arc
+        for start in points[0][:STARTS].tolist():
+            taken = self._taken_on_ways(every, length, start, points[1:])
+            if taken is not None:
+                break
+        else:
+            return None
+        used = np.zeros(self._faces.size, dtype=bool)
+        used[every[taken]] = True
+        chosen = [self.plain_pairs, every[taken[taken >= len(self.plain_pairs)]]]
+        for sides in self._branching:
+            left = sides[~used[sides]]
+            if len(left) > 1:
+                chosen.append(self._straightest(left, vertices))
+        return np.concatenate(chosen)
+
+    def _taken_on_ways(
+        self, every: IntArray, length: FloatArray, start: int, points: list[IntArray]
+    ) -> IntArray | None:
+        """Which of all pairs of sides, (q, 2), a way from a face to each of some points takes."""
+        n_faces = len(self._faces)
+        partner = np.full(self._faces.size, -1)
+        reached = np.zeros(n_faces, dtype=bool)
+        reached[start] = True
+        taken: list[int] = []
+        for among in points:
+            checkpoint()
+            one, other = every.T
+            free = (partner[one] == other) | ((partner[one] < 0) & (partner[other] < 0))
+            arcs = np.flatnonzero(free)
+            # Of several sides that two faces have in common the shortest way is as good as any.
+            ends = np.sort(every[arcs] // 3, axis=1)
+            _, first = np.unique(ends @ [n_faces, 1], return_index=True)
+            arcs, ends = arcs[first], ends[first]
+            entries = (
+                np.concatenate([length[arcs], length[arcs]]),
+                np.concatenate([ends, ends[:, ::-1]]).T,
+            )
+            graph = sparse.csr_array(entries, shape=(n_faces, n_faces))
+            distance, previous, _ = csgraph.dijkstra(
+                graph, indices=np.flatnonzero(reached), min_only=True, return_predecessors=True
+            )
+            face = int(among[distance[among].argmin()])
+            if not np.isfinite(distance[face]):
+                return None
+            number = dict(zip(map(tuple, ends.tolist()), arcs.tolist(), strict=True))
+            while not reached[face]:
+                reached[face] = True
+                before = int(previous[face])
+                pair = number[min(face, before), max(face, before)]
+                taken.append(pair)
+                partner[every[pair]] = every[pair][::-1]
+                face = before
+        return np.array(taken, dtype=np.int64)
 
     def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
         """Pairs of the sides of one edge, the straightest first, until fewer than two are left."""
