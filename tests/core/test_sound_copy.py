@@ -271,3 +271,31 @@ class TestOpenEdgesAtOnePlace:
         curve = nicmm.design_curve(soup, [3, 100, 400]).curves[0]
         with pytest.raises(nicmm.CurveError, match="merge vertices by distance"):
             nicmm.cut_mesh(soup, curve)
+
+
+class TestJoinedFromPointToPoint:
+    """Where neither going straight on nor linking all parts joins the points."""
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_octants_about_one_vertex(self, seed):
+        """Every edge at it has four faces, and each curve needs other pairs of them."""
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        vertices = np.concatenate([np.zeros((1, 3)), axes])
+        pairs = [(a, b) for a in range(1, 7) for b in range(a + 1, 7) if b != a + 3]
+        mesh = nicmm.Mesh(vertices, [[0, a, b] for a, b in pairs])
+        assert mesh.branches
+        chosen = np.random.default_rng(seed).choice(np.arange(1, 7), 3, replace=False)
+        design = nicmm.design_curve(mesh, chosen, order="shortest", closed=False)
+        assert not judge(mesh, design, chosen, closed=False, order="shortest").faults
+
+    def test_another_request_gets_another_joining(self):
+        mesh = nicmm.Mesh(
+            [[0, 0, -0.5], [0, 0, 0.5], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]],
+            [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 5]],
+        )
+        designer = nicmm.Designer(mesh)
+        for ends in ([2, 4], [3, 5], [4, 2], [2, 3], [4, 3]):
+            design = designer.design(ends, closed=False)
+            assert not judge(mesh, design, ends, closed=False).faults
+        with pytest.raises(nicmm.UnreachableError, match="single vertices or edges"):
+            designer.design([2, 3, 4])
