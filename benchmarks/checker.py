@@ -196,10 +196,16 @@ def judge_curve(
     n = len(curve.points)
     if not _readable(mesh, curve) or n < FEWEST_POINTS[bool(curve.closed)]:
         return Verdict(curves, points=n)
-    vertices, weights = _places(mesh, curve)
     first = np.arange(n if curve.closed else n - 1)
     chords = np.stack([first, (first + 1) % n], axis=1)
-    simplices, on_face = _common_simplices(mesh, vertices, chords)
+    faces = mesh.faces
+    vertices, weights = _places(faces, curve)
+    simplices, on_face = _common_simplices(faces, vertices, chords)
+    if not on_face.all():
+        # Open edges at the same place are one edge to a curve where nothing else joins its points.
+        faces = _with_open_edges_joined(mesh)
+        vertices, weights = _places(faces, curve)
+        simplices, on_face = _common_simplices(faces, vertices, chords)
     crossings, touchings = _contacts(vertices, weights, chords[on_face], simplices[on_face])
     missed, in_order = 0.0, True
     if positions is not None:
@@ -245,7 +251,18 @@ def _readable(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> bool:
     )
 
 
-def _places(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> tuple[IntArray, FloatArray]:
+def _with_open_edges_joined(mesh: nicmm.Mesh) -> IntArray:
+    """The faces, (F, 3), where vertices of open edges with the same coordinates are one."""
+    sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    first: dict[tuple[float, ...], int] = {}
+    number = np.arange(len(mesh.vertices))
+    for vertex in np.unique(edges[count == 1]).tolist():
+        number[vertex] = first.setdefault(tuple(mesh.vertices[vertex].tolist()), vertex)
+    return number[mesh.faces]
+
+
+def _places(faces: IntArray, curve: nicmm.SurfaceCurve) -> tuple[IntArray, FloatArray]:
     """What each point is, regardless of the face named.
 
     Returns
@@ -256,14 +273,14 @@ def _places(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> tuple[IntArray, Floa
         The weights there, 0 for the others.
     """
     positive = curve.barycentric > 0.0
-    vertices = np.where(positive, mesh.faces[curve.faces], -1)
+    vertices = np.where(positive, faces[curve.faces], -1)
     order = np.argsort(vertices, axis=1, kind="stable")
     weights = np.where(positive, curve.barycentric, 0.0)
     return np.take_along_axis(vertices, order, 1), np.take_along_axis(weights, order, 1)
 
 
 def _common_simplices(
-    mesh: nicmm.Mesh, vertices: IntArray, chords: IntArray
+    faces: IntArray, vertices: IntArray, chords: IntArray
 ) -> tuple[IntArray, BoolArray]:
     """The smallest face, edge or vertex that holds both ends of each chord.
 
@@ -280,11 +297,11 @@ def _common_simplices(
     small = (both >= 0).sum(axis=1) <= 3
 
     # Only faces near the curve are sorted, and only its own vertices have numbers in the keys.
-    used = np.zeros(len(mesh.vertices) + 1, dtype=bool)
+    used = np.zeros(int(faces.max()) + 2, dtype=bool)
     used[vertices[vertices >= 0]] = True
     number = np.cumsum(used)
     number[~used] = 0
-    near = mesh.faces[used[mesh.faces].sum(axis=1) >= 2]
+    near = faces[used[faces].sum(axis=1) >= 2]
     near = np.sort(number[near], axis=1)
     edges = np.concatenate([near[:, [0, 1]], near[:, [1, 2]], near[:, [0, 2]]])
     corners = np.arange(1, number.max() + 1)

@@ -30,7 +30,7 @@ from .scale import Scale
 
 SEED = 0
 
-FOLDERS = ("nasty", "thingi10k", "clean", "shapes", "meshcnn_seg", "shrec16", "big")
+FOLDERS = ("nasty", "thingi10k", "clean", "shapes", "meshcnn_seg", "big", "shrec16")
 
 GENERATED = "generated"
 
@@ -68,15 +68,28 @@ class Outcome:
 
 
 def run(scale: Scale) -> None:
-    """Ask for curves on all meshes and sort what comes."""
+    """Ask for curves on all meshes and sort what comes, one collection after the other."""
     items = _items(scale)
+    folders = [f for f in (GENERATED, *FOLDERS) if any(item.folder == f for item in items)]
     done: list[Isolated[Item, Outcome]] = []
-    for one in isolated(outcome, items, PATIENCE):
-        done.append(one)
-        if _verdict(one) in (DECLINED, WRONG):
-            print(f"  {_line(one)}", flush=True)
+    for number, folder in enumerate(folders, start=1):
+        here = [item for item in items if item.folder == folder]
+        for one in isolated(outcome, here, PATIENCE):
+            done.append(one)
+            if _verdict(one) in (DECLINED, WRONG):
+                print(f"  {_line(one)}", flush=True)
+        _write(done, folders[:number], folders[number:], scale)
+
+
+def _write(
+    done: Sequence[Isolated[Item, Outcome]],
+    folders: Sequence[str],
+    missing: Sequence[str],
+    scale: Scale,
+) -> None:
+    """The section as far as the measurement is; a large collection takes hours."""
     rows = []
-    for folder in (GENERATED, *FOLDERS):
+    for folder in folders:
         rows += _row(folder, [one for one in done if one.item.folder == folder])
     rows += _row("all", done)
     slowest = sorted(done, key=lambda one: -one.seconds)[:SLOWEST]
@@ -92,6 +105,7 @@ def run(scale: Scale) -> None:
         + "\nThe slowest: "
         + report.listed(f"{_name(one.item)} {one.seconds:.0f} s" for one in slowest)
         + "."
+        + (f"\n\nNot measured yet: {report.listed(missing)}." if missing else "")
     )
     report.write_section("corpus", "Every mesh", body, scale)
 
@@ -163,7 +177,7 @@ def _points(
     """Random vertices; None where there are too few."""
     faces = mesh.faces
     if of_one_part:
-        part = edge_connected_parts(faces)
+        part = edge_connected_parts(mesh)
         faces = faces[part == part[generator.integers(len(faces))]]
     vertices = np.unique(faces)
     fewest = 3 if closed else 2
@@ -173,13 +187,23 @@ def _points(
     return generator.choice(vertices, count, replace=False)
 
 
-def edge_connected_parts(faces: IntArray) -> IntArray:
-    """Which part each face belongs to, shape (F,), where faces join that have a common edge."""
+def edge_connected_parts(mesh: nicmm.Mesh) -> IntArray:
+    """Which part each face belongs to, shape (F,).
+
+    Faces are joined that have a common edge, or open edges between the same two places.
+    """
+    faces = mesh.faces
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, edge = np.unique(sides, axis=0, return_inverse=True)
+    _, edge, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1)
+    _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
+    ends = np.sort(place.reshape(-1)[sides], axis=1)
+    is_open = (count[edge] == 1) & (ends[:, 0] != ends[:, 1])
+    _, joint = np.unique(ends[is_open], axis=0, return_inverse=True)
+    edge[is_open] = len(count) + joint.reshape(-1)
     face = np.repeat(np.arange(len(faces)), 3)
     shape = (len(faces), int(edge.max()) + 1)
-    incidence = sparse.csr_array((np.ones(len(face)), (face, edge.reshape(-1))), shape=shape)
+    incidence = sparse.csr_array((np.ones(len(face)), (face, edge)), shape=shape)
     return csgraph.connected_components(incidence @ incidence.T, directed=False)[1]
 
 
@@ -193,7 +217,7 @@ def not_possible(mesh: nicmm.Mesh, points: IntArray) -> str:
     apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     if (apart[np.triu_indices(len(points), 1)] <= 1e-9 * mesh.diagonal).any():
         return "two points are at one place"
-    part = edge_connected_parts(mesh.faces)
+    part = edge_connected_parts(mesh)
     common = set(part.tolist())
     for point in points:
         common &= set(part[(mesh.faces == point).any(axis=1)].tolist())

@@ -31,6 +31,7 @@ def defective_meshes() -> Iterator[tuple[str, Mesh]]:
     yield "fans without area", Mesh(*_with_fans(vertices, faces, 12))
     yield "soup", Mesh(vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3))
     yield "seam", _seam(ball)
+    yield "touching boxes", _touching_boxes()
     yield "three sheets along an edge", _sheets(3)
     yield "four sheets along an edge", _sheets(4)
     yield "fins", Mesh(*_with_fins(vertices, faces, 15))
@@ -97,6 +98,31 @@ def _seam(ball: Mesh) -> Mesh:
     faces = ball.faces.copy()
     faces[upper] += len(ball.vertices)
     return Mesh(np.concatenate([ball.vertices, ball.vertices]), faces)
+
+
+def _touching_boxes(size: int = 4) -> Mesh:
+    """Two closed boxes side by side, with vertices at the same places where they touch."""
+    box = _box(size)
+    return _together(box, Mesh(box.vertices + [1.0, 0.0, 0.0], box.faces))
+
+
+def _box(size: int) -> Mesh:
+    """A unit cube whose sides are grids."""
+    step = np.arange(size + 1)
+    a, b = (each.ravel() for each in np.meshgrid(step, step, indexing="ij"))
+    grids = []
+    for axis in range(3):
+        for level in (0, size):
+            points = np.zeros((len(a), 3), dtype=np.int64)
+            points[:, axis], points[:, (axis + 1) % 3], points[:, (axis + 2) % 3] = level, a, b
+            grids.append(points)
+    corner = (step[:-1, None] * (size + 1) + step[:-1]).ravel()
+    one = np.stack([corner, corner + size + 1, corner + 1], axis=1)
+    other = np.stack([corner + 1, corner + size + 1, corner + size + 2], axis=1)
+    side = np.concatenate([one, other])
+    faces = np.concatenate([side + number * len(a) for number in range(6)])
+    places, number = np.unique(np.concatenate(grids), axis=0, return_inverse=True)
+    return Mesh(places / size, number.reshape(-1)[faces])
 
 
 def _sheets(count: int, size: int = 8) -> Mesh:

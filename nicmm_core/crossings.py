@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh
 from .surface_points import SurfacePoints
 
 TOUCHING = 1e-12
@@ -17,16 +16,25 @@ TOUCHING = 1e-12
 may put the point on the near side of it in either face."""
 
 
-def crossing_segments(mesh: Mesh, polyline: SurfacePoints, closed: bool) -> IntArray:
-    """Pairs of segments, not consecutive, that have a point in common, shape (p, 2)."""
+def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool) -> IntArray:
+    """Pairs of segments, not consecutive, that have a point in common, shape (p, 2).
+
+    Parameters
+    ----------
+    all_faces : (F, 3) int array
+        Of the mesh.
+    polyline : SurfacePoints
+        Each in the face of the segment after it.
+    closed : bool
+    """
     n = len(polyline)
     n_segments = n if closed else n - 1
     segment = np.arange(n_segments)
     following = (segment + 1) % n
     faces = polyline.faces[:n_segments]
     start = polyline.barycentric[:n_segments, :2]
-    theirs = mesh.faces[polyline.faces[following]]
-    same = theirs[:, :, None] == mesh.faces[faces][:, None, :2]
+    theirs = all_faces[polyline.faces[following]]
+    same = theirs[:, :, None] == all_faces[faces][:, None, :2]
     end = (polyline.barycentric[following][:, :, None] * same).sum(axis=1)
 
     order = np.argsort(faces, kind="stable")
@@ -46,15 +54,17 @@ def crossing_segments(mesh: Mesh, polyline: SurfacePoints, closed: bool) -> IntA
     a, b, c, d = start[first], end[first], start[second], end[second]
     meets = _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
     in_faces = np.stack([first[meets], second[meets]], axis=1)
-    return np.concatenate([in_faces, _vertices_passed_twice(mesh, polyline, n_segments)])
+    return np.concatenate([in_faces, _vertices_passed_twice(all_faces, polyline, n_segments)])
 
 
-def _vertices_passed_twice(mesh: Mesh, polyline: SurfacePoints, n_segments: int) -> IntArray:
+def _vertices_passed_twice(
+    all_faces: IntArray, polyline: SurfacePoints, n_segments: int
+) -> IntArray:
     """Segments from a vertex that strands of different faces pass, shape (p, 2)."""
     n = len(polyline)
     here = polyline.barycentric > 0.0
     place = np.flatnonzero(here.sum(axis=1) == 1)
-    vertex = mesh.faces[polyline.faces[place]][here[place]]
+    vertex = all_faces[polyline.faces[place]][here[place]]
     order = np.argsort(vertex, kind="stable")
     first, second = place[order[:-1]], place[order[1:]]
     apart = second - first

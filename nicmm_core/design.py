@@ -33,14 +33,14 @@ from .curve import SurfaceCurve
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, CurveError, UnreachableError
 from .mesh import Mesh
-from .mesh_copy import MeshCopy
+from .mesh_copy import MeshCopy, faces_holding
 from .outputs.chain import checked_curve
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .request import Request
-from .sound_copy import sound_copy
+from .sound_copy import SOUND_COPIES, led_copy, sound_copy
 from .surface_designer import SurfaceDesigner
-from .surface_points import SurfacePoints, locate_control_points
+from .surface_points import SurfacePoints, check_connected, locate_control_points
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
@@ -50,6 +50,9 @@ PARTS = (
 
 FOLLOWING = 3
 """Iterations of `Designer.follow` by default: a frame or two of a live drawing."""
+
+_OnCopy = tuple[MeshCopy, SurfaceDesigner]
+"""A copy of the mesh without its defects, and who designs on it."""
 
 
 class Designer:
@@ -73,15 +76,17 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._designers: list[tuple[MeshCopy, SurfaceDesigner]] = []
+        self._designers: list[_OnCopy | None] = []
+        self._led: _OnCopy | None = None  # for the points of the last request that needed it
         # A progress function may ask the same Designer for another curve.
         self._lock = threading.RLock()
 
     def forget(self) -> None:
         """Start the next design anew."""
         with self._lock:
-            for _, designer in self._designers:
-                designer.forget()
+            for made in (*self._designers, self._led):
+                if made is not None:
+                    made[1].forget()
 
     def design(
         self,
@@ -108,7 +113,7 @@ class Designer:
         try:
             with watched(progress), self._its_turn():
                 maps = self._maps(obstacles, alignment, clearance, smoothness)
-                points = locate_control_points(self.mesh, control_points, closed)
+                points = locate_control_points(self.mesh, control_points, closed, connected=False)
                 via = {} if via_points is None else via_points
                 located = located_via_points(self.mesh, points, via, order, closed)
                 request = Request(
@@ -168,7 +173,7 @@ class Designer:
             )
         found = SurfacePoints(faces[index], barycentric[index])
         request = Request(
-            points=locate_control_points(self.mesh, found, curve.closed),
+            points=locate_control_points(self.mesh, found, curve.closed, connected=False),
             closed=curve.closed,
             order="given",
             via_points={},
@@ -218,7 +223,7 @@ class Designer:
         started = time.perf_counter()
         check_closed(closed)
         request = Request(
-            points=locate_control_points(self.mesh, control_points, closed),
+            points=locate_control_points(self.mesh, control_points, closed, connected=False),
             closed=closed,
             order="given",
             via_points={},
@@ -248,19 +253,29 @@ class Designer:
         }
 
     def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
-        """A copy of the mesh without its defects, who designs on it, and the request there."""
-        place = 0
-        while True:
-            if place == len(self._designers):
-                copy = sound_copy(self.mesh, place)
-                if copy is None:
-                    raise UnreachableError(PARTS)
-                self._designers.append((copy, SurfaceDesigner(copy.mesh)))
-            copy, designer = self._designers[place]
-            there = copy.request(request)
-            if there is not None:
-                return copy, designer, there
-            place += 1
+        """The first copy on which the points are connected, and the request there."""
+        for number in range(SOUND_COPIES):
+            if number == len(self._designers):
+                made = sound_copy(self.mesh, number)
+                new = None if made is None else (made, SurfaceDesigner(made.mesh))
+                self._designers.append(new)
+            found = self._designers[number]
+            there = None if found is None else found[0].request(request)
+            if found is not None and there is not None:
+                return *found, there
+        there = None if self._led is None else self._led[0].request(request)
+        if self._led is not None and there is not None:
+            return *self._led, there
+        sets = [request.points, *request.via_points.values()]
+        made = led_copy(
+            self.mesh, [faces for points in sets for faces in faces_holding(self.mesh, points)]
+        )
+        there = None if made is None else made.request(request)
+        if made is not None and there is not None:
+            self._led = made, SurfaceDesigner(made.mesh)
+            return *self._led, there
+        check_connected(self.mesh, request.points)
+        raise UnreachableError(PARTS)
 
 
 def design_curve(

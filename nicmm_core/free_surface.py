@@ -48,7 +48,7 @@ def free_surface(mesh: Mesh, obstacles: FloatArray, clearance: float) -> MeshCop
         )
     # Parts that meet in nothing but a vertex come apart there: no curve passes between them.
     corners, vertex = fans(Mesh(mesh.vertices, mesh.faces[face]))
-    return MeshCopy(mesh, Mesh(mesh.vertices[vertex], corners), vertex, face)
+    return MeshCopy(mesh, Mesh(mesh.vertices[vertex], corners), face, vertex)
 
 
 def check_reachable(free: MeshCopy, request: Request) -> None:

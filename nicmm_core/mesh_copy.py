@@ -32,18 +32,18 @@ class MeshCopy:
     original : Mesh
     mesh : Mesh
         The copy; the same object where nothing differs.
-    vertex : (v,) int array
-        The original of each of its vertices.
     face : (f,) int array
         The original of each of its faces.
+    place : (v,) int array
+        The same for vertices that are one and the same of the surface, as of a doubled one.
     origin : (3,) float array
         Where the copy's origin is in the space of the original.
     """
 
     original: Mesh
     mesh: Mesh
-    vertex: IntArray
     face: IntArray
+    place: IntArray
     origin: FloatArray = dataclass_field(default_factory=lambda: np.zeros(3))
 
     @property
@@ -52,9 +52,10 @@ class MeshCopy:
         return self.mesh is not self.original
 
     def request(self, request: Request) -> Request | None:
-        """The same request on the copy; None where cuts separate its points."""
+        """The same request on the copy; None where its points are not connected there."""
         if not self.differs:
-            return request
+            components = self.mesh.face_component[request.points.faces]
+            return request if (components == components[0]).all() else None
         sets = [request.points, *request.via_points.values()]
         candidates = [self.candidates(points) for points in sets]
         common = self._common_component([each for of_set in candidates for each in of_set])
@@ -68,9 +69,17 @@ class MeshCopy:
             request,
             points=points,
             via_points=dict(zip(request.via_points, via_points, strict=True)),
-            obstacles=None if request.obstacles is None else request.obstacles[self.vertex],
-            alignment=None if request.alignment is None else request.alignment[self.vertex],
+            obstacles=self._weights(request.obstacles),
+            alignment=self._weights(request.alignment),
         )
+
+    def _weights(self, weights: FloatArray | None) -> FloatArray | None:
+        """Weights at the vertices; the greatest of vertices that are one in the copy."""
+        if weights is None:
+            return None
+        result = np.zeros(len(self.mesh.vertices))
+        np.maximum.at(result, self.mesh.faces, weights[self.original.faces[self.face]])
+        return result
 
     def design(self, design: Design) -> Design:
         """A design on the copy as one on the mesh."""
@@ -79,8 +88,8 @@ class MeshCopy:
         curves = [self._curve(curve) for curve in design.curves]
         status = design.status
         # Strands that pass different copies of one vertex touch there.
-        doubled = len(np.unique(self.vertex)) < len(self.vertex)
-        if doubled and not all(map(self._is_simple, curves)):
+        doubled = len(np.unique(self.place)) < len(self.place)
+        if doubled and not all(map(self._is_simple, design.curves)):
             status = Status.NOT_ONE_CURVE
         return replace(
             design, status=status, curves=curves, find_field=partial(self._field, design)
@@ -98,7 +107,7 @@ class MeshCopy:
 
     def _is_simple(self, curve: SurfaceCurve) -> bool:
         polyline = SurfacePoints(curve.faces, curve.barycentric)
-        return not len(crossing_segments(self.original, polyline, curve.closed))
+        return not len(crossing_segments(self.place[self.mesh.faces], polyline, curve.closed))
 
     def _curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         faces = self.face[curve.faces]
@@ -108,8 +117,9 @@ class MeshCopy:
     def _field(self, design: Design) -> FloatArray:
         """φ at the vertices of the mesh; the copy of a vertex nearest to the curve counts."""
         field = np.full(len(self.original.vertices), np.inf)
-        order = np.argsort(-np.abs(design.field), kind="stable")
-        field[self.vertex[order]] = design.field[order]
+        values = design.field[self.mesh.faces.ravel()]
+        order = np.argsort(-np.abs(values), kind="stable")
+        field[self.original.faces[self.face].ravel()[order]] = values[order]
         # What the copy does not have is outside.
         field[np.isinf(field)] = design.field.max()
         return field
@@ -123,18 +133,8 @@ class MeshCopy:
 
     def candidates(self, points: SurfacePoints) -> list[IntArray]:
         """Faces of the copy that each point lies in, its own first."""
-        around = self.original.vertex_faces
-        found = []
-        checkpoint()
-        for face, barycentric in zip(points.faces, points.barycentric, strict=True):
-            corners = self.original.faces[face][barycentric > 0.0]
-            shared = None
-            for corner in corners:
-                here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
-                shared = here if shared is None else np.intersect1d(shared, here)
-            copies = self._copies[np.concatenate([[face], shared])]
-            found.append(copies[copies >= 0])
-        return found
+        copies = [self._copies[faces] for faces in faces_holding(self.original, points)]
+        return [faces[faces >= 0] for faces in copies]
 
     def _common_component(self, candidates: list[IntArray]) -> int | None:
         """The largest component of the copy that has all points; None where there is none."""
@@ -161,3 +161,17 @@ class MeshCopy:
         return SurfacePoints(
             np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
         )
+
+
+def faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
+    """The faces that each point lies in, its own first."""
+    around = mesh.vertex_faces
+    found = []
+    checkpoint()
+    for face, barycentric in zip(points.faces, points.barycentric, strict=True):
+        shared = None
+        for corner in mesh.faces[face][barycentric > 0.0]:
+            here = around.indices[around.indptr[corner] : around.indptr[corner + 1]]
+            shared = here if shared is None else np.intersect1d(shared, here)
+        found.append(np.concatenate([[face], shared]).astype(np.int64))
+    return found

@@ -8,6 +8,8 @@ is there. Three things may differ:
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut
   off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
   there are doubled.
+- Where that leaves points apart, open edges whose ends are at the same places are one edge: the
+  triangles of a soup, or the two sides of a seam. Their vertices are one.
 - Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
   that has a length, each its own way, so that every face has an area.
 """
@@ -44,6 +46,12 @@ ATTEMPTS = 4
 ROUNDS = 8
 """Of cutting one edge further where a cut does not come apart."""
 
+SOUND_COPIES = 4
+"""Ways in which faces are joined, one after the other."""
+
+STARTS = 8
+"""Faces of the first point from which ways to the others are looked for."""
+
 BLOCK = 50_000
 """Faces that are looked at together."""
 
@@ -52,31 +60,101 @@ SEED = 0
 
 
 def sound_copy(mesh: Mesh, number: int) -> MeshCopy | None:
-    """A copy of a mesh, the first or one for points that those before separate.
+    """A copy of a mesh, for points that the copies before separate.
 
     Parameters
     ----------
     mesh : Mesh
     number : int
-        0: where more than two faces share an edge the surface goes straight on. 1: as many parts
-        of it are joined there as can be.
+        Below `SOUND_COPIES`. 0: where more than two faces share an edge the surface goes straight
+        on. 1: as many parts of it are joined there as can be. 2 and 3: the same, and open edges at
+        the same place are one edge.
 
     Returns
     -------
     MeshCopy or None
-        None where there is no further one.
+        None where it joins no more than those before.
     """
+    linked = number % 2 == 1
+    if number < 2:
+        return _joined_copy(mesh, np.arange(len(mesh.vertices)), linked)
+    welded = welded_vertices(mesh)
+    if (welded == np.arange(len(welded))).all():
+        return None
+    return _joined_copy(mesh, welded, linked)
+
+
+def led_copy(mesh: Mesh, points: list[IntArray]) -> MeshCopy | None:
+    """The copy in which faces are joined on a way from point to point, for some points only.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : list of (c,) int array
+        The faces that each point lies in.
+
+    Returns
+    -------
+    MeshCopy or None
+        None where no way was found that passes every side of a face at most once.
+    """
+    welded = welded_vertices(mesh)
+    kept = _without_twins(welded[mesh.faces])
+    sides = _Sides(mesh.faces[kept], welded)
+    if not sides.branches:
+        return None
+    place = np.full(len(mesh.faces), -1)
+    place[kept] = np.arange(len(kept))
+    among = [place[faces][place[faces] >= 0] for faces in points]
+    if not all(map(len, among)):
+        return None
+    pairs = sides.led(mesh.vertices, among)
+    return None if pairs is None else _cut_copy(mesh, sides, pairs, kept, welded)
+
+
+def welded_vertices(mesh: Mesh) -> IntArray:
+    """For vertices of open edges the first one at the same place, others as they are, shape (V,).
+
+    Only places whose coordinates are the same to the last digit are one. Edges that two faces have
+    are closed already, so closed surfaces that touch each other stay apart.
+    """
+    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]
+    checkpoint()
+    edges, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    rim = np.unique(edges[count == 1])
+    welded = np.arange(len(mesh.vertices))
+    if len(rim):
+        # Adding zero makes one zero of both.
+        _, first, place = np.unique(
+            mesh.vertices[rim] + 0.0, axis=0, return_index=True, return_inverse=True
+        )
+        welded[rim] = rim[first[place.ravel()]]
+    return welded
+
+
+def _joined_copy(mesh: Mesh, welded: IntArray, linked: bool) -> MeshCopy | None:
+    """The copy in which sides of faces whose ends are the same welded vertices may be joined."""
+    is_welded = bool((welded != np.arange(len(welded))).any())
     kept = np.arange(len(mesh.faces))
-    if mesh.branches:
-        kept = _without_twins(mesh.faces)
-    elif number > 0:
+    if mesh.branches or is_welded:
+        kept = _without_twins(welded[mesh.faces])
+    sides = _Sides(mesh.faces[kept], welded)
+    if linked and not sides.branches:
         return None
-    sides = _Sides(mesh.faces[kept])
-    joinings = (sides.straight_on, sides.linked)
-    if number == len(joinings):
-        return None
-    pairs = joinings[number](mesh.vertices)
-    return _with_areas(mesh, *sides.cut(pairs, len(mesh.vertices)), kept)
+    joined = sides.linked if linked else sides.straight_on
+    return _cut_copy(mesh, sides, joined(mesh.vertices), kept, welded)
+
+
+def _cut_copy(
+    mesh: Mesh, sides: _Sides, pairs: IntArray, kept: IntArray, welded: IntArray
+) -> MeshCopy:
+    """The copy of some faces, joined where pairs of their sides are one."""
+    corners, vertex = sides.cut(pairs, len(mesh.vertices))
+    # A side whose ends have been welded to one has no length, and its face no area.
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if not whole.all():
+        corners, kept = corners[whole], kept[whole]
+    return _with_areas(mesh, corners, vertex, kept, welded[vertex])
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -88,17 +166,29 @@ class _Sides:
     """The sides of faces, three each, and which of them are one edge.
 
     Side 3 f + j lies opposite corner j of face f.
+
+    Parameters
+    ----------
+    faces : (f, 3) int array
+    welded : (V,) int array
+        Which vertex each counts as where faces are joined.
     """
 
-    def __init__(self, faces: IntArray) -> None:
+    def __init__(self, faces: IntArray, welded: IntArray) -> None:
         self._faces = faces
-        # Corners at the ends of each side, that with the smaller vertex first.
+        # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
+        # welded to one, the vertices themselves decide.
         first, second = self._corners(1), self._corners(2)
-        swapped = faces.ravel()[first] > faces.ravel()[second]
-        self._low, self._high = np.where(swapped, [second, first], [first, second])
         vertices = faces.ravel()
+        one, other = welded[vertices[first]], welded[vertices[second]]
+        swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
+        self._low, self._high = np.where(swapped, [second, first], [first, second])
         checkpoint()
-        keys = vertices[self._low] * (int(vertices.max()) + 1) + vertices[self._high]
+        size = int(vertices.max()) + 1
+        keys = np.minimum(one, other) * size + np.maximum(one, other)
+        nowhere = np.flatnonzero(one == other)  # such a side joins nothing
+        keys[nowhere] = size * size + nowhere
+        del one, other, swapped, first, second
         self._order = np.argsort(keys, kind="stable")
         checkpoint()
         _, self._first, self._count = np.unique(
@@ -109,6 +199,11 @@ class _Sides:
     def _corners(self, step: int) -> IntArray:
         corner = np.arange(self._faces.size)
         return corner - corner % 3 + (corner + step) % 3
+
+    @property
+    def branches(self) -> bool:
+        """Whether some edge has more than two."""
+        return bool((self._count > 2).any())
 
     @cached_property
     def plain_pairs(self) -> IntArray:
@@ -161,6 +256,83 @@ class _Sides:
                     here = [sides[part[sides // 3] == parts[run + step]][0] for step in (0, 1)]
                     pairs.append(np.array([here]))
         return np.concatenate(pairs)
+
+    def led(self, vertices: FloatArray, points: list[IntArray]) -> IntArray | None:
+        """Pairs of sides that join faces on a way to each of some points, shape (p, 2).
+
+        Parameters
+        ----------
+        vertices : (V, 3) float array
+        points : list of (c,) int array
+            The faces that each point lies in.
+
+        Returns
+        -------
+        (p, 2) int array or None
+            Each side at most once; None where no such way was found.
+        """
+        pairs = [self.plain_pairs]
+        for sides in self._branching:
+            pairs.append(np.stack(np.triu_indices(len(sides), 1), axis=1))
+            pairs[-1] = sides[pairs[-1]]
+        every = np.concatenate(pairs)
+        centre = vertices[self._faces].mean(axis=1)
+        faces = every // 3
+        length = np.linalg.norm(centre[faces[:, 0]] - centre[faces[:, 1]], axis=1)
+        length = np.maximum(length, np.finfo(float).tiny)  # a zero would not be an arc
+        for start in points[0][:STARTS].tolist():
+            taken = self._taken_on_ways(every, length, start, points[1:])
+            if taken is not None:
+                break
+        else:
+            return None
+        used = np.zeros(self._faces.size, dtype=bool)
+        used[every[taken]] = True
+        chosen = [self.plain_pairs, every[taken[taken >= len(self.plain_pairs)]]]
+        for sides in self._branching:
+            left = sides[~used[sides]]
+            if len(left) > 1:
+                chosen.append(self._straightest(left, vertices))
+        return np.concatenate(chosen)
+
+    def _taken_on_ways(
+        self, every: IntArray, length: FloatArray, start: int, points: list[IntArray]
+    ) -> IntArray | None:
+        """Which of all pairs of sides, (q, 2), a way from a face to each of some points takes."""
+        n_faces = len(self._faces)
+        partner = np.full(self._faces.size, -1)
+        reached = np.zeros(n_faces, dtype=bool)
+        reached[start] = True
+        taken: list[int] = []
+        for among in points:
+            checkpoint()
+            one, other = every.T
+            free = (partner[one] == other) | ((partner[one] < 0) & (partner[other] < 0))
+            arcs = np.flatnonzero(free)
+            # Of several sides that two faces have in common the shortest way is as good as any.
+            ends = np.sort(every[arcs] // 3, axis=1)
+            _, first = np.unique(ends @ [n_faces, 1], return_index=True)
+            arcs, ends = arcs[first], ends[first]
+            entries = (
+                np.concatenate([length[arcs], length[arcs]]),
+                np.concatenate([ends, ends[:, ::-1]]).T,
+            )
+            graph = sparse.csr_array(entries, shape=(n_faces, n_faces))
+            distance, previous, _ = csgraph.dijkstra(
+                graph, indices=np.flatnonzero(reached), min_only=True, return_predecessors=True
+            )
+            face = int(among[distance[among].argmin()])
+            if not np.isfinite(distance[face]):
+                return None
+            number = dict(zip(map(tuple, ends.tolist()), arcs.tolist(), strict=True))
+            while not reached[face]:
+                reached[face] = True
+                before = int(previous[face])
+                pair = number[min(face, before), max(face, before)]
+                taken.append(pair)
+                partner[every[pair]] = every[pair][::-1]
+                face = before
+        return np.array(taken, dtype=np.int64)
 
     def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
         """Pairs of the sides of one edge, the straightest first, until fewer than two are left."""
@@ -246,13 +418,15 @@ class _Sides:
         return corners, np.concatenate([vertex, added]), True
 
 
-def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -> MeshCopy:
+def _with_areas(
+    mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray, place: IntArray
+) -> MeshCopy:
     """A copy with these faces, in which every face has an area where that is possible."""
     vertices = mesh.vertices[vertex]
     short = SHORT * mesh.diagonal
     flat = _flat(vertices, faces, short)
-    if not flat.any() and len(vertex) == len(mesh.vertices) and len(face) == len(mesh.faces):
-        return MeshCopy(mesh, mesh, vertex, face)
+    if not flat.any() and np.array_equal(faces, mesh.faces):
+        return MeshCopy(mesh, mesh, face, vertex)
     origin = np.zeros(3)
     if flat.any():
         # Far from the origin a small move would be lost to rounding.
@@ -270,7 +444,7 @@ def _with_areas(mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray) -
             still = _flat(vertices, faces, short)
             if not still.any():
                 break
-    return MeshCopy(mesh, Mesh(vertices, faces), vertex, face, origin)
+    return MeshCopy(mesh, Mesh(vertices, faces), face, place, origin)
 
 
 def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:

@@ -47,7 +47,7 @@ class SurfacePoints:
 
 
 def locate_control_points(
-    mesh: Mesh, control_points: ArrayLike | SurfacePoints, closed: bool
+    mesh: Mesh, control_points: ArrayLike | SurfacePoints, closed: bool, connected: bool = True
 ) -> SurfacePoints:
     """Bring any accepted form of control points to faces and barycentrics, and check them.
 
@@ -58,6 +58,8 @@ def locate_control_points(
         Vertex indices, points on the surface, or faces with barycentrics.
     closed : bool
         Whether a closed curve is wanted; it needs three points, an open one two.
+    connected : bool
+        Whether points on different components of the mesh are refused.
 
     Returns
     -------
@@ -73,10 +75,19 @@ def locate_control_points(
     """
     points = locate_points(mesh, control_points, "control_points")
     _check_count(len(points), closed)
-    names = [f"control_points[{index}]" for index in range(len(points))]
-    check_distinct(mesh, points, names)
-    check_one_component(mesh, points, names)
+    check_distinct(mesh, points, _names(points))
+    if connected:
+        check_connected(mesh, points)
     return points
+
+
+def _names(points: SurfacePoints) -> list[str]:
+    return [f"control_points[{index}]" for index in range(len(points))]
+
+
+def check_connected(mesh: Mesh, points: SurfacePoints) -> None:
+    """Refuse control points on different components."""
+    check_one_component(mesh, points, _names(points))
 
 
 def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> SurfacePoints:
@@ -309,6 +320,6 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[str]) -> 
     if other.any():
         raise UnreachableError(
             f"{names[0]} and {names[int(other.argmax())]} lie on different "
-            "components of the mesh, so no curve joins them; join the components or merge "
-            "vertices by distance"
+            "components of the mesh, so no curve joins them; join the components, or merge "
+            "vertices by distance where only hair-thin gaps part them"
         )

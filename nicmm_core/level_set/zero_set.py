@@ -38,7 +38,7 @@ class ZeroSet:
             return False
         curve = self.curves[0]
         polyline = SurfacePoints(curve.faces, curve.barycentric)
-        return not len(crossing_segments(mesh, polyline, closed))
+        return not len(crossing_segments(mesh.faces, polyline, closed))
 
 
 def zero_set(

@@ -271,7 +271,8 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
         if not holds.any():
             raise CurveError(
                 f"curve is not on this mesh: no face holds its points {point} and "
-                f"{int(following[point])}; pass the mesh that it was designed on"
+                f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
+                "there share no vertices, merge vertices by distance and design it again"
             )
         found[point] = candidates[holds.argmax()]
     return found

@@ -20,6 +20,9 @@ from ..surface_points import SurfacePoints, check_distinct, check_one_component,
 ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
 """From the index of a control point to the points on the way from there to the next one."""
 
+OFF_BOUNDARY = 0.2
+"""How far a via point on the boundary is drawn towards the middle of its face."""
+
 LocatedViaPoints = dict[int, SurfacePoints]
 """The same, checked and as faces and barycentrics."""
 
@@ -119,7 +122,21 @@ def with_via_points(
     together = SurfacePoints(np.concatenate(faces), np.concatenate(barycentric))
     check_distinct(mesh, together, names)
     check_one_component(mesh, together, names)
-    return Waypoints(together, np.array(is_control), names)
+    controls_only = np.array(is_control)
+    return Waypoints(_off_the_boundary(mesh, together, ~controls_only), controls_only, names)
+
+
+def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> SurfacePoints:
+    """Some of the points drawn into their faces where they are on the boundary.
+
+    A curve that only passes near them must not touch it.
+    """
+    on_rim = np.zeros(len(mesh.vertices), dtype=bool)
+    on_rim[mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]] = True
+    support = (points.barycentric > 0.0) & ~on_rim[mesh.faces[points.faces]]
+    drawn = (which & ~support.any(axis=1))[:, None]
+    inside = (1.0 - OFF_BOUNDARY) * points.barycentric + OFF_BOUNDARY / 3.0
+    return SurfacePoints(points.faces, np.where(drawn, inside, points.barycentric))
 
 
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:

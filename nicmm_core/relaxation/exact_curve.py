@@ -87,7 +87,7 @@ def without_short_segments(mesh: Mesh, curve: ExactCurve) -> SurfaceCurve:
     length = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     short = length < SHORT * float(curve.nodes.lengths.mean())
     kept = ~(inside & (short | np.roll(short, 1)))
-    if kept.all() or len(crossing_segments(mesh, polyline[kept], curve.closed)):
+    if kept.all() or len(crossing_segments(mesh.faces, polyline[kept], curve.closed)):
         return curve.surface_curve(mesh)
     at_controls = (np.cumsum(kept) - 1)[curve.node_place[curve.control_nodes]]
     polyline = polyline[kept]
@@ -207,7 +207,7 @@ def shifted(
 
 def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:
     """Whether the curve neither crosses nor touches itself."""
-    return not len(crossing_segments(surface.mesh, curve.polyline, curve.closed))
+    return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
 def drawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> ExactCurve | None:
@@ -265,7 +265,7 @@ def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[Exa
             nodes = nodes_at(surface, places, curve.closed)
         polyline, node_place, bad = _drawn(surface.mesh, curve, nodes, kept)
         if not bad.any():
-            pairs = crossing_segments(surface.mesh, polyline, curve.closed)
+            pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
         if not bad.any():
             return ExactCurve(nodes, curve.control_nodes, polyline, node_place), stays

@@ -24,7 +24,9 @@ def in_triangle(points):
 
 
 def pairs(mesh, polyline, closed):
-    return {tuple(sorted(pair)) for pair in crossing_segments(mesh, polyline, closed).tolist()}
+    return {
+        tuple(sorted(pair)) for pair in crossing_segments(mesh.faces, polyline, closed).tolist()
+    }
 
 
 def pairs_by_solving(points, closed):
@@ -55,7 +57,7 @@ def test_random_polylines_over_many_faces_against_brute_force(flat_disc, seed):
     corners = np.random.default_rng(seed).uniform(-0.6, 0.6, (7, 2))
     controls = np.arange(7)
     curve = curve_through(flat_disc, np.pad(corners, ((0, 0), (0, 1))), controls)
-    found = crossing_segments(flat_disc, SurfacePoints(curve.faces, curve.barycentric), True)
+    found = crossing_segments(flat_disc.faces, SurfacePoints(curve.faces, curve.barycentric), True)
     owner = np.searchsorted(curve.control_index, found, side="right") - 1
     assert sorted(map(tuple, np.sort(owner).tolist())) == sorted(pairs_by_solving(corners, True))
 
@@ -109,7 +111,7 @@ def test_neither_numbers_nor_orientation_matter(flat_disc, change):
     for mesh in (flat_disc, change(flat_disc, 4)):
         curve = curve_through(mesh, knot, [0])
         polyline = SurfacePoints(curve.faces, curve.barycentric)
-        counts.append(len(crossing_segments(mesh, polyline, True)))
+        counts.append(len(crossing_segments(mesh.faces, polyline, True)))
     # A Lissajous figure with frequencies 2 and 3, turned off the axis of the mesh.
     assert counts == [7, 7]
 

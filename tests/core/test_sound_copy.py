@@ -1,7 +1,5 @@
 """Meshes with every defect: a curve where one exists, on the user's own faces."""
 
-import itertools
-
 import numpy as np
 import pytest
 
@@ -11,16 +9,20 @@ from benchmarks.checker import judge
 from benchmarks.defects import defective_meshes
 from nicmm_core import shapes, surface_designer
 from nicmm_core.mesh import unique_edges
-from nicmm_core.sound_copy import FLAT, sound_copy
+from nicmm_core.sound_copy import FLAT, SOUND_COPIES, sound_copy, welded_vertices
 from nicmm_core.surface_points import locate_points
 from tests.core.checks import grid, joined
 
 MESHES = dict(defective_meshes())
 
 
+JOINED = {"duplicate faces": [0], "soup": [0, 2], "seam": [0, 2]}
+"""Copies that there are where it is not the first, and the second if edges have more faces."""
+
+
 def copies_of(mesh):
-    made = (sound_copy(mesh, number) for number in itertools.count())
-    return list(itertools.takewhile(lambda copy: copy is not None, made))
+    made = (sound_copy(mesh, number) for number in range(SOUND_COPIES))
+    return [copy for copy in made if copy is not None]
 
 
 def first_copy(mesh):
@@ -41,6 +43,10 @@ class TestWhatIsDue:
         mesh = MESHES["components"]
         assert "different parts" in corpus.not_possible(mesh, np.array([0, len(mesh.vertices) - 1]))
         assert corpus.not_possible(mesh, np.array([0, 1, 2])) == ""
+
+    def test_triangles_that_share_no_vertices_are_joined_by_their_places(self):
+        assert len(np.unique(corpus.edge_connected_parts(MESHES["soup"]))) == 1
+        assert len(np.unique(corpus.edge_connected_parts(MESHES["touching boxes"]))) == 2
 
     def test_one_common_vertex_joins_nothing(self):
         mesh = MESHES["hour glass"]
@@ -73,15 +79,17 @@ def test_meshes_without_defects_are_their_own_copy(mesh):
 @pytest.mark.parametrize("name", MESHES)
 def test_copies_keep_faces_and_have_no_defects(name):
     mesh = MESHES[name]
+    copies = [sound_copy(mesh, number) for number in range(SOUND_COPIES)]
+    there = [number for number, copy in enumerate(copies) if copy is not None]
+    assert there == JOINED.get(name, [0, 1] if mesh.branches else [0])
     for copy in copies_of(mesh):
-        np.testing.assert_array_equal(copy.vertex[copy.mesh.faces], mesh.faces[copy.face])
-        np.testing.assert_array_equal(
-            copy.vertex[: len(mesh.vertices)], np.arange(len(mesh.vertices))
-        )
+        corners = copy.mesh.faces.ravel()
+        there = mesh.vertices[mesh.faces[copy.face].ravel()]
+        np.testing.assert_array_equal(mesh.vertices[copy.place[corners]], there)
         assert (unique_edges(copy.mesh.faces)[1] <= 2).all()
         assert (copy.mesh.face_areas > 0.0).all()
-        moved = (copy.mesh.vertices - mesh.vertices[copy.vertex])[np.unique(copy.mesh.faces)]
-        assert np.ptp(moved, axis=0).max() <= 2e-3 * mesh.mean_edge_length
+        moved = copy.mesh.vertices[corners] + copy.origin - there
+        assert np.abs(moved).max() <= 2e-3 * mesh.mean_edge_length + 1e-9
 
 
 def test_only_vertices_of_faces_without_area_move():
@@ -192,3 +200,102 @@ def test_sizes_beyond_all_numbers_are_refused(factor):
     ball = shapes.sphere(1)
     with pytest.raises(nicmm.MeshError, match="scale"):
         nicmm.Mesh(factor * ball.vertices, ball.faces)
+
+
+class TestOpenEdgesAtOnePlace:
+    """Where nothing else joins control points."""
+
+    @pytest.fixture
+    def soup(self, ball):
+        return nicmm.Mesh(
+            ball.vertices[ball.faces].reshape(-1, 3), np.arange(ball.faces.size).reshape(-1, 3)
+        )
+
+    @pytest.mark.parametrize("method", ["nicmm", "variational"])
+    def test_a_soup_has_the_curve_of_the_surface_that_it_is(self, ball, soup, method):
+        faces = np.array([3, 100, 400, 900])
+        points = nicmm.SurfacePoints(faces, np.tile([0.2, 0.3, 0.5], (4, 1)))
+        weights = (ball.vertices[:, 2] > 0.95).astype(float)
+        of_corners = np.zeros(len(soup.vertices))
+        # One corner of all that are at a place is enough.
+        of_corners[np.unique(ball.faces, return_index=True)[1]] = weights
+        one, other = (
+            nicmm.design_curve(mesh, points, order="shortest", obstacles=obstacles, method=method)
+            for mesh, obstacles in ((ball, weights), (soup, of_corners))
+        )
+        assert not judge(soup, other, points, order="shortest").faults
+        assert abs(one.curves[0].length - other.curves[0].length) < 0.02 * one.curves[0].length
+        np.testing.assert_allclose(
+            np.abs(other.field), np.abs(one.field)[ball.faces.ravel()], atol=0.1
+        )
+
+    def test_what_is_joined_anyway_is_not_welded(self):
+        mesh = MESHES["seam"]
+        upper = np.unique(mesh.faces[mesh.faces[:, 0] >= len(mesh.vertices) // 2])
+        designer = nicmm.Designer(mesh)
+        designer.design(upper[[0, 50, 100]])
+        assert len(designer._designers) == 1
+
+    def test_closed_surfaces_that_touch_stay_apart(self):
+        """Two boxes with a side in common, and every vertex there twice."""
+        mesh = MESHES["touching boxes"]
+        assert (welded_vertices(mesh) == np.arange(len(mesh.vertices))).all()
+        with pytest.raises(nicmm.UnreachableError, match="different components"):
+            nicmm.design_curve(mesh, [0, 5, len(mesh.vertices) - 1])
+
+    def test_two_zeros_are_one_place(self):
+        sheet = grid(2)
+        half = sheet.vertices * [-1.0, 1.0, 1.0]
+        mesh = joined(sheet, nicmm.Mesh(half, sheet.faces))
+        n = len(sheet.vertices)
+        far = int(sheet.vertices.sum(axis=1).argmax())
+        design = nicmm.design_curve(mesh, [far, far + n], closed=False)
+        assert not judge(mesh, design, [far, far + n], closed=False).faults
+
+    def test_three_sheets_that_share_no_vertices(self):
+        mesh = MESHES["three sheets along an edge"]
+        soup = nicmm.Mesh(
+            mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(mesh.faces.size).reshape(-1, 3)
+        )
+        corners = mesh.faces.ravel()
+        ends = np.array([np.flatnonzero(corners == v)[0] for v in (40, 120, 200)])
+        design = nicmm.design_curve(soup, ends, closed=False, order="shortest")
+        assert not judge(soup, design, ends, closed=False, order="shortest").faults
+
+    def test_a_gap_is_named_as_what_it_is(self, soup):
+        vertices = soup.vertices + np.repeat(np.linspace(0.0, 1e-3, len(soup.faces)), 3)[:, None]
+        with pytest.raises(nicmm.UnreachableError, match="merge vertices by distance"):
+            nicmm.design_curve(nicmm.Mesh(vertices, soup.faces), [3, 100, 400])
+
+    def test_cutting_a_soup_says_what_mends_it(self, soup):
+        curve = nicmm.design_curve(soup, [3, 100, 400]).curves[0]
+        with pytest.raises(nicmm.CurveError, match="merge vertices by distance"):
+            nicmm.cut_mesh(soup, curve)
+
+
+class TestJoinedFromPointToPoint:
+    """Where neither going straight on nor linking all parts joins the points."""
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_octants_about_one_vertex(self, seed):
+        """Every edge at it has four faces, and each curve needs other pairs of them."""
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        vertices = np.concatenate([np.zeros((1, 3)), axes])
+        pairs = [(a, b) for a in range(1, 7) for b in range(a + 1, 7) if b != a + 3]
+        mesh = nicmm.Mesh(vertices, [[0, a, b] for a, b in pairs])
+        assert mesh.branches
+        chosen = np.random.default_rng(seed).choice(np.arange(1, 7), 3, replace=False)
+        design = nicmm.design_curve(mesh, chosen, order="shortest", closed=False)
+        assert not judge(mesh, design, chosen, closed=False, order="shortest").faults
+
+    def test_another_request_gets_another_joining(self):
+        mesh = nicmm.Mesh(
+            [[0, 0, -0.5], [0, 0, 0.5], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]],
+            [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 5]],
+        )
+        designer = nicmm.Designer(mesh)
+        for ends in ([2, 4], [3, 5], [4, 2], [2, 3], [4, 3]):
+            design = designer.design(ends, closed=False)
+            assert not judge(mesh, design, ends, closed=False).faults
+        with pytest.raises(nicmm.UnreachableError, match="single vertices or edges"):
+            designer.design([2, 3, 4])

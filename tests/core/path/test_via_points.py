@@ -6,6 +6,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core.__main__ import main
 from nicmm_core.files import read_mesh, write_mesh
+from nicmm_core.path import legs
 from nicmm_core.path.initial_loop import build_initial_loop
 from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_design, circle, joined, nearest_vertices
@@ -73,12 +74,22 @@ class TestWhichWay:
             loop = build_initial_loop(small_ball, points, "given", via_points=nothing)[1]
             np.testing.assert_array_equal(loop.vertices, plain.vertices)
 
-    def test_impossible_ones_are_named_and_left_out_in_the_advice(self, flat_disc):
-        """Each via point is beyond the line that joins the other two points of the rim."""
+    @pytest.mark.parametrize("closed", [True, False])
+    def test_on_the_boundary_they_steer_and_the_curve_keeps_off_it(self, flat_disc, closed):
+        """The via point is beyond the line that joins the other two points of the rim."""
         rim = nearest_vertices(flat_disc, circle(np.pi / 3 * np.arange(6)))
-        points = locate_control_points(flat_disc, rim[[0, 2, 4]], closed=True)
+        found = design(flat_disc, rim[[0, 2, 4]], closed=closed, via_points={0: rim[[3]]})
+        assert_valid_design(flat_disc, found, flat_disc.vertices[rim[[0, 2, 4]]], closed)
+        plain = design(flat_disc, rim[[0, 2, 4]], closed=closed)
+        assert found.curves[0].length > (1.0 if closed else 1.2) * plain.curves[0].length
+
+    def test_impossible_ones_are_named_and_left_out_in_the_advice(self, ball, monkeypatch):
+        """Through many points to and fro the path winds more often than it may."""
+        monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
+        chosen = np.random.default_rng(0).choice(len(ball.vertices), 40, replace=False)
+        points = locate_control_points(ball, chosen[:3], closed=True)
         with pytest.raises(nicmm.UnreachableError, match=r"without via points.*\[0, 1, 2\]"):
-            build_initial_loop(flat_disc, points, "given", via_points={0: rim[[3]]})
+            build_initial_loop(ball, points, "given", via_points={0: chosen[3:]})
 
 
 BAD = {

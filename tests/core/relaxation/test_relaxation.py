@@ -309,7 +309,7 @@ def test_strands_that_would_cross_stay_apart(flat_disc):
     start = bow(flat_disc)
     polyline = straight_bow(flat_disc)
     pairs = crossing_segments(
-        flat_disc, SurfacePoints(polyline.faces, polyline.barycentric), closed=True
+        flat_disc.faces, SurfacePoints(polyline.faces, polyline.barycentric), closed=True
     )
     assert len(pairs) > 0
     result, seen = states(flat_disc, start)
