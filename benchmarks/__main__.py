@@ -28,6 +28,7 @@ MEASUREMENTS = (
     "runtime",
     "dragging",
     "stages",
+    "cancellation",
     "obstacles",
     "lanes",
     "peers",

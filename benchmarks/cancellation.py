@@ -1,0 +1,126 @@
+"""How soon a design stops that the caller wants no more: the time between two questions."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import igl
+import numpy as np
+
+import nicmm_core as nicmm
+from nicmm_core import progress, shapes
+from nicmm_core.array_types import FloatArray, IntArray
+
+from . import report
+from .defects import defective_meshes
+from .scale import Scale
+
+SEED = 0
+
+LONG = 0.1
+"""Seconds between two questions from which they are counted."""
+
+
+@dataclass
+class Gaps:
+    """Seconds of CPU time from one question to the next, and where each was asked."""
+
+    seconds: list[float] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)
+    fractions: list[float] = field(default_factory=list)
+
+    def __call__(self, done: float, _: FloatArray) -> None:
+        """Be asked whether to go on."""
+        self.note(_asking())
+        self.fractions.append(done)
+
+    def note(self, place: str) -> None:
+        """A moment."""
+        self.seconds.append(time.thread_time())
+        self.places.append(place)
+
+    @property
+    def longest(self) -> tuple[float, str]:
+        """The longest time and where it began and ended."""
+        gaps = np.diff(self.seconds)
+        place = int(gaps.argmax())
+        return float(gaps[place]), f"{self.places[place]} to {self.places[place + 1]}"
+
+
+def run(scale: Scale) -> None:
+    """Design on large and on bad meshes, and note every question."""
+    rows = []
+    for name, mesh, points, arguments in _requests(scale):
+        gaps = Gaps()
+        with _always_asked():
+            gaps.note("start")
+            design = nicmm.Designer(mesh).design(points, progress=gaps, **arguments)
+            gaps.note("end")
+        longest, where = gaps.longest
+        total = gaps.seconds[-1] - gaps.seconds[0]
+        backwards = int((np.diff(gaps.fractions) < 0.0).sum())
+        counted = int((np.diff(gaps.seconds) > LONG).sum())
+        rows.append(
+            (name, len(mesh.faces), design.status.name.lower(), f"{total:.1f}",
+             len(gaps.fractions), counted, f"{longest:.2f}", where, backwards)
+        )  # fmt: skip
+    header = (
+        "mesh", "faces", "status", "seconds", "questions", f"longer than {LONG:g} s apart",
+        "longest, s", "from … to", "fractions that fell",
+    )  # fmt: skip
+    body = (
+        f"Seed {SEED}. CPU time between two places where a design asks whether to go on; the "
+        f"progress function itself is called at most every {progress.INTERVAL:g} s. Times beyond "
+        "that are single calls of NumPy, SciPy or libigl on arrays of the size of the mesh.\n\n"
+        + report.table(header, rows)
+    )
+    report.write_section("cancellation", "Cancelling", body, scale)
+
+
+@contextmanager
+def _always_asked() -> Iterator[None]:
+    """Call progress functions at every question."""
+    interval = progress.INTERVAL
+    progress.INTERVAL = 0.0
+    try:
+        yield
+    finally:
+        progress.INTERVAL = interval
+
+
+def _asking() -> str:
+    """The module of the core that asks."""
+    frame = sys._getframe(2)
+    while frame.f_back is not None:
+        name = str(frame.f_globals["__name__"])
+        if name.startswith("nicmm_core") and name != "nicmm_core.progress":
+            return f"`{name.removeprefix('nicmm_core.')}`"
+        frame = frame.f_back
+    raise AssertionError("nobody but the core asks")
+
+
+def _requests(
+    scale: Scale,
+) -> Iterator[tuple[str, nicmm.Mesh, IntArray, dict[str, object]]]:
+    """Name, mesh, points and arguments."""
+    creature = shapes.creature(1, faces=1_300, subdivisions=0)
+    for subdivisions in range(scale.choose(2, 2, 1), scale.choose(6, 4, 2)):
+        mesh = nicmm.Mesh(*igl.loop(creature.vertices, creature.faces, subdivisions))
+        yield f"{subdivisions} Loop subdivisions", mesh, _drawn(mesh, 5), {"order": "shortest"}
+    ball = shapes.sphere(scale.choose(6, 5, 3))
+    needles = nicmm.Mesh(ball.vertices * [1.0, 1.0, 1e-7], ball.faces)
+    yield "needles", needles, _drawn(needles, 5), {"order": "shortest"}
+    fins = dict(defective_meshes())["fins"]
+    yield "fins", fins, _drawn(fins, 5), {"order": "shortest"}
+    ball = shapes.sphere(scale.choose(4, 4, 3))
+    many = scale.choose(30, 20, 8)
+    yield f"{many} points to and fro", ball, _drawn(ball, many), {}
+    yield "variational", ball, _drawn(ball, 5), {"order": "shortest", "method": "variational"}
+
+
+def _drawn(mesh: nicmm.Mesh, count: int) -> IntArray:
+    return np.random.default_rng(SEED).choice(len(mesh.vertices), count, replace=False)
