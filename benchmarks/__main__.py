@@ -30,6 +30,7 @@ MEASUREMENTS = (
     "stages",
     "obstacles",
     "lanes",
+    "sharp_edges",
     "peers",
     "degraded",
     "resolution",
