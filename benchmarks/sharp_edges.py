@@ -42,16 +42,16 @@ MECHANICAL = (0.02, 0.2)
 
 FEWEST_VERTICES = 2000
 
-LINES = 4
+LINES = 3
 """Lines of a mesh."""
 
 
 def run(scale: Scale) -> None:
     """Open curves beside lines of sharp edges, without and with the map."""
     generator = np.random.default_rng(SEED)
-    groups = [("generated", cad_shapes(generator, scale.choose(16, 8, 2)))]
+    groups = [("generated", cad_shapes(generator, scale.choose(12, 8, 2)))]
     if scale is not Scale.SMOKE:
-        groups.append(("third-party", _mechanical(scale.choose(100, 12))))
+        groups.append(("third-party", _mechanical(scale.choose(40, 12))))
     rows = []
     for label, meshes in groups:
         before, after, faults = [], [], 0
