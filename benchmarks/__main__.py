@@ -22,6 +22,7 @@ MEASUREMENTS = (
     "pretrained_start",
     "convergence",
     "ablation",
+    "ninth_channel",
     "parameters",
     "initial",
     "curvature",
