@@ -66,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
     pretrain.add_argument("--sets", type=int, default=1000, help="sets of control points in all")
     pretrain.add_argument("--epochs", type=int, default=10)
     pretrain.add_argument("--seed", type=int, default=0)
+    pretrain.add_argument(
+        "--maps", type=float, default=0.0, metavar="SHARE", help="share of sets with maps"
+    )
     pretrain.add_argument("--no-attention", action="store_true", help="ablation: without ECA")
     pretrain.add_argument("--no-gating", action="store_true", help="ablation: without Light GLU")
     pretrain.set_defaults(run=_pretrain)
@@ -130,7 +133,9 @@ def _pretrain(options: argparse.Namespace) -> None:
         [read_mesh(path) for path in options.meshes],
         options.output,
         NetworkConfig(attention=not options.no_attention, gating=not options.no_gating),
-        PretrainingConfig(sets=options.sets, epochs=options.epochs, seed=options.seed),
+        PretrainingConfig(
+            sets=options.sets, epochs=options.epochs, map_share=options.maps, seed=options.seed
+        ),
         progress=report,
     )
 

@@ -31,7 +31,7 @@ from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.exact_curve import ExactCurve, exact_curve
-from .relaxation.relaxing import RelaxationConfig, relax
+from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import WARM, moved_along, part_of_the_way
 from .request import Request, same_course, same_request
 
@@ -232,7 +232,8 @@ class SurfaceDesigner:
                     breaking=zeros.breaking_vertices,
                 )
         with part(STARTED, 1.0):
-            return self._relaxed(request, start, RelaxationConfig(), started)
+            config = GUIDED if request.has_maps else RelaxationConfig()
+            return self._relaxed(request, start, config, started)
 
     def _start_from_last(self, request: Request) -> _Start | None:
         """The last curve with its control points moved; None where the request is too different."""

@@ -17,7 +17,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from ..array_types import FloatArray, IntArray
 from ..errors import ArgumentError, UnreachableError
+from ..level_set.features import BASE_CHANNELS
 from ..level_set.losses import EnergySurface, LossWeights, balanced, loss_terms, total_loss
 from ..level_set.problem import Problem, build_problem
 from ..mesh import Mesh
@@ -32,6 +34,7 @@ from .forward_pass import (
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .trainable_network import CurveNetwork, network_weights
+from .training_maps import random_maps
 from .weights_file import save_weights
 
 GRADIENT_LIMIT = 1.0
@@ -52,6 +55,9 @@ class PretrainingConfig:
         Share of sets that are asked for as open curves.
     given_share : float
         Share of sets whose closed curve visits the points in the order drawn, not the shortest.
+    map_share : float
+        Share of sets with obstacles or lanes. With any, the network has the ninth channel φ_fea,
+        which is neutral in the other sets.
     batch : int
         Sets to a step.
     epochs : int
@@ -66,6 +72,7 @@ class PretrainingConfig:
     most_points: int = 5
     open_share: float = 0.35
     given_share: float = 0.15
+    map_share: float = 0.0
     batch: int = 4
     epochs: int = 10
     learning_rate: float = 0.01
@@ -121,11 +128,14 @@ def pretrain(
             f"open_share and given_share are {shares[0]} and {shares[1]}; they are shares of all "
             "sets, so neither may be negative nor both together more than 1"
         )
+    if not 0.0 <= config.map_share <= 1.0:
+        raise ArgumentError(f"map_share is {config.map_share}; it is a share of all sets, 0 … 1")
     if not Path(output).resolve().parent.is_dir():
         raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     torch.manual_seed(config.seed)
-    network = CurveNetwork(network_config or NetworkConfig()).to(device)
+    channels = BASE_CHANNELS + (config.map_share > 0.0)
+    network = CurveNetwork(network_config or NetworkConfig(), channels).to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
     checkpoint = Path(output).with_suffix(".checkpoint.pt")
     configuration = repr((network.config, config, weights, _fingerprint(meshes)))
@@ -268,8 +278,9 @@ def _random_problems(
             chosen = generator.choice(vertices, size=count, replace=False)
             closed, order = _kind(generator.random(), config)
             points = locate_control_points(mesh, chosen, closed)
+            obstacles, alignment = _maps(mesh, chosen, config, generator)
             try:
-                problem = build_problem(mesh, points, order, closed=closed)
+                problem = build_problem(mesh, points, order, obstacles, alignment, closed=closed)
             except UnreachableError:
                 continue
             found += 1
@@ -281,6 +292,18 @@ def _random_problems(
                 f"meshes[{number}]: only {found} of {wanted} random sets of points have a path "
                 "through them; leave the mesh out or use a finer one"
             )
+
+
+def _maps(
+    mesh: Mesh, points: IntArray, config: PretrainingConfig, generator: np.random.Generator
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Obstacles and alignment of a set; none at all where the network is not to see any."""
+    if config.map_share == 0.0:
+        return None, None
+    if generator.random() < config.map_share:
+        return random_maps(mesh, points, generator)
+    nothing = np.zeros(len(mesh.vertices))
+    return nothing, nothing
 
 
 TRIES_PER_SET = 10

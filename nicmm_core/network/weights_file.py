@@ -23,6 +23,9 @@ from .forward_pass import NetworkConfig, NetworkWeights, parameter_shapes
 SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
 """Weights that come with the package; `docs/pretraining.md` names the command that made them."""
 
+SHIPPED_WITH_MAPS = SHIPPED.with_name("nicmm-maps.npz")
+"""Those of the network that sees φ_fea in the ninth channel."""
+
 LARGEST = 2**28
 """Bytes of all arrays of a file; a small archive may hold any amount of zeros."""
 
@@ -37,9 +40,8 @@ def save_weights(path: str | Path, weights: NetworkWeights) -> None:
 def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> NetworkWeights:
     """Read the weights of a network for a number of input channels, as NumPy arrays.
 
-    The weights are stored for the eight base channels. A ninth one, φ_fea, starts with zero
-    weight, so the same weights serve with and without maps. Settings that a file does not name
-    have their defaults.
+    Where a file has weights for the eight base channels only, a ninth one, φ_fea, starts with zero
+    weight. Settings that a file does not name have their defaults.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
 @cache
 def shipped_weights(channels: int) -> NetworkWeights:
     """The weights that come with the package, read once; nobody may change them."""
-    return load_weights(SHIPPED, channels)
+    return load_weights(SHIPPED if channels == BASE_CHANNELS else SHIPPED_WITH_MAPS, channels)
 
 
 # What a missing file, another kind of file and weights of another network raise.

@@ -92,6 +92,12 @@ class RelaxationConfig:
     drawn_iterations: int = 100
 
 
+GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2)
+"""Where a map guides: a lane has to be found while nodes are few, since many hardly move.
+
+Few nodes take long steps along the surface, and they do so until they rest.
+"""
+
 DAMPING_NODES = 128
 """Number of nodes that the damping is given for."""
 

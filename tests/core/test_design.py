@@ -6,6 +6,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import igl
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -583,3 +584,31 @@ def test_without_torch_only_the_method_of_the_paper_says_what_to_install():
     )
     assert result.returncode == 0, result.stderr + result.stdout
     assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_a_changed_map_gives_the_curve_that_a_new_designer_finds(ball, parallel):
+    """The path may have to go elsewhere, so the last curve is no start; the same map goes on."""
+    designer = nicmm.Designer(ball)
+    for height in (0.3, 0.5, None):
+        lane = None
+        if height is not None:
+            lane = (np.abs(ball.vertices[:, 2] - height) < 0.06).astype(float)
+        again = designer.design(parallel, alignment=lane).curves[0]
+        anew = nicmm.design_curve(ball, parallel, alignment=lane).curves[0]
+        np.testing.assert_array_equal(again.points, anew.points)
+
+
+@pytest.mark.parametrize(
+    ("method", "finer", "most"), [("nicmm", 0, 0.03), ("nicmm", 1, 0.03), ("variational", 0, 0.06)]
+)
+def test_a_lane_beside_a_straight_way_is_followed(flat_disc, method, finer, most):
+    """Over its middle, on the disc and on one twice as fine."""
+    mesh = nicmm.Mesh(*igl.upsample(flat_disc.vertices, flat_disc.faces, finer))
+    x, y, _ = mesh.vertices.T
+    lane = ((np.abs(y - 0.12) < 0.09) & (np.abs(x) < 0.45)).astype(float)
+    ends = nearest_vertices(mesh, np.array([[-0.8, 0.0, 0.0], [0.8, 0.0, 0.0]]))
+    design = nicmm.design_curve(mesh, ends, closed=False, method=method, alignment=lane)
+    assert_valid_design(mesh, design, mesh.vertices[ends], closed=False)
+    points = design.curves[0].points
+    middle = np.abs(points[:, 0]) < 0.3
+    assert np.abs(points[middle, 1] - 0.12).mean() < most

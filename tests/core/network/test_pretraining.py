@@ -185,8 +185,8 @@ def prepared(monkeypatch):
     asked = []
     build = pretraining.build_problem
 
-    def recorded(mesh, points, order, *, closed):
-        problem = build(mesh, points, order, closed=closed)
+    def recorded(mesh, points, order, *maps, closed):
+        problem = build(mesh, points, order, *maps, closed=closed)
         asked.append((closed, order, problem))
         return problem
 
@@ -285,3 +285,22 @@ def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
 def test_impossible_settings_are_refused_by_name(meshes, tmp_path, change, named):
     with pytest.raises(nicmm.ArgumentError, match=named):
         train(meshes, tmp_path / "weights.npz", replace(SETTINGS, **change))
+
+
+def test_sets_with_maps_train_the_ninth_channel(meshes, tmp_path, prepared):
+    """Also in sets without one, where φ_fea is neutral."""
+    settings = replace(SETTINGS, sets=12, epochs=1, map_share=0.5)
+    train(meshes, tmp_path / "weights.npz", settings)
+    weights = load_weights(tmp_path / "weights.npz", channels=9).parameters
+    assert np.abs(weights["stem.weight"][:, 8]).max() > 0.0
+    maps = [problem.feature_map for _, _, problem in prepared]
+    neutral = sum((one == 1.0).all() for one in maps)
+    assert 2 <= neutral <= 10
+    assert min(one.min() for one in maps) < 0.8
+    assert max(one.max() for one in maps) > 1.5
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1])
+def test_shares_of_maps_beyond_all_are_refused(meshes, tmp_path, share):
+    with pytest.raises(nicmm.ArgumentError, match="map_share"):
+        train(meshes, tmp_path / "weights.npz", replace(SETTINGS, map_share=share))

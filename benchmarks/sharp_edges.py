@@ -1,0 +1,198 @@
+"""Curves beside sharp edges with an automatic map: whether they run along the edge."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+import nicmm_core as nicmm
+from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.curve import SurfaceCurve
+from nicmm_core.level_set.redistancing import distance_to_segments
+from nicmm_core.mesh import Mesh
+from nicmm_core.relaxation.face_walks import moved
+from nicmm_core.surface_points import SurfacePoints
+
+from . import collections, report
+from .cad_shapes import cad_shapes
+from .checker import judge_curve
+from .scale import Scale
+
+SEED = 6
+
+OFFSET = 0.03
+"""Distance of the control points from the edge on the surface, in diagonals."""
+
+LEAST_LENGTH, MOST_LENGTH = 0.25, 0.6
+"""Of a line of sharp edges, in diagonals."""
+
+STRAIGHT = 0.8
+"""Cosine of the greatest angle between two edges of one line."""
+
+CLOSE = 0.5
+"""The middle part of a line, along which the curve has had the room to come to it."""
+
+WANTED = 0.25
+"""Distance from the edge that counts as on it, in edge lengths."""
+
+MECHANICAL = (0.02, 0.2)
+"""Shares of vertices on sharp edges between which a third-party mesh is taken as CAD-like."""
+
+FEWEST_VERTICES = 2000
+
+LINES = 3
+"""Lines of a mesh."""
+
+
+def run(scale: Scale) -> None:
+    """Open curves beside lines of sharp edges, without and with the map."""
+    generator = np.random.default_rng(SEED)
+    groups = [("generated", cad_shapes(generator, scale.choose(12, 8, 2)))]
+    if scale is not Scale.SMOKE:
+        groups.append(("third-party", _mechanical(scale.choose(40, 12))))
+    rows = []
+    for label, meshes in groups:
+        before, after, faults = [], [], 0
+        for name, mesh in meshes:
+            weights = nicmm.sharp_edge_map(mesh)
+            for line, points in itertools.islice(_lines(mesh, generator), LINES):
+                try:
+                    free = nicmm.design_curve(mesh, points, closed=False)
+                    led = nicmm.design_curve(mesh, points, closed=False, alignment=weights)
+                except nicmm.NicmmError as error:
+                    print(f"  {name}: {error}", flush=True)
+                    continue
+                pair = [_distance(mesh, line, design.curves[0]) for design in (free, led)]
+                before.append(pair[0])
+                after.append(pair[1])
+                where = points.positions(mesh)
+                faults += bool(judge_curve(mesh, led.curves[0], where, closed=False).faults)
+                print(f"  {name}: {pair[0]:.2f} -> {pair[1]:.2f} edges", flush=True)
+        if after:
+            on_edge = np.mean(np.array(after) <= WANTED)
+            rows.append(
+                (
+                    label,
+                    len(after),
+                    f"{np.median(before):.2f}",
+                    *(f"{value:.2f}" for value in np.quantile(after, [0.5, 0.75, 0.9])),
+                    f"{on_edge:.0%}",
+                    f"{len(after) - faults} of {len(after)}",
+                )
+            )
+    if not rows:
+        raise SystemExit("No mesh has a line of sharp edges with room beside it")
+    header = (
+        "meshes", "lines", "free curve", "with the map: median", "75 %", "90 %",
+        f"within {WANTED:g} edges", "simple, through its points",
+    )  # fmt: skip
+    body = (
+        f"Seed {SEED}; up to {LINES} lines of sharp edges a mesh, {LEAST_LENGTH:g} to "
+        f"{MOST_LENGTH:g} diagonals long. An open curve joins two points beside the ends of a "
+        f"line, {OFFSET:.0%} of the diagonal away from it on one side; the map is "
+        "`sharp_edge_map(mesh)`. Mean distance of the middle half of the line to the curve, in "
+        "mean edge lengths of the line. Third-party meshes are those of which 2 to 20 % of the "
+        "vertices are on sharp edges.\n\n" + report.table(header, rows)
+    )
+    report.write_section("sharp_edges", "Sharp edges to follow", body, scale)
+
+
+def _mechanical(count: int) -> Iterator[tuple[str, Mesh]]:
+    """Closed third-party meshes with some sharp edges and many others."""
+    low, high = MECHANICAL
+    for name, mesh in collections.clean(count):
+        share = nicmm.sharp_edge_map(mesh).mean()
+        if len(mesh.vertices) >= FEWEST_VERTICES and low <= share <= high:
+            yield name, mesh
+
+
+def _lines(
+    mesh: Mesh, generator: np.random.Generator
+) -> Iterator[tuple[FloatArray, SurfacePoints]]:
+    """Lines of sharp edges, (n, 3), each with a point beside either end, on the left of it."""
+    edges = nicmm.sharp_edges(mesh)
+    if not len(edges):
+        return
+    around: dict[int, list[int]] = {}
+    for a, b in edges.tolist():
+        around.setdefault(a, []).append(b)
+        around.setdefault(b, []).append(a)
+    sides = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    left = {(a, b): place // 3 for place, (a, b) in enumerate(sides.tolist())}
+    used: set[int] = set()
+    everything = mesh.vertices[edges]
+    for place in generator.permutation(len(edges)).tolist():
+        a, b = edges[place].tolist()
+        if a in used or b in used:
+            continue
+        line = _followed(mesh, around, a, b)
+        used.update(line)
+        positions = mesh.vertices[line]
+        length = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+        if len(line) < 6 or not LEAST_LENGTH * mesh.diagonal <= length:
+            continue
+        points = _beside(mesh, left, np.array(line))
+        if points is None:
+            continue
+        # Another edge may be nearer: then it is not clear which one is to be followed.
+        others = everything[~np.isin(edges, line).all(axis=1)]
+        if len(others):
+            start, end = others.transpose(1, 0, 2)
+            away = [
+                distance_to_segments(np.broadcast_to(point, start.shape), start, end).min()
+                for point in np.concatenate([points.positions(mesh), positions[2:-2]])
+            ]
+            if min(away) < OFFSET * mesh.diagonal:
+                continue
+        yield positions, points
+
+
+def _followed(mesh: Mesh, around: dict[int, list[int]], a: int, b: int) -> list[int]:
+    """The line that an edge is part of, as far as it is smooth and not longer than allowed."""
+    line = [a, b]
+    for _ in range(2):
+        while len(around[line[-1]]) == 2:
+            (onward,) = (v for v in around[line[-1]] if v != line[-2])
+            before, after = np.diff(mesh.vertices[[line[-2], line[-1], onward]], axis=0)
+            cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
+            steps = np.diff(mesh.vertices[line], axis=0)
+            too_long = np.linalg.norm(steps, axis=1).sum() > MOST_LENGTH * mesh.diagonal
+            if onward in line or cosine < STRAIGHT or too_long:
+                break
+            line.append(onward)
+        line.reverse()
+    return line
+
+
+def _beside(mesh: Mesh, left: dict[tuple[int, int], int], line: IntArray) -> SurfacePoints | None:
+    """Points on the left of the line's ends; None where the surface ends before."""
+    faces, barycentric, across = [], [], []
+    for a, b in (line[1:3], line[-3:-1]):
+        face = left.get((int(a), int(b)))
+        if face is None:
+            return None
+        weights = np.where(np.isin(mesh.faces[face], (a, b)), 0.495, 0.01)
+        along = mesh.vertices[b] - mesh.vertices[a]
+        faces.append(face)
+        barycentric.append(weights)
+        across.append(np.cross(mesh.face_normals[face], along / np.linalg.norm(along)))
+    start = SurfacePoints(np.array(faces), np.array(barycentric))
+    length = np.full(2, OFFSET * mesh.diagonal)
+    points, stuck = moved(mesh, start, np.array(across), length)
+    return None if stuck.any() else points
+
+
+def _distance(mesh: Mesh, line: FloatArray, curve: SurfaceCurve) -> float:
+    """Mean distance of the middle of a line to a curve, in edge lengths of the line."""
+    lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(lengths)])
+    share = np.linspace(0.5 - 0.5 * CLOSE, 0.5 + 0.5 * CLOSE, 64) * arc[-1]
+    samples = np.stack([np.interp(share, arc, line[:, axis]) for axis in range(3)], axis=1)
+    start, end = curve.points[:-1], curve.points[1:]
+    distance = [
+        distance_to_segments(np.broadcast_to(point, start.shape), start, end).min()
+        for point in samples
+    ]
+    return float(np.mean(distance) / lengths.mean())

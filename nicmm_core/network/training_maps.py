@@ -1,0 +1,79 @@
+"""Random obstacles and lanes for pretraining: what people paint beside and across curves."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..array_types import FloatArray, IntArray
+from ..mesh import Mesh
+
+BESIDE = 0.12
+"""Farthest that the ends of a lane lie from the way between two control points, in √area."""
+
+PART = (0.2, 0.8)
+"""The part of that way that a lane runs along."""
+
+RADII = (0.02, 0.07)
+"""Of obstacles, in √area."""
+
+WEIGHTS = (0.4, 1.0)
+
+MOST_STROKES = 3
+
+
+def random_maps(
+    mesh: Mesh, points: IntArray, generator: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Weights of obstacles and of alignment, (V,) both, from one to three strokes.
+
+    A stroke belongs to the way along edges between two of the control points: a lane from beside
+    its one end to beside its other, or an obstacle round a vertex of it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    points : (k,) int array
+        Vertices of one component, the control points.
+    generator : Generator
+    """
+    size = len(mesh.vertices)
+    start, end = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[start] - mesh.vertices[end], axis=1)
+    graph = sparse.csr_array((length, (start, end)), shape=(size, size))
+    component = mesh.face_component == mesh.face_component[mesh.faces_at(points[:1])[0]]
+    unit = float(np.sqrt(mesh.face_areas[component].sum()))
+    obstacles, alignment = np.zeros(size), np.zeros(size)
+    for _ in range(generator.integers(1, MOST_STROKES + 1)):
+        ends = generator.choice(points, 2, replace=False)
+        way = _way(graph, int(ends[0]), int(ends[1]))
+        weight = generator.uniform(*WEIGHTS)
+        if generator.random() < 0.5:
+            middle = generator.choice(way)
+            radius = generator.uniform(*RADII) * unit
+            near = _around(graph, int(middle), radius)
+            obstacles[near] = np.maximum(obstacles[near], weight)
+        else:
+            stops = [way[int(share * (len(way) - 1))] for share in PART]
+            beside = [
+                int(generator.choice(_around(graph, int(stop), BESIDE * unit))) for stop in stops
+            ]
+            lane = _way(graph, *beside)
+            alignment[lane] = np.maximum(alignment[lane], weight)
+    return obstacles, alignment
+
+
+def _way(graph: sparse.csr_array, start: int, end: int) -> IntArray:
+    """Vertices of the shortest way along edges."""
+    _, previous = csgraph.dijkstra(graph, directed=False, indices=end, return_predecessors=True)
+    way = [start]
+    while way[-1] != end:
+        way.append(int(previous[way[-1]]))
+    return np.array(way)
+
+
+def _around(graph: sparse.csr_array, middle: int, radius: float) -> IntArray:
+    """Vertices within a distance along edges, the middle itself among them."""
+    distance = csgraph.dijkstra(graph, directed=False, indices=middle, limit=radius)
+    return np.flatnonzero(np.isfinite(distance))
