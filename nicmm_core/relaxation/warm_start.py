@@ -50,8 +50,10 @@ def moved_along(
     mesh = surface.mesh
     nodes, at_controls = curve.nodes, curve.control_nodes
     move = controls.positions(mesh) - nodes.positions[at_controls]
-    if np.linalg.norm(move, axis=1).max() > LONGEST_MOVE * float(nodes.lengths.sum()):
+    away = np.linalg.norm(move, axis=1)
+    if away.max() > LONGEST_MOVE * float(nodes.lengths.sum()):
         return None
+    moves = away > 0.0
     shift = _shifts(nodes, at_controls, move)
     shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(shift, axis=1)
@@ -59,9 +61,13 @@ def moved_along(
     direction = shift / np.maximum(length, tolerances.TINY)[:, None]
     places = shifted(surface, nodes, direction, length)[0].places
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
-    faces[at_controls], barycentric[at_controls] = controls.faces, controls.barycentric
+    going = at_controls[moves]
+    faces[going], barycentric[going] = controls.faces[moves], controls.barycentric[moves]
+    still = length == 0.0
+    still[going] = False
     places = SurfacePoints(faces, barycentric)
-    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed))
+    # A stretch that once could not be drawn straight stays as it is where nothing moves.
+    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed), still)
     if changed is None or not is_simple(surface, changed):
         return None
     return changed
