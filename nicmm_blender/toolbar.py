@@ -3,6 +3,7 @@
 
 import bpy
 
+from . import mesh_data
 from .edit_operator import NICMM_OT_edit_curve
 
 ICON = "ops.curve.pen"
@@ -30,8 +31,13 @@ class _SurfaceCurve:
     @staticmethod
     def draw_settings(context, layout, _tool):
         """Draw the settings of a new curve in the header."""
+        properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness"):
-            layout.prop(context.scene.nicmm_curves, name)
+            layout.prop(properties, name)
+        mesh_object = mesh_data.mesh_object(context)
+        if mesh_object is not None:
+            for name in ("obstacle_group", "alignment_group"):
+                layout.prop_search(properties, name, mesh_object, "vertex_groups")
 
 
 class NICMM_WT_object(_SurfaceCurve, bpy.types.WorkSpaceTool):

@@ -41,6 +41,9 @@ STARTED = 0.6
 SOON_DONE = 5
 """The cap of a relaxation, in numbers of iterations that most need."""
 
+CROWDED = 3
+"""Frames for which strands that were in each other's way are taken to be so still."""
+
 PART_WAYS = (0.06, 0.015)
 """How far control points are led at once where they cannot be led all the way, in curve lengths."""
 
@@ -74,6 +77,7 @@ class _Remembered:
     start: _Start
     exact: ExactCurve  # the design's curve with its nodes
     design: Design | None  # None where the curve is not at rest yet
+    crowded: int = 0  # frames in which it is better drawn after every step
 
 
 class SurfaceDesigner:
@@ -160,6 +164,9 @@ class SurfaceDesigner:
         if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
         config = replace(WARM, iterations=iterations, drawn_iterations=1)
+        if last is not None and last.crowded:
+            # Without would fail once more.
+            config = replace(config, drawn_at_rest=False)
         start = self._start_from_last(request)
         if start is not None:
             return self._relaxed(request, start, config, started)
@@ -301,7 +308,11 @@ class SurfaceDesigner:
         )
         if design.status is not Status.CANCELLED:
             at_rest = design.status is not Status.ITERATION_LIMIT
-            self._last = _Remembered(request, start, relaxed.exact, design if at_rest else None)
+            before = 0 if self._last is None else self._last.crowded
+            failed = config.drawn_at_rest and relaxed.iterations > config.iterations
+            crowded = CROWDED if failed else max(before - 1, 0)
+            kept = design if at_rest else None
+            self._last = _Remembered(request, start, relaxed.exact, kept, crowded)
         return design
 
     def _level_set_design(

@@ -210,10 +210,19 @@ def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:
     return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
-def drawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> ExactCurve | None:
-    """The curve through nodes at new places, simple or not; None where it cannot be drawn."""
-    none = np.zeros(len(nodes.positions), dtype=bool)
-    polyline, node_place, lost = _drawn(surface.mesh, curve, nodes, none)
+def drawn(
+    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, still: BoolArray | None = None
+) -> ExactCurve | None:
+    """The curve through nodes at new places, simple or not; None where it cannot be drawn.
+
+    Between two nodes that are `still`, (n,), it stays as it is.
+    """
+    kept = np.zeros(len(nodes.positions), dtype=bool)
+    if still is not None:
+        kept = still & np.roll(still, -1)
+        if not curve.closed:
+            kept[-1] = False
+    polyline, node_place, lost = _drawn(surface.mesh, curve, nodes, kept)
     if lost.any():
         return None
     return ExactCurve(nodes, curve.control_nodes, polyline, node_place)

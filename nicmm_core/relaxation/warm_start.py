@@ -13,7 +13,7 @@ from ..array_types import FloatArray, IntArray
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
-from .face_walks import join, moved, strictly_inside
+from .face_walks import join, strictly_inside
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
@@ -22,7 +22,7 @@ WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
 
-WIDEST_DETOUR = 4.0
+WIDEST_DETOUR = 1.5
 """Longest way of a control point over the faces, relative to its move in space."""
 
 TAKEN_ALONG = 4.0
@@ -50,8 +50,10 @@ def moved_along(
     mesh = surface.mesh
     nodes, at_controls = curve.nodes, curve.control_nodes
     move = controls.positions(mesh) - nodes.positions[at_controls]
-    if np.linalg.norm(move, axis=1).max() > LONGEST_MOVE * float(nodes.lengths.sum()):
+    away = np.linalg.norm(move, axis=1)
+    if away.max() > LONGEST_MOVE * float(nodes.lengths.sum()):
         return None
+    moves = away > 0.0
     shift = _shifts(nodes, at_controls, move)
     shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(shift, axis=1)
@@ -59,9 +61,13 @@ def moved_along(
     direction = shift / np.maximum(length, tolerances.TINY)[:, None]
     places = shifted(surface, nodes, direction, length)[0].places
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
-    faces[at_controls], barycentric[at_controls] = controls.faces, controls.barycentric
+    going = at_controls[moves]
+    faces[going], barycentric[going] = controls.faces[moves], controls.barycentric[moves]
+    still = length == 0.0
+    still[going] = False
     places = SurfacePoints(faces, barycentric)
-    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed))
+    # A stretch that once could not be drawn straight stays as it is where nothing moves.
+    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed), still)
     if changed is None or not is_simple(surface, changed):
         return None
     return changed
@@ -84,7 +90,7 @@ def part_of_the_way(
     Returns
     -------
     SurfacePoints or None
-        None where one of them comes to a boundary.
+        None where no straight way leads to one of them without much of a detour.
     """
     mesh, nodes = surface.mesh, curve.nodes
     longest = farthest * float(nodes.lengths.sum())
@@ -96,14 +102,7 @@ def part_of_the_way(
         start = SurfacePoints(starts.faces[here], strictly_inside(starts.barycentric[here]))
         line = _way_over_faces(surface, curve, start, controls[here], here)
         if line is None:
-            # No straight way leads there: on in its direction.
-            ahead = goals[here] - origins[here]
-            normal = mesh.face_normals[start.faces]
-            ahead -= (ahead * normal).sum(axis=1, keepdims=True) * normal
-            length = np.maximum(np.linalg.norm(ahead, axis=1), tolerances.TINY)
-            line, stuck = moved(mesh, start, ahead / length[:, None], np.array([longest]))
-            if stuck.any():
-                return None
+            return None
         gone = np.linalg.norm(np.diff(line.positions(mesh), axis=0, prepend=origins[here]), axis=1)
         at = max(int(np.searchsorted(np.cumsum(gone), longest, side="right")) - 1, 0)
         faces[far], barycentric[far] = line.faces[at], line.barycentric[at]

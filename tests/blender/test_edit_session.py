@@ -159,6 +159,22 @@ def test_every_frame_of_a_drag_is_bounded(parts, monkeypatch):
     assert_passes(session)
 
 
+def test_after_a_jump_the_curve_is_designed_anew(parts):
+    """Led there in parts while the point is held, and free of what that leaves at the end."""
+    session = filled(parts, scenes.sphere(4))
+    session.grab()
+    session.move(1, *at(session, [*ring()[1, :2], 1.0]))
+    assert not session.waiting
+    assert not session.state.rested
+    session.drop()
+    while not session.waiting:
+        assert session.step()
+    session.settle()
+    assert_passes(session)
+    expected = parts.core.design_curve(session.designer.mesh, session.points).curves[0]
+    np.testing.assert_array_equal(session.curve.points, expected.points)
+
+
 def test_undo_and_redo(parts):
     """Each change is one step, a drag with all its moves too; the same curves come back."""
     session = filled(parts, scenes.sphere())

@@ -91,7 +91,7 @@ def test_nothing_to_follow(ball):
     assert designer.follow(points) is not None
 
 
-@pytest.mark.parametrize("height", [1.0, 5.0])
+@pytest.mark.parametrize("height", [1.0, 1.5])
 def test_a_point_that_jumped_is_led_there_in_parts(ball, height):
     designer = nicmm.Designer(ball)
     designer.design(on_ball(ball, START))

@@ -31,6 +31,9 @@ PATIENCE = 240.0
 HOLD = 1.5
 """Seconds that a key is held about a click."""
 
+CROP = "1048x800+0+0"
+"""What of the screen is kept: the 3D viewport."""
+
 FRAME = 50.0
 """Milliseconds that the tool may take for an event while a point is dragged."""
 
@@ -134,7 +137,16 @@ class Blender:
         self.do("pass")
         path = self.shots / f"{name}.png"
         subprocess.run(["import", "-window", "root", str(path)], env=self.environment, check=True)
-        options = ["-strip", "-colors", "200", "-define", "png:compression-level=9"]
+        options = [
+            "-crop",
+            CROP,
+            "+repage",
+            "-strip",
+            "-colors",
+            "200",
+            "-define",
+            "png:compression-level=9",
+        ]
         subprocess.run(["convert", str(path), *options, str(path)], check=True)
         print(f"   {path.name}, {path.stat().st_size // 1000} kB", flush=True)
 
@@ -232,10 +244,22 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.click(added, "ctrl")
     count_points(blender, 5)
 
-    step("Closed and open, smoothness, obstacle group")
+    step("A point on an eye, which is another part of the mesh: the status bar says why not")
+    (eye,) = blender.do("value = helper.pixels(helper.in_front([(0.35, 0.24)]))")
+    good = blender.do("value = helper.session().polyline().tolist()")
+    blender.click(eye)
+    blender.wait("helper.session().problem", "a problem")
+    check(
+        blender.do("value = helper.session().polyline().tolist()") == good, "the last curve stays"
+    )
+    blender.shot("5-problem")
+    blender.key("ctrl+z")
+    count_points(blender, 5)
+
+    step("Closed and open, smoothness")
     blender.key("c")
     count_points(blender, 5, "not helper.session().curve.closed")
-    blender.shot("5-open")
+    blender.shot("6-open")
     blender.key("c")
     count_points(blender, 5, "helper.session().curve.closed")
     blender.key("Down", "Down", "Down")
@@ -245,7 +269,7 @@ def drive(blender: Blender, archive: Path) -> None:
 
     step("From the side: hidden parts are dimmed")
     blender.do("helper.look(1.0, -0.55, 0.25)")
-    blender.shot("6-hidden-parts")
+    blender.shot("7-hidden-parts")
     blender.do("helper.look()")
 
     step("Enter keeps the curve")
@@ -263,7 +287,7 @@ def drive(blender: Blender, archive: Path) -> None:
         for a, b in zip(one, other, strict=True)
     )
     check(apart < 1e-6, f"what is kept is what was seen ({apart})")
-    blender.shot("7-kept")
+    blender.shot("8-kept")
 
     step("Save, open again, and edit again")
     path = str(blender.folder / "head.blend")
@@ -286,7 +310,7 @@ def drive(blender: Blender, archive: Path) -> None:
         time.sleep(0.1)
     blender.mouse("mouseup", 1)
     count_points(blender, 6)
-    blender.shot("8-edited-again")
+    blender.shot("9-edited-again")
     blender.key("Escape")
     blender.wait("not helper.running", "cancel")
     check(blender.do(f"value = {written}") == kept, "Esc leaves the curve as it was")
@@ -311,7 +335,7 @@ def drive(blender: Blender, archive: Path) -> None:
                 "for found in bpy.context.scene.objects:\n"
                 "    found.location.y -= 0.6 * (found.name != 'Suzanne')"
             )
-        blender.shot(f"9-{name}")
+        blender.shot(f"10-{name}")
 
 
 def main() -> None:
