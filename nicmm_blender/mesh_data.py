@@ -118,13 +118,18 @@ def _history(edited) -> np.ndarray:
     return np.array(vertices, dtype=np.int64)
 
 
-def control_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
+def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     """Return the selected vertices and the core's order for them, "given" or "shortest".
 
     Box, circle and lasso selection leave no history and old entries stay in it, so the history
     counts only where it holds exactly the selected vertices.
     """
     selected = selected_vertices(mesh_object)
+    if len(selected) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" is selected. Select the vertices that the curve '
+            "should pass through in Edit Mode"
+        )
     if order == "SHORTEST":
         return selected, "shortest"
     history = selection_history(mesh_object)
@@ -139,10 +144,67 @@ def control_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     return selected, "shortest"
 
 
-def group_weights(mesh_object, name: str) -> np.ndarray | None:
-    """Weight of every vertex in a vertex group; None for an empty name."""
-    if not name:
-        return None
+def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str]:
+    """Return the vertices of a vertex group, and the core's order for them."""
+    vertices = np.flatnonzero(group_weights(mesh_object, name) > 0.0)
+    if order == "GIVEN":
+        raise InputError(
+            f'The vertices of the group "{name}" have no order. Set Order to Automatic or Shortest'
+        )
+    if len(vertices) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" has a weight in the group "{name}". Assign the '
+            "vertices that the curve should pass through"
+        )
+    return vertices, "shortest"
+
+
+def given_points(surface, given: list, order: str) -> tuple[np.ndarray, str]:
+    """Return the control points of a script as the core takes them, and their order.
+
+    Each is a vertex index, or -1 and a position in the object's own space.
+    """
+    core_order = "shortest" if order == "SHORTEST" else "given"
+    vertices = np.array([vertex for vertex, _ in given], dtype=np.int64)
+    if (vertices >= 0).all():
+        return vertices, core_order
+    count = len(surface.local)
+    if vertices.max() >= count:
+        raise InputError(
+            f"Vertex {vertices.max()} is out of range; the mesh has {count} vertices, "
+            f"0 to {count - 1}"
+        )
+    places = np.array([place for _, place in given], dtype=np.float64) @ surface.linear.T
+    return np.where((vertices >= 0)[:, None], surface.solved[vertices], places), core_order
+
+
+def marked_edges(mesh_object, mark: str) -> np.ndarray:
+    """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
+    edges = mesh_object.data.edges
+    marked = np.empty(len(edges), dtype=bool)
+    edges.foreach_get(mark, marked)
+    vertices = np.empty((len(edges), 2), dtype=np.int32)
+    edges.foreach_get("vertices", vertices.ravel())
+    return vertices[marked].astype(np.int64)
+
+
+def check_local(mesh_object, consequence: str) -> None:
+    """Refuse a mesh whose data belongs to another file."""
+    library = mesh_object.data.library or mesh_object.library
+    if library is not None:
+        raise InputError(
+            f'The mesh of "{mesh_object.name}" is linked from {library.filepath}, and '
+            f"{consequence}. Make it local (Object > Relations > Make Local)"
+        )
+    if mesh_object.data.override_library is not None:
+        raise InputError(
+            f'The mesh of "{mesh_object.name}" is a library override, and {consequence}. '
+            "Make it local (Object > Relations > Make Local)"
+        )
+
+
+def vertex_group(mesh_object, name: str):
+    """A vertex group by its name."""
     group = mesh_object.vertex_groups.get(name)
     if group is None:
         groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)
@@ -151,9 +213,17 @@ def group_weights(mesh_object, name: str) -> np.ndarray | None:
             + (f"Choose one of {groups}, or leave" if groups else "Add the group, or leave")
             + " the field empty"
         )
+    return group
+
+
+def group_weights(mesh_object, name: str) -> np.ndarray | None:
+    """Weight of every vertex in a vertex group; None for an empty name."""
+    if not name:
+        return None
+    index = vertex_group(mesh_object, name).index
     weights = np.zeros(len(mesh_object.data.vertices))
     for vertex in mesh_object.data.vertices:
         for membership in vertex.groups:
-            if membership.group == group.index:
+            if membership.group == index:
                 weights[vertex.index] = membership.weight
     return weights
