@@ -81,9 +81,9 @@ def _points(options: argparse.Namespace) -> dict:
     if options.group is not None:
         return {"point_group": options.group}
     if options.points is not None:
-        return {"points": [{"vertex": vertex} for vertex in options.points]}
+        return {"points": [{"name": "", "vertex": vertex} for vertex in options.points]}
     if options.at is not None:
-        return {"points": [{"co": place} for place in options.at]}
+        return {"points": [{"name": "", "co": place} for place in options.at]}
     return {}
 
 
