@@ -81,9 +81,7 @@ def _points(options: argparse.Namespace) -> dict:
     if options.group is not None:
         return {"point_group": options.group}
     if options.points is not None:
-        return {"points": [{"name": "", "vertex": vertex} for vertex in options.points]}
-    if options.at is not None:
-        return {"points": [{"name": "", "co": place} for place in options.at]}
+        return {"points": options.points}
     return {}
 
 
@@ -101,15 +99,9 @@ def parser() -> argparse.ArgumentParser:
     ).add_mutually_exclusive_group()
     points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
     points.add_argument(
-        "--points", type=_indices, metavar="A,B,C", help="vertices by index, from 0"
-    )
-    points.add_argument(
-        "--at",
-        nargs=3,
-        type=float,
-        action="append",
-        metavar=("X", "Y", "Z"),
-        help="a place on the surface in the object's own space; repeatable",
+        "--points",
+        metavar="A,B,C",
+        help='vertex indices, from 0, or places in the object\'s own space: "0.5 0 1, 0 0 2, 41"',
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = made.add_argument_group("settings", "As in the sidebar.")
@@ -128,15 +120,6 @@ def _option(described) -> dict:
         identifiers = [item.identifier for item in described.enum_items]
         return {"type": str.upper, "choices": identifiers, **words}
     return {"type": {"FLOAT": float, "STRING": str}[described.type], **words}
-
-
-def _indices(text: str) -> list:
-    try:
-        return [int(index) for index in text.split(",")]
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no list of vertex indices; give them with commas, such as 12,80,41"
-        ) from error
 
 
 def register() -> None:

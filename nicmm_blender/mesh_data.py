@@ -159,23 +159,39 @@ def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str
     return vertices, "shortest"
 
 
-def given_points(surface, given: list, order: str) -> tuple[np.ndarray, str]:
+def given_points(surface, text: str, order: str) -> tuple[np.ndarray, str]:
     """Return the control points of a script as the core takes them, and their order.
 
-    Each is a vertex index, or -1 and a position in the object's own space.
+    The text holds vertex indices or places in the object's own space, "12, 80, 0.5 0 1".
     """
     core_order = "shortest" if order == "SHORTEST" else "given"
-    vertices = np.array([vertex for vertex, _ in given], dtype=np.int64)
-    if (vertices >= 0).all():
-        return vertices, core_order
-    count = len(surface.local)
-    if vertices.max() >= count:
+    given = [_given_point(word, len(surface.local)) for word in text.split(",")]
+    if all(isinstance(point, int) for point in given):
+        return np.array(given, dtype=np.int64), core_order
+    places = [
+        surface.solved[point] if isinstance(point, int) else surface.linear @ point
+        for point in given
+    ]
+    return np.array(places), core_order
+
+
+def _given_point(word: str, count: int) -> int | np.ndarray:
+    """A vertex index, or a place in the object's own space, (3,)."""
+    numbers = word.split()
+    try:
+        point = int(word) if len(numbers) == 1 else np.array(numbers, dtype=np.float64)
+    except ValueError:
+        point = np.zeros(0)
+    if isinstance(point, np.ndarray) and point.shape != (3,):
         raise InputError(
-            f"Vertex {vertices.max()} is out of range; the mesh has {count} vertices, "
-            f"0 to {count - 1}"
+            f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Give '
+            'points with commas and coordinates with spaces, such as "12, 80, 0.5 0 1"'
         )
-    places = np.array([place for _, place in given], dtype=np.float64) @ surface.linear.T
-    return np.where((vertices >= 0)[:, None], surface.solved[vertices], places), core_order
+    if isinstance(point, int) and not 0 <= point < count:
+        raise InputError(
+            f"Vertex {point} is out of range; the mesh has {count} vertices, 0 to {count - 1}"
+        )
+    return point
 
 
 def marked_edges(mesh_object, mark: str) -> np.ndarray:

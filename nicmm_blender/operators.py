@@ -2,13 +2,7 @@
 """The operators: a curve through the selected vertices, and other things made from a curve."""
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    FloatVectorProperty,
-    IntProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, StringProperty
 
 from . import curve_object, curve_record, design_request, mesh_data, outputs, settings
 from .long_solves import LongSolves, reporting
@@ -21,17 +15,6 @@ ORDER_NAMES = {  # by the core's name, and whether the points are what is select
 }
 
 
-class NICMM_PG_control_point(bpy.types.PropertyGroup):
-    """A control point that a script gives, at a vertex or else at a place on the surface."""
-
-    vertex: IntProperty(name="Vertex", description="Index of a vertex, or -1", default=-1, min=-1)
-    co: FloatVectorProperty(
-        name="Position",
-        description="Place on the surface in the object's own space, where no vertex is given",
-        subtype="XYZ",
-    )
-
-
 class NICMM_OT_design_curve(
     LongSolves, settings.DesignProperties, settings.OutputProperties, bpy.types.Operator
 ):
@@ -41,10 +24,10 @@ class NICMM_OT_design_curve(
     bl_label = "Design Curve on Surface"
     bl_options = {"REGISTER", "UNDO"}
 
-    points: CollectionProperty(
+    points: StringProperty(
         name="Points",
-        description="Control points of scripts, instead of the selected vertices",
-        type=NICMM_PG_control_point,
+        description="Control points of scripts, instead of the selected vertices: vertex indices "
+        "or places in the object's own space with commas, such as 12, 80, 0.5 0 1",
         options={"HIDDEN", "SKIP_SAVE"},
     )
     point_group: StringProperty(
@@ -82,8 +65,7 @@ class NICMM_OT_design_curve(
                 "points and point_group both say where the control points are. Give one of them"
             )
         if self.points:
-            given = [(point.vertex, tuple(point.co)) for point in self.points]
-            return mesh_data.given_points(surface, given, self.order)
+            return mesh_data.given_points(surface, self.points, self.order)
         if self.point_group:
             return mesh_data.points_of_group(mesh_object, self.point_group, self.order)
         return mesh_data.selected_points(mesh_object, self.order)
@@ -164,7 +146,7 @@ def _summary(mesh_object, design, order: str) -> str:
     return summary
 
 
-CLASSES = (NICMM_PG_control_point, NICMM_OT_design_curve, NICMM_OT_convert_curve)
+CLASSES = (NICMM_OT_design_curve, NICMM_OT_convert_curve)
 
 
 def register() -> None:

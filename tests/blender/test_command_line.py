@@ -43,9 +43,14 @@ def test_group_points_and_places_give_the_same(command, file, tmp_path, extensio
     path, vertices, mesh = file
     before = path.read_bytes()
     expected = extension.core.design_curve(mesh, vertices).curves[0].points
-    places = [text for v in vertices for text in ("--at", *map(str, mesh.vertices[v]))]
+    places = [" ".join(map(str, mesh.vertices[v])) for v in vertices]
     for number, points in enumerate(
-        (["--group", "Cut"], ["--points", ",".join(map(str, vertices))], places)
+        (
+            ["--group", "Cut"],
+            ["--points", ",".join(map(str, vertices))],
+            ["--points", ", ".join(places)],
+            ["--points", ", ".join([*places[:2], *map(str, vertices[2:])])],
+        )
     ):
         out = tmp_path / f"out{number}.blend"
         arguments = ["--file", str(path), "--object", "Körper", "--output-file", str(out)]
@@ -87,7 +92,9 @@ def test_every_setting_is_an_option(command, extension, capsys):
         ({"--file": "gone.blend"}, "there is no file"),
         ({"--output-file": "gone/out.blend"}, "there is no folder"),
         ({"--group": "Nothing"}, 'no vertex group "Nothing"'),
-        ({"--points": "1,2,x"}, "list of vertex indices"),
+        ({"--points": "1,2,x"}, 'The point "x" is neither'),
+        ({"--points": "1,2,0.5 1"}, 'The point "0.5 1" is neither'),
+        ({"--points": "1,2,9 9 9"}, "off the surface"),
         ({"--points": "1,2,999"}, "999 is out of range"),
         ({"--output": "shoes"}, "invalid choice"),
         ({"--object": "Cube"}, 'no vertex group "Cut"'),
