@@ -7,6 +7,7 @@ on by turns, a timer giving them, until it is done or Esc is pressed.
 """
 
 import sys
+import time
 from contextlib import contextmanager
 
 import bpy
@@ -16,6 +17,9 @@ from .partial_curve import PartialCurve
 
 TURN = 0.03
 """Seconds; about the time between two pictures of the window."""
+
+LONGEST_TURN = 0.25
+"""Seconds. Where the window takes longer to draw, turns are as long, so that work goes on."""
 
 # Turning the view is no change of what is being worked on.
 NAVIGATION = {
@@ -59,7 +63,10 @@ class LongSolves:
             self.report({"INFO"}, "Cancelled; nothing has changed")
             return {"CANCELLED"}
         if event.type == "TIMER":
-            if self._work.turn(TURN):
+            drawing = time.perf_counter() - self._turn_ended
+            done = self._work.turn(min(max(TURN, drawing), LONGEST_TURN))
+            self._turn_ended = time.perf_counter()
+            if done:
                 self._tidy(context)
                 return reporting(self, lambda: self._end(context))
             self._show(context)
@@ -82,7 +89,8 @@ class LongSolves:
         self._work = turns.Work(lambda progress: answer_all(requests, progress))
         if self._work.turn(preferences.patience()):
             return self._end(context)
-        self._partial = PartialCurve()
+        self._partial, self._shown = PartialCurve(), None
+        self._turn_ended = time.perf_counter()
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TURN, window=context.window)
         window_manager.modal_handler_add(self)
@@ -97,9 +105,10 @@ class LongSolves:
         return self.finish(context, self._requests, answers)
 
     def _show(self, context):
-        request = self._requests[_place(self._work.fraction, len(self._requests))]
-        world = request.in_world(self._work.polyline)
-        self._partial.show(world, request.asked.closed)
+        if self._work.polyline is not self._shown:
+            self._shown = self._work.polyline
+            request = self._requests[_place(self._work.fraction, len(self._requests))]
+            self._partial.show(request.in_world(self._shown), request.asked.closed)
         percent = round(100 * self._work.fraction)
         context.workspace.status_text_set(f"{self.bl_label}: {percent} %   |   Esc: Cancel")
 

@@ -122,7 +122,7 @@ def window(empty_scene, monkeypatch):
     operators = import_module(f"{empty_scene.name}.nicmm_blender.operators")
     long_solves = import_module(f"{empty_scene.name}.nicmm_blender.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
-    monkeypatch.setattr(long_solves, "TURN", 0.0)
+    monkeypatch.setattr(long_solves, "LONGEST_TURN", 0.0)
     monkeypatch.setattr(long_solves, "answer_all", slow(long_solves.answer_all))
     sphere = scenes.sphere(5)
     scenes.select(sphere, scenes.ring(sphere, 4, height=0.3))
