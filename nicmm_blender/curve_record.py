@@ -197,23 +197,24 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
 
 
-def controls_now(curve_object, surface) -> tuple[object, int]:
+def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
     """The control points of a curve on the mesh as it is now, and how many had to be moved.
 
-    Those whose triangles are gone take the nearest place to where they were.
+    Those whose triangles are gone take the nearest place to where they were. `mesh` is the core's
+    mesh of the surface, where there is one already.
     """
     from .. import nicmm_core as nicmm
     from ..nicmm_core.surface_points import nearest_points
 
-    points, places = recall_controls(curve_object, surface)
-    gone = points.faces < 0
-    if not gone.any():
+    points, positions = recall_controls(curve_object, surface)
+    lost = points.faces < 0
+    if not lost.any():
         return points, 0
-    mesh = nicmm.Mesh(surface.solved, surface.faces)
-    nearest, _ = nearest_points(mesh, places[gone] @ surface.linear.T)
+    mesh = nicmm.Mesh(surface.solved, surface.faces) if mesh is None else mesh
+    nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
-    faces[gone], barycentric[gone] = nearest.faces, nearest.barycentric
-    return nicmm.SurfacePoints(faces, barycentric), int(gone.sum())
+    faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
+    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
 def _recalled(record, corners_name: str, weights_name: str, surface):

@@ -19,6 +19,9 @@ from .long_solves import TURN, answer_all
 PAUSE = 0.01
 """Seconds that Blender has to itself between two turns."""
 
+WAIT = 0.1
+"""Seconds until it is asked again whether curves may be written."""
+
 
 class _Updates:
     """What has changed and what is being done; no Blender objects, which undo replaces."""
@@ -62,11 +65,13 @@ def tick() -> float | None:
     if _updates.changed or _updates.everything:
         _updates.stop()
         rest = _updates.last_change + preferences.live_delay() - time.monotonic()
-        if rest > 0.0 or bpy.app.is_job_running("RENDER"):
-            return max(rest, PAUSE)
+        if rest > 0.0 or _has_to_wait():
+            return max(rest, WAIT)
         _begin()
     if _updates.work is None:
         return None
+    if _has_to_wait():
+        return WAIT
     if _updates.work.turn(TURN):
         _write()
         return PAUSE if _updates.changed else None
@@ -137,6 +142,16 @@ def _write() -> None:
             curve_list.replace(designed, request, answer)
         except mesh_data.InputError as error:
             _updates.failed[uid] = now, f"{designed.name}: {error}"
+
+
+def _has_to_wait() -> bool:
+    """Whether Blender is rendering, or a tool of ours is at work on curves."""
+    running = (
+        operator.bl_idname
+        for window in bpy.context.window_manager.windows
+        for operator in window.modal_operators
+    )
+    return bpy.app.is_job_running("RENDER") or any(name.startswith("NICMM") for name in running)
 
 
 def _live_scenes() -> list:

@@ -126,6 +126,7 @@ def test_file_is_not_overwritten(command, file, capfd):
 
 # What `blender -c nicmm ...` does, for the bpy module, which has no command line of its own.
 RUNNER = """
+import os
 import sys
 from importlib import import_module
 import bpy, addon_utils
@@ -133,8 +134,8 @@ addon_utils.extensions_refresh()
 addon_utils.enable("bl_ext.user_default.nicmm_curves", default_set=True)
 command = import_module("bl_ext.user_default.nicmm_curves.nicmm_blender.command_line")
 code = command.main(sys.argv[1:])
-addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
-sys.exit(code)
+sys.stderr.flush()
+os._exit(code)  # disabling would take the wheels away from the other process
 """
 
 

@@ -177,7 +177,7 @@ def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
     other = scenes.sphere()
     draw(other)
     record = module(empty_scene, "curve_record")
-    assert record.curves_on(sphere) == sorted(mine, key=lambda found: found.name)
+    assert record.designed_on(sphere) == sorted(mine, key=lambda found: found.name)
     scenes.activate(mine[1])
     assert curve_list.mesh_of_context(bpy.context) == sphere
     objects = bpy.data.objects
