@@ -50,8 +50,8 @@ def open_session(context, edited, asked: Asked) -> Opened:
     designer = designers.designer_for(surface.solved, surface.faces)
     designer.forget()
     remarks = []
-    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
-        remarks.append("on the mesh without its modifiers")
+    if shown := mesh_data.shown_beyond_the_mesh(mesh_object):
+        remarks.append(f"on the mesh without its {shown}")
     for name in ("obstacle_group", "alignment_group"):
         group = getattr(asked, name)
         if edited is not None and group and group not in mesh_object.vertex_groups:

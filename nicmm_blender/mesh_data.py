@@ -10,6 +10,9 @@ import numpy as np
 
 import bmesh
 
+FLAT = 1e-6
+"""Least scale of an object relative to its largest one; single precision knows no less."""
+
 
 class InputError(Exception):
     """The Blender data does not say what was asked for; the message says what to change."""
@@ -75,6 +78,12 @@ def triangles(mesh_object) -> Triangles:
 
     local = positions.astype(np.float64)
     linear = np.array(mesh_object.matrix_world.to_3x3(), dtype=np.float64)
+    stretches = np.linalg.svd(linear, compute_uv=False)
+    if stretches[-1] <= FLAT * stretches[0]:
+        raise InputError(
+            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Give it another '
+            "scale (Object > Clear > Scale)"
+        )
     if _keeps_proportions(linear):
         linear = np.eye(3)
     faces, loops, polygons = (found.astype(np.int64) for found in (faces, loops, polygons))
@@ -88,6 +97,18 @@ def _keeps_proportions(linear: np.ndarray) -> bool:
     """
     gram = linear.T @ linear
     return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))
+
+
+def shown_beyond_the_mesh(mesh_object) -> str:
+    """What makes an object look other than the mesh that is solved on, in words."""
+    shown = []
+    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
+        shown.append("modifiers")
+    keys = mesh_object.data.shape_keys
+    others = [] if keys is None else keys.key_blocks[1:]
+    if any(key.value != 0.0 and not key.mute for key in others):
+        shown.append("shape keys")
+    return " and ".join(shown)
 
 
 def selected_vertices(mesh_object) -> np.ndarray:

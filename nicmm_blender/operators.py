@@ -141,9 +141,8 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 def _summary(mesh_object, design, order: str) -> str:
     curve = design.curves[0]
     summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
-    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
-        summary += ", on the mesh without its modifiers"
-    return summary
+    shown = mesh_data.shown_beyond_the_mesh(mesh_object)
+    return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 
 CLASSES = (NICMM_OT_design_curve, NICMM_OT_convert_curve)
