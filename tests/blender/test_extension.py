@@ -34,7 +34,8 @@ assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
 REPORT = """
 loaded = {name.partition(".")[0] for name in sys.modules}
 addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
-print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}))
+core = [name for name in sys.modules if ".nicmm_core" in name]
+print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}), *(["core"] if core else []))
 """
 
 
@@ -53,7 +54,7 @@ def test_runs_from_the_installed_zip(extension):
     assert not (libraries / "numpy").exists()
 
 
-@pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy"])])
+@pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy", "core"])])
 def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded):
     build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
