@@ -99,7 +99,11 @@ def answer(request: DesignRequest, progress):
                 smoothness=asked.smoothness,
                 progress=progress,
             )
-        except nicmm.UnreachableError as error:
-            group = asked.obstacle_group
-            words = f' (obstacles: the vertex group "{group}")' if group else ""
-            raise mesh_data.InputError(f"{error}{words}") from error
+        except nicmm.MissingPackageError:
+            raise
+        except nicmm.NicmmError as error:
+            vertices = request.points if isinstance(request.points, np.ndarray) else None
+            at = vertices if vertices is not None and vertices.ndim == 1 else None
+            raise mesh_data.InputError(
+                mesh_data.in_words(error, asked.obstacle_group, at)
+            ) from error

@@ -4,6 +4,7 @@
 Blender keeps a separate copy of a mesh that is being edited: call `synchronise` first.
 """
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,24 @@ FLAT = 1e-6
 
 class InputError(Exception):
     """The Blender data does not say what was asked for; the message says what to change."""
+
+
+def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
+    """The core's message as a user reads it: points count from one, and the map is named.
+
+    `vertices` are the indices of the vertices that the control points are at, if they are.
+    """
+
+    def point(found: re.Match) -> str:
+        number = int(found[1])
+        name = f"point {number + 1}"
+        return name if vertices is None else f"{name} (vertex {vertices[number]})"
+
+    text = re.sub(r"control_points\[(\d+)\]", point, str(error))
+    text = text.replace("control_points has", "there are").replace("control_points", "the points")
+    if type(error).__name__ == "UnreachableError" and obstacle_group:
+        text += f' (obstacles: the vertex group "{obstacle_group}")'
+    return text[:1].upper() + text[1:]
 
 
 @dataclass(frozen=True)
