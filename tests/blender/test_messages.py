@@ -65,7 +65,7 @@ def of_blender():
 def of_core():
     kinds = {"UnreachableError", "ControlPointError", "CurveError"}
     for place, found in messages([build.ROOT / "nicmm_core" / name for name in CORE], kinds):
-        if not found[0].startswith(OF_PYTHON):
+        if not any(piece.startswith(OF_PYTHON) for piece in found):
             yield place, found
 
 
