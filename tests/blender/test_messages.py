@@ -20,14 +20,8 @@ CORE = (
     "path/legs.py",
     "path/initial_loop.py",
 )
-OF_PYTHON = (
-    "mesh is a",
-    "progress is",
-    "iterations is",
-    "curve has the control_index",
-    "side_of",
-    "points pass one",
-)
+# What only a caller of the core in Python can do wrong.
+OF_PYTHON = ("mesh is", "progress is", "curve has the control index", "side of", "points pass one")
 
 
 def pieces(node):
