@@ -44,6 +44,7 @@ def entries(menu):
     return [draw.__module__ for draw in getattr(bpy.types, menu).draw._draw_funcs]
 
 
+@pytest.mark.usefixtures("bpy_module")
 def test_runs_from_the_installed_zip(extension):
     user_folder = os.environ["BLENDER_USER_RESOURCES"]
     assert extension.folder.startswith(user_folder)
@@ -55,6 +56,7 @@ def test_runs_from_the_installed_zip(extension):
 
 
 @pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy", "core"])])
+@pytest.mark.usefixtures("bpy_module")
 def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded):
     build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
