@@ -39,6 +39,9 @@ PLATFORMS = {
     "macos-arm64": ("macosx_12_0_arm64", "macosx_14_0_arm64"),  # PyTorch needs the newer one
 }
 
+LARGEST_ZIP = 120e6
+"""Bytes of a zip without PyTorch."""
+
 # Blender brings its own NumPy, which every extension shares: it must not be in the zip.
 BUNDLED = ("libigl", "scipy")
 TORCH_COMPANIONS = (
@@ -239,6 +242,12 @@ def package(
         ):
             if run([VENV_PYTHON, tool, *arguments, "--valid-tags", tags]) != 0:
                 raise BuildError("Blender's tool refused the extension: see the lines above")
+    size = archive.stat().st_size
+    if size > LARGEST_ZIP and not with_torch:
+        raise BuildError(
+            f"{archive.name} has {size / 1e6:.0f} MB, more than {LARGEST_ZIP / 1e6:.0f} MB. "
+            "Build it for fewer versions of Python (--python)"
+        )
     return archive
 
 

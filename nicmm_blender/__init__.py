@@ -5,21 +5,44 @@ Nothing here loads the core, or a library that it needs, before a curve is asked
 extension stays quick and works where a library is missing, and the operator then says which one.
 """
 
-from . import designers, edit_operator, interface, operators, settings, toolbar
+from . import (
+    command_line,
+    curve_list,
+    designers,
+    edit_operator,
+    interface,
+    live_update,
+    long_solves,
+    maps,
+    operators,
+    preferences,
+    settings,
+    toolbar,
+    turns,
+)
+
+MODULES = (
+    preferences,
+    settings,
+    turns,
+    operators,
+    edit_operator,
+    curve_list,
+    maps,
+    live_update,
+    interface,
+    toolbar,
+    command_line,
+)
 
 
 def register() -> None:
-    settings.register()
-    operators.register()
-    edit_operator.register()
-    interface.register()
-    toolbar.register()
+    for module in MODULES:
+        module.register()
 
 
 def unregister() -> None:
-    toolbar.unregister()
-    interface.unregister()
-    edit_operator.unregister()
-    operators.unregister()
-    settings.unregister()
+    long_solves.stop_all()
+    for module in reversed(MODULES):
+        module.unregister()
     designers.forget()

@@ -6,13 +6,17 @@ keep their numbers when the mesh is moved or deformed, and when the file is open
 points are kept so too, with what else the curve was asked for, so that it can be edited again.
 """
 
+import hashlib
 from dataclasses import asdict, dataclass, fields
 
+import bpy
 import numpy as np
 
+from . import mesh_data
 from .mesh_data import InputError
 
 KEY = "nicmm_curve"
+DESIGNED_ON = "nicmm_designed_on"
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,24 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
         "control_positions": surface.points(control_faces, control_barycentric).ravel().tolist(),
         "asked": asdict(asked),
     }
+    # With the points themselves, so that undo brings both back together.
+    curve_object.data[DESIGNED_ON] = digest(mesh_object, surface, asked)
+
+
+def digest(mesh_object, surface, asked: Asked) -> str:
+    """What is different whenever something has changed that a curve depends on."""
+    found = hashlib.blake2b(repr(asked).encode(), digest_size=16)
+    found.update(surface.solved.tobytes())
+    found.update(surface.faces.tobytes())
+    for name in (asked.obstacle_group, asked.alignment_group):
+        if name in mesh_object.vertex_groups:
+            found.update(mesh_data.group_weights(mesh_object, name).tobytes())
+    return found.hexdigest()
+
+
+def is_current(curve_object, now: str) -> bool:
+    """Whether a curve was designed on what has this digest."""
+    return curve_object.data.get(DESIGNED_ON) == now
 
 
 def has_record(candidate) -> bool:
@@ -117,6 +139,12 @@ def lies_on(curve_object, surface) -> bool:
     return bool((_recalled(record, "corners", "barycentric", surface)[0] >= 0).all())
 
 
+def designed_on(mesh_object) -> list:
+    """The curve objects that were designed on a mesh object, by name."""
+    found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
+    return sorted(found, key=lambda each: each.name)
+
+
 def asked_of(curve_object) -> Asked:
     """What a curve was asked for."""
     stored = curve_object[KEY].get("asked")
@@ -167,6 +195,26 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     names = ("control_corners", "control_barycentric")
     found = nicmm.SurfacePoints(*_recalled(record, *names, surface))
     return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
+
+
+def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
+    """The control points of a curve on the mesh as it is now, and how many had to be moved.
+
+    Those whose triangles are gone take the nearest place to where they were. `mesh` is the core's
+    mesh of the surface, where there is one already.
+    """
+    from .. import nicmm_core as nicmm
+    from ..nicmm_core.surface_points import nearest_points
+
+    points, positions = recall_controls(curve_object, surface)
+    lost = points.faces < 0
+    if not lost.any():
+        return points, 0
+    mesh = nicmm.Mesh(surface.solved, surface.faces) if mesh is None else mesh
+    nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
+    faces, barycentric = points.faces.copy(), points.barycentric.copy()
+    faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
+    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
 def _recalled(record, corners_name: str, weights_name: str, surface):

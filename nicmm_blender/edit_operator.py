@@ -12,7 +12,7 @@ from .curve_record import Asked
 from .edit_overlay import Overlay
 from .edit_view import view_of
 from .edited_curve import chosen, keep, open_session
-from .operators import reporting
+from .long_solves import reporting
 
 INTERVAL = 1.0 / 60.0
 """Seconds between two steps of a curve that is coming to rest."""

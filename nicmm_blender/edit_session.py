@@ -8,14 +8,13 @@ anew, which takes longer; `step` does that too. A request that cannot be met lea
 that could, and `problem` says why.
 """
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .curve_record import Asked
-from .mesh_data import InputError
+from .mesh_data import InputError, in_words
 
 MOST_STEPS = 60
 """Steps from a change until the curve is taken as it is; most need fewer than five."""
@@ -379,13 +378,7 @@ class EditSession:
 
     def _in_words(self, error: Exception) -> str:
         """The core's message, with its points numbered as the user counts them."""
-        text = re.sub(
-            r"control_points\[(\d+)\]", lambda found: f"point {int(found[1]) + 1}", str(error)
-        )
-        text = text.replace("control_points", "the points")
-        if isinstance(error, self._nicmm.UnreachableError) and self.asked.obstacle_group:
-            text += f' (obstacles: the vertex group "{self.asked.obstacle_group}")'
-        return text[:1].upper() + text[1:]
+        return in_words(error, self.asked.obstacle_group)
 
 
 def _with_point(nicmm, mesh, curve, segment: int, share: float):

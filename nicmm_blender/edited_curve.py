@@ -50,8 +50,8 @@ def open_session(context, edited, asked: Asked) -> Opened:
     designer = designers.designer_for(surface.solved, surface.faces)
     designer.forget()
     remarks = []
-    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
-        remarks.append("on the mesh without its modifiers")
+    if shown := mesh_data.shown_beyond_the_mesh(mesh_object):
+        remarks.append(f"on the mesh without its {shown}")
     for name in ("obstacle_group", "alignment_group"):
         group = getattr(asked, name)
         if edited is not None and group and group not in mesh_object.vertex_groups:
@@ -59,7 +59,7 @@ def open_session(context, edited, asked: Asked) -> Opened:
             remarks.append(f'without the vertex group "{group}", which is gone')
     points = curve = None
     if edited is not None:
-        points, moved = _points_of(edited, surface, designer.mesh)
+        points, moved = curve_record.controls_now(edited, surface, designer.mesh)
         if moved:
             remarks.append(f"the mesh has changed: {moved} points are at the nearest place")
         elif asked == replace(curve_record.asked_of(edited), method=asked.method):
@@ -97,21 +97,6 @@ def _check_editable(edited) -> None:
             f'"{edited.name}" is linked from {library.filepath}. Make it local '
             "(Object > Relations > Make Local) first"
         )
-
-
-def _points_of(edited, surface, mesh) -> tuple[object, int]:
-    """The control points of a curve on the mesh as it is, and how many had to be looked for."""
-    from .. import nicmm_core as nicmm
-    from ..nicmm_core.surface_points import nearest_points
-
-    found, positions = curve_record.recall_controls(edited, surface)
-    lost = found.faces < 0
-    if not lost.any():
-        return found, 0
-    nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
-    faces, barycentric = found.faces.copy(), found.barycentric.copy()
-    faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
-    return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
 def _curve_of(edited, surface):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import curve_record, mesh_data, settings
+from . import curve_list, curve_record, live_update, maps, settings
 from .edit_operator import NICMM_OT_edit_curve
 from .operators import NICMM_OT_convert_curve, NICMM_OT_design_curve
 
@@ -12,26 +12,69 @@ EDIT_ICON = "CURVE_PATH"
 CONVERT_ICON = "MOD_EDGESPLIT"
 
 
-class NICMM_PT_design_curve(bpy.types.Panel):
-    """Settings and button, in the sidebar of the 3D viewport"""
+class SidebarPanel:
+    """The tab of the sidebar that all panels are in."""
 
-    bl_label = "NICMM Curves"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "NICMM"
 
+
+class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
+    """Settings and button for a new curve"""
+
+    bl_label = "NICMM Curves"
+
     def draw(self, context):
         properties = context.scene.nicmm_curves
-        settings.draw(self.layout, properties, mesh_data.mesh_object(context))
-        operator = self.layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
+        layout = self.layout
+        settings.draw_course(layout, properties)
+        settings.draw_output(layout, properties)
+        operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
         for name in settings.PROPERTY_NAMES:
             setattr(operator, name, getattr(properties, name))
-        self.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
+        layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
         if curve_record.has_record(context.active_object):
-            self.layout.separator()
-            convert = self.layout.operator(NICMM_OT_convert_curve.bl_idname, icon=CONVERT_ICON)
+            convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=CONVERT_ICON)
             for name in settings.OutputProperties.__annotations__:
                 setattr(convert, name, getattr(properties, name))
+
+
+class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
+    """Vertex groups that keep curves away or attract them"""
+
+    bl_label = "Maps"
+    bl_parent_id = "NICMM_PT_design_curve"
+
+    @classmethod
+    def poll(cls, context):
+        return curve_list.mesh_of_context(context) is not None
+
+    def draw(self, context):
+        properties = context.scene.nicmm_curves
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        mesh_object = curve_list.mesh_of_context(context)
+        maps.draw_row(layout, properties, "OBSTACLES", context, mesh_object)
+        settings.draw_clearance(layout, properties)
+        maps.draw_row(layout, properties, "ALIGNMENT", context, mesh_object)
+
+
+class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
+    """The curves that were designed on this mesh"""
+
+    bl_label = "Curves on This Mesh"
+    bl_parent_id = "NICMM_PT_design_curve"
+
+    @classmethod
+    def poll(cls, context):
+        return curve_list.mesh_of_context(context) is not None
+
+    def draw(self, context):
+        curve_list.draw(self.layout, context)
+        for message in live_update.messages(curve_list.mesh_of_context(context)):
+            self.layout.label(text=message, icon="ERROR")
 
 
 def draw_in_menu(menu, _context) -> None:
@@ -66,8 +109,12 @@ MENUS = (
 )
 
 
+PANELS = (NICMM_PT_design_curve, NICMM_PT_maps, NICMM_PT_curves)
+
+
 def register() -> None:
-    bpy.utils.register_class(NICMM_PT_design_curve)
+    for panel in PANELS:
+        bpy.utils.register_class(panel)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
 
@@ -75,4 +122,5 @@ def register() -> None:
 def unregister() -> None:
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
-    bpy.utils.unregister_class(NICMM_PT_design_curve)
+    for panel in reversed(PANELS):
+        bpy.utils.unregister_class(panel)

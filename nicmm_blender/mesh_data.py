@@ -4,15 +4,37 @@
 Blender keeps a separate copy of a mesh that is being edited: call `synchronise` first.
 """
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 import bmesh
 
+FLAT = 1e-6
+"""Least scale of an object relative to its largest one; single precision knows no less."""
+
 
 class InputError(Exception):
     """The Blender data does not say what was asked for; the message says what to change."""
+
+
+def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
+    """The core's message as a user reads it: points count from one, and the map is named.
+
+    `vertices` are the indices of the vertices that the control points are at, if they are.
+    """
+
+    def point(found: re.Match) -> str:
+        number = int(found[1])
+        name = f"point {number + 1}"
+        return name if vertices is None else f"{name} (vertex {vertices[number]})"
+
+    text = re.sub(r"control_points\[(\d+)\]", point, str(error))
+    text = text.replace("control_points has", "there are").replace("control_points", "the points")
+    if type(error).__name__ == "UnreachableError" and obstacle_group:
+        text += f' (obstacles: the vertex group "{obstacle_group}")'
+    return text[:1].upper() + text[1:]
 
 
 @dataclass(frozen=True)
@@ -75,6 +97,12 @@ def triangles(mesh_object) -> Triangles:
 
     local = positions.astype(np.float64)
     linear = np.array(mesh_object.matrix_world.to_3x3(), dtype=np.float64)
+    stretches = np.linalg.svd(linear, compute_uv=False)
+    if stretches[-1] <= FLAT * stretches[0]:
+        raise InputError(
+            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Give it another '
+            "scale (Object > Clear > Scale)"
+        )
     if _keeps_proportions(linear):
         linear = np.eye(3)
     faces, loops, polygons = (found.astype(np.int64) for found in (faces, loops, polygons))
@@ -88,6 +116,18 @@ def _keeps_proportions(linear: np.ndarray) -> bool:
     """
     gram = linear.T @ linear
     return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))
+
+
+def shown_beyond_the_mesh(mesh_object) -> str:
+    """What makes an object look other than the mesh that is solved on, in words."""
+    shown = []
+    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
+        shown.append("modifiers")
+    keys = mesh_object.data.shape_keys
+    others = [] if keys is None else keys.key_blocks[1:]
+    if any(key.value != 0.0 and not key.mute for key in others):
+        shown.append("shape keys")
+    return " and ".join(shown)
 
 
 def selected_vertices(mesh_object) -> np.ndarray:
@@ -118,13 +158,18 @@ def _history(edited) -> np.ndarray:
     return np.array(vertices, dtype=np.int64)
 
 
-def control_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
+def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     """Return the selected vertices and the core's order for them, "given" or "shortest".
 
     Box, circle and lasso selection leave no history and old entries stay in it, so the history
     counts only where it holds exactly the selected vertices.
     """
     selected = selected_vertices(mesh_object)
+    if len(selected) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" is selected. Select the vertices that the curve '
+            "should pass through in Edit Mode"
+        )
     if order == "SHORTEST":
         return selected, "shortest"
     history = selection_history(mesh_object)
@@ -139,10 +184,83 @@ def control_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     return selected, "shortest"
 
 
-def group_weights(mesh_object, name: str) -> np.ndarray | None:
-    """Weight of every vertex in a vertex group; None for an empty name."""
-    if not name:
-        return None
+def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str]:
+    """Return the vertices of a vertex group, and the core's order for them."""
+    vertices = np.flatnonzero(group_weights(mesh_object, name) > 0.0)
+    if order == "GIVEN":
+        raise InputError(
+            f'The vertices of the group "{name}" have no order. Set Order to Automatic or Shortest'
+        )
+    if len(vertices) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" has a weight in the group "{name}". Assign the '
+            "vertices that the curve should pass through"
+        )
+    return vertices, "shortest"
+
+
+def given_points(surface, text: str, order: str) -> tuple[np.ndarray, str]:
+    """Return the control points of a script as the core takes them, and their order.
+
+    The text holds vertex indices or places in the object's own space, "12, 80, 0.5 0 1".
+    """
+    core_order = "shortest" if order == "SHORTEST" else "given"
+    given = [_given_point(word, len(surface.local)) for word in text.split(",")]
+    if all(isinstance(point, int) for point in given):
+        return np.array(given, dtype=np.int64), core_order
+    places = [
+        surface.solved[point] if isinstance(point, int) else surface.linear @ point
+        for point in given
+    ]
+    return np.array(places), core_order
+
+
+def _given_point(word: str, count: int) -> int | np.ndarray:
+    """A vertex index, or a place in the object's own space, (3,)."""
+    numbers = word.split()
+    try:
+        point = int(word) if len(numbers) == 1 else np.array(numbers, dtype=np.float64)
+    except ValueError:
+        point = np.zeros(0)
+    if isinstance(point, np.ndarray) and point.shape != (3,):
+        raise InputError(
+            f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Give '
+            'points with commas and coordinates with spaces, such as "12, 80, 0.5 0 1"'
+        )
+    if isinstance(point, int) and not 0 <= point < count:
+        raise InputError(
+            f"Vertex {point} is out of range; the mesh has {count} vertices, 0 to {count - 1}"
+        )
+    return point
+
+
+def marked_edges(mesh_object, mark: str) -> np.ndarray:
+    """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
+    edges = mesh_object.data.edges
+    marked = np.empty(len(edges), dtype=bool)
+    edges.foreach_get(mark, marked)
+    vertices = np.empty((len(edges), 2), dtype=np.int32)
+    edges.foreach_get("vertices", vertices.ravel())
+    return vertices[marked].astype(np.int64)
+
+
+def check_local(mesh_object, consequence: str) -> None:
+    """Refuse a mesh whose data belongs to another file."""
+    library = mesh_object.data.library or mesh_object.library
+    if library is not None:
+        raise InputError(
+            f'The mesh of "{mesh_object.name}" is linked from {library.filepath}, and '
+            f"{consequence}. Make it local (Object > Relations > Make Local)"
+        )
+    if mesh_object.data.override_library is not None:
+        raise InputError(
+            f'The mesh of "{mesh_object.name}" is a library override, and {consequence}. '
+            "Make it local (Object > Relations > Make Local)"
+        )
+
+
+def vertex_group(mesh_object, name: str):
+    """A vertex group by its name."""
     group = mesh_object.vertex_groups.get(name)
     if group is None:
         groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)
@@ -151,9 +269,17 @@ def group_weights(mesh_object, name: str) -> np.ndarray | None:
             + (f"Choose one of {groups}, or leave" if groups else "Add the group, or leave")
             + " the field empty"
         )
+    return group
+
+
+def group_weights(mesh_object, name: str) -> np.ndarray | None:
+    """Weight of every vertex in a vertex group; None for an empty name."""
+    if not name:
+        return None
+    index = vertex_group(mesh_object, name).index
     weights = np.zeros(len(mesh_object.data.vertices))
     for vertex in mesh_object.data.vertices:
         for membership in vertex.groups:
-            if membership.group == group.index:
+            if membership.group == index:
                 weights[vertex.index] = membership.weight
     return weights

@@ -174,21 +174,30 @@ class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGr
 
 
 def draw(layout, properties, mesh_object) -> None:
-    """Draw the settings for a curve on `mesh_object`, which may be None."""
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    for name in ("closed", "order", "method", "smoothness"):
-        layout.prop(properties, name)
+    """Draw the settings for a curve on `mesh_object`, which may be None; for the redo panel."""
+    draw_course(layout, properties)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
         else:
             layout.prop_search(properties, name, mesh_object, "vertex_groups")
-        if name == "obstacle_group":
-            row = layout.row()
-            row.active = bool(properties.obstacle_group)
-            row.prop(properties, "clearance")
+    draw_clearance(layout, properties)
     draw_output(layout, properties)
+
+
+def draw_course(layout, properties) -> None:
+    """Draw what leads the curve, without its maps."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for name in ("closed", "order", "method", "smoothness"):
+        layout.prop(properties, name)
+
+
+def draw_clearance(layout, properties) -> None:
+    """Draw the distance from obstacles, greyed out where there are none."""
+    row = layout.row()
+    row.active = bool(properties.obstacle_group)
+    row.prop(properties, "clearance")
 
 
 def draw_output(layout, properties) -> None:

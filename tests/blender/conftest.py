@@ -1,17 +1,28 @@
-"""Blender with the extension installed from the zip, never from the source tree."""
+"""Blender with the extension installed from the zip, never from the source tree.
+
+By default this is the bpy module. A Blender runs the same tests with a zip that was built for it:
+
+    NICMM_TEST_ZIP=nicmm_curves.zip BLENDER_USER_RESOURCES=$(mktemp -d) blender -b \\
+        --python-exit-code 1 --python-expr "import sys, pytest; sys.path.insert(0, '.'); \\
+        assert pytest.main(['tests/blender', '-q']) == 0"
+"""
 
 import os
+import sys
 import tempfile
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import build
 
-# Blender reads this when bpy is first imported: the tests keep off the user's own settings.
-_user_folder = tempfile.TemporaryDirectory(prefix="nicmm-blender-")
-os.environ["BLENDER_USER_RESOURCES"] = _user_folder.name
+IN_BLENDER = "bpy" in sys.modules
+if not IN_BLENDER:
+    # Blender reads this when bpy is first imported: the tests keep off the user's own settings.
+    _user_folder = tempfile.TemporaryDirectory(prefix="nicmm-blender-")
+    os.environ["BLENDER_USER_RESOURCES"] = _user_folder.name
 
 import bpy  # noqa: E402
 
@@ -20,9 +31,18 @@ import addon_utils  # noqa: E402
 MODULE = "bl_ext.user_default.nicmm_curves"
 
 
+@pytest.fixture
+def bpy_module():
+    """For tests that start another Python with the bpy module in it, or build zips."""
+    if IN_BLENDER:
+        pytest.skip("this Python has no bpy module that another process could import")
+
+
 @pytest.fixture(scope="session")
 def archive(tmp_path_factory):
     """The zip of this platform, as users get it."""
+    if "NICMM_TEST_ZIP" in os.environ:
+        return Path(os.environ["NICMM_TEST_ZIP"])
     return build.package(build.this_platform(), output=tmp_path_factory.mktemp("package"))
 
 

@@ -11,6 +11,13 @@ def sphere(subdivisions=3):
     return bpy.context.active_object
 
 
+def activate(chosen):
+    """Make an object the active and the only selected one, as a click on it does."""
+    bpy.ops.object.select_all(action="DESELECT")
+    chosen.select_set(True)
+    bpy.context.view_layer.objects.active = chosen
+
+
 def nearest_vertices(mesh_object, points):
     """The vertices nearest to points in the object's own space."""
     vertices = positions(mesh_object)

@@ -34,7 +34,8 @@ assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
 REPORT = """
 loaded = {name.partition(".")[0] for name in sys.modules}
 addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
-print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}))
+core = [name for name in sys.modules if ".nicmm_core" in name]
+print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}), *(["core"] if core else []))
 """
 
 
@@ -43,6 +44,7 @@ def entries(menu):
     return [draw.__module__ for draw in getattr(bpy.types, menu).draw._draw_funcs]
 
 
+@pytest.mark.usefixtures("bpy_module")
 def test_runs_from_the_installed_zip(extension):
     user_folder = os.environ["BLENDER_USER_RESOURCES"]
     assert extension.folder.startswith(user_folder)
@@ -53,7 +55,8 @@ def test_runs_from_the_installed_zip(extension):
     assert not (libraries / "numpy").exists()
 
 
-@pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy"])])
+@pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy", "core"])])
+@pytest.mark.usefixtures("bpy_module")
 def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded):
     build.stage(tmp_path / "extensions" / "user_default" / "nicmm_curves")
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
@@ -91,7 +94,8 @@ def test_labels_and_tooltips_follow_blender(extension):
 def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()
-    assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"}
+    of_scripts = {"points", "point_group"}
+    assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
 
 
 def test_disabling_removes_everything(extension):

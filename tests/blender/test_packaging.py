@@ -61,6 +61,13 @@ def test_zip_holds_the_wheels_of_every_blender(archive):
     assert {"__init__.py", "nicmm_core/__init__.py", "nicmm_blender/__init__.py"} <= set(names)
 
 
+def test_zip_is_small_enough_for_the_platform(archive, monkeypatch, tmp_path):
+    assert archive.stat().st_size <= build.LARGEST_ZIP == 120e6
+    monkeypatch.setattr(build, "LARGEST_ZIP", 1e6)
+    with pytest.raises(build.BuildError, match="more than 1 MB"):
+        build.package(build.this_platform(), output=tmp_path)
+
+
 def test_missing_wheel_says_what_to_do(capfd):
     with pytest.raises(build.BuildError, match=r"no wheel of scipy==0\.0\.1 .*--platform"):
         build.download("scipy==0.0.1", "linux-x64", "3.11")

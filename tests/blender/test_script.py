@@ -7,6 +7,7 @@ import sys
 
 import bpy
 import numpy as np
+import pytest
 
 import build
 from tests.blender import scenes
@@ -27,6 +28,7 @@ finally:
 """
 
 
+@pytest.mark.usefixtures("bpy_module")
 def test_documented_script(empty_scene, tmp_path):
     documentation = (build.ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
     mesh_name, indices = re.search(r"-- \\\n +(\w+) ([\d,]+) out\.blend", documentation).groups()

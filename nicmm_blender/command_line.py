@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`blender -c nicmm`: a curve on an object of a file, written to another file.
+
+The options are the properties of *Design Curve on Surface*, read from Blender's own description.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import bpy
+
+from . import mesh_data, settings
+
+COMMAND = "nicmm"
+FAILED = 2
+
+_registered: list = []
+
+
+def main(arguments: list) -> int:
+    """Run the command; 0 when it succeeded, 2 with a message on standard error when it did not."""
+    try:
+        options = parser().parse_args(arguments)
+    except SystemExit as stopped:  # argparse has written why; Blender wants a number
+        return 0 if not stopped.code else FAILED
+    try:
+        run(options)
+    except (mesh_data.InputError, RuntimeError) as error:
+        print(f"{COMMAND}: {str(error).removeprefix('Error: ').strip()}", file=sys.stderr)
+        return FAILED
+    return 0
+
+
+def run(options: argparse.Namespace) -> None:
+    """Open the file, design the curve and write the other file."""
+    source, target = Path(options.file).absolute(), Path(options.output_file).absolute()
+    if not source.is_file():
+        raise mesh_data.InputError(f"--file: there is no file {source}")
+    if not target.parent.is_dir():
+        raise mesh_data.InputError(f"--output-file: there is no folder {target.parent}")
+    if target.exists() and target.samefile(source):
+        raise mesh_data.InputError("--output-file is the file that is read; give another one")
+    bpy.ops.wm.open_mainfile(filepath=str(source), load_ui=False)
+    activate(options.object)
+    chosen = {name: getattr(options, name) for name in settings.PROPERTY_NAMES}
+    bpy.ops.nicmm.design_curve(
+        **{name: value for name, value in chosen.items() if value is not None},
+        **_points(options),
+    )
+    bpy.ops.wm.save_as_mainfile(filepath=str(target), copy=True, check_existing=False)
+
+
+def activate(name: str | None) -> None:
+    """Make an object active in Object Mode; without a name, the one that is active in the file."""
+    context = bpy.context
+    if name is not None:
+        chosen = bpy.data.objects.get(name)
+        if chosen is None:
+            meshes = [found.name for found in bpy.data.objects if found.type == "MESH"]
+            raise mesh_data.InputError(
+                f'--object: there is no object "{name}" in the file. Its meshes are '
+                + ", ".join(f'"{mesh}"' for mesh in meshes)
+            )
+        if chosen.name not in context.view_layer.objects:
+            raise mesh_data.InputError(
+                f'--object: "{name}" is not in the view layer "{context.view_layer.name}", which '
+                "is the active one of the file"
+            )
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        context.view_layer.objects.active = chosen
+    if context.active_object is None:
+        raise mesh_data.InputError("no object is active in the file; name one with --object")
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _points(options: argparse.Namespace) -> dict:
+    """The control points, as the operator takes them."""
+    if options.group is not None:
+        return {"point_group": options.group}
+    if options.points is not None:
+        return {"points": options.points}
+    return {}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    made = argparse.ArgumentParser(
+        prog=f"blender -c {COMMAND}",
+        description="Draw a smooth curve on a mesh of a Blender file and write another file.",
+    )
+    made.add_argument("--file", required=True, metavar="IN.blend")
+    made.add_argument("--output-file", required=True, metavar="OUT.blend")
+    made.add_argument("--object", metavar="NAME", help="default: the active object of the file")
+    points = made.add_argument_group(
+        "control points", "By default the vertices that are selected in the file."
+    ).add_mutually_exclusive_group()
+    points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
+    points.add_argument(
+        "--points",
+        metavar="A,B,C",
+        help='vertex indices, from 0, or places in the object\'s own space: "0.5 0 1, 0 0 2, 41"',
+    )
+    described = bpy.ops.nicmm.design_curve.get_rna_type().properties
+    options = made.add_argument_group("settings", "As in the sidebar.")
+    for name in settings.PROPERTY_NAMES:
+        options.add_argument(f"--{name.replace('_', '-')}", dest=name, **_option(described[name]))
+    return made
+
+
+def _option(described) -> dict:
+    """How argparse takes a Blender property."""
+    # argparse formats its help with %.
+    words = {"help": described.description.replace("%", "%%"), "default": None}
+    if described.type == "BOOLEAN":
+        return {"action": argparse.BooleanOptionalAction, **words}
+    if described.type == "ENUM":
+        identifiers = [item.identifier for item in described.enum_items]
+        return {"type": str.upper, "choices": identifiers, **words}
+    return {"type": {"FLOAT": float, "STRING": str}[described.type], **words}
+
+
+def register() -> None:
+    _registered.append(bpy.utils.register_cli_command(COMMAND, main))
+
+
+def unregister() -> None:
+    bpy.utils.unregister_cli_command(_registered.pop())

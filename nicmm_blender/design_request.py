@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A curve that is asked for, as plain arrays: read from Blender, then answered by the core.
+
+Reading takes place in Blender's thread. The answer touches no Blender data, so that it can be
+found by turns (`turns`).
+"""
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from . import curve_record, designers, mesh_data
+from .curve_record import Asked
+
+
+@dataclass(frozen=True)
+class DesignRequest:
+    """Everything that a curve depends on.
+
+    `points` are control points as the core takes them and `order` is the core's; `moved` of the
+    points are not where they were when the curve was designed before.
+    """
+
+    mesh_name: str
+    mesh_uid: int
+    surface: mesh_data.Triangles
+    placement: np.ndarray
+    points: object
+    order: str
+    asked: Asked
+    obstacles: np.ndarray | None
+    alignment: np.ndarray | None
+    moved: int = 0
+
+    def mesh_object(self):
+        """The mesh object, looked up again: undo replaces Blender's Python objects."""
+        for candidate in bpy.data.objects:
+            if candidate.session_uid == self.mesh_uid:
+                return candidate
+        return None
+
+    def check_unchanged(self) -> None:
+        """Refuse to go on where the mesh is no longer the one that was read."""
+        found = self.mesh_object()
+        now = None if found is None else mesh_data.triangles(found)
+        if now is None or not (
+            np.array_equal(now.solved, self.surface.solved)
+            and np.array_equal(now.faces, self.surface.faces)
+        ):
+            raise mesh_data.InputError(
+                f'"{self.mesh_name}" has changed while the curve was computed. Draw the curve again'
+            )
+
+    def in_world(self, solved: np.ndarray) -> np.ndarray:
+        """World positions of points in the space that the core works in."""
+        local = solved @ np.linalg.inv(self.surface.linear).T
+        return local @ self.placement[:3, :3].T + self.placement[:3, 3]
+
+
+def for_points(mesh_object, surface, points, order: str, asked: Asked) -> DesignRequest:
+    """A request for a curve through points on the triangles of a mesh."""
+    return DesignRequest(
+        mesh_name=mesh_object.name,
+        mesh_uid=mesh_object.session_uid,
+        surface=surface,
+        placement=np.array(mesh_object.matrix_world, dtype=np.float64),
+        points=points,
+        order=order,
+        asked=asked,
+        obstacles=mesh_data.group_weights(mesh_object, asked.obstacle_group),
+        alignment=mesh_data.group_weights(mesh_object, asked.alignment_group),
+    )
+
+
+def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
+    """A request for a designed curve once more, on the mesh as it is now."""
+    points, moved = curve_record.controls_now(curve_object, surface)
+    return replace(for_points(mesh_object, surface, points, "given", asked), moved=moved)
+
+
+def answer(request: DesignRequest, progress):
+    """Let the core design the curve; touches no Blender data."""
+    from .. import nicmm_core as nicmm
+
+    asked = request.asked
+    with designers.lent(request.surface.solved, request.surface.faces) as designer:
+        # The same settings give the same curve, whatever was designed before.
+        designer.forget()
+        try:
+            return designer.design(
+                request.points,
+                closed=asked.closed,
+                order=request.order,
+                method=asked.method.lower().replace("_", "-"),
+                obstacles=request.obstacles,
+                alignment=request.alignment,
+                clearance=0.0 if request.obstacles is None else asked.clearance,
+                smoothness=asked.smoothness,
+                progress=progress,
+            )
+        except nicmm.MissingPackageError:
+            raise
+        except nicmm.NicmmError as error:
+            vertices = request.points if isinstance(request.points, np.ndarray) else None
+            at = vertices if vertices is not None and vertices.ndim == 1 else None
+            raise mesh_data.InputError(
+                mesh_data.in_words(error, asked.obstacle_group, at)
+            ) from error

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps curves up to date while their mesh or its weights change.
+
+Blender's handlers only note that something has changed. When the mesh has rested, a timer compares
+what each curve was designed on with what is there now (`curve_record.digest`) and designs anew
+those that are out of date, by turns. Writing a curve changes no mesh, and undo brings a curve
+back together with its digest: nothing goes round in circles.
+"""
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+from bpy.props import BoolProperty
+
+from . import curve_list, curve_record, design_request, mesh_data, preferences, turns
+from .long_solves import TURN, answer_all
+
+PAUSE = 0.01
+"""Seconds that Blender has to itself between two turns."""
+
+WAIT = 0.1
+"""Seconds until it is asked again whether curves may be written."""
+
+
+class _Updates:
+    """What has changed and what is being done; no Blender objects, which undo replaces."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Know of nothing."""
+        self.changed: set = set()  # of meshes, by their session_uid
+        self.everything = False
+        self.last_change = 0.0
+        self.work = None
+        self.requests: list = []
+        self.curves: list = []  # by their session_uid, one for each request
+        self.failed: dict = {}  # from a curve's session_uid to the digest and the message
+
+    def note(self, meshes: set, everything: bool = False) -> None:
+        """Remember that something has changed, and let the timer look at it."""
+        self.changed |= meshes
+        self.everything |= everything
+        self.last_change = time.monotonic()
+        if not bpy.app.timers.is_registered(tick):
+            bpy.app.timers.register(tick, first_interval=preferences.live_delay())
+
+    def stop(self) -> None:
+        """Drop what is being done."""
+        if self.work is not None:
+            self.work.cancel()
+        self.work, self.requests, self.curves = None, [], []
+
+
+_updates = _Updates()
+
+
+def tick() -> float | None:
+    """Do a little; return the seconds until the next time, or None where nothing is left."""
+    if not _live_scenes():
+        _updates.stop()
+        return None
+    if _updates.changed or _updates.everything:
+        _updates.stop()
+        rest = _updates.last_change + preferences.live_delay() - time.monotonic()
+        if rest > 0.0 or _has_to_wait():
+            return max(rest, WAIT)
+        _begin()
+    if _updates.work is None:
+        return None
+    if _has_to_wait():
+        return WAIT
+    if _updates.work.turn(TURN):
+        _write()
+        return PAUSE if _updates.changed else None
+    return PAUSE
+
+
+def messages(mesh_object) -> list:
+    """Why curves on a mesh could not be updated."""
+    found = [
+        _updates.failed.get(each.session_uid) for each in curve_record.designed_on(mesh_object)
+    ]
+    return [failure[1] for failure in found if failure is not None]
+
+
+def _begin() -> None:
+    """Ask for the curves that are out of date."""
+    changed, everything = _updates.changed, _updates.everything
+    _updates.changed, _updates.everything = set(), False
+    surfaces: dict = {}
+    for designed in _live_curves():
+        mesh_object = curve_record.mesh_of(designed)
+        if not everything and mesh_object.data.session_uid not in changed:
+            continue
+        if mesh_object not in surfaces:
+            mesh_data.synchronise(mesh_object)
+            surfaces[mesh_object] = mesh_data.triangles(mesh_object)
+        _ask(designed, mesh_object, surfaces[mesh_object])
+    if _updates.requests:
+        requests = _updates.requests
+        _updates.work = turns.Work(lambda progress: answer_all(requests, progress))
+
+
+def _ask(designed, mesh_object, surface) -> None:
+    """Add a request for a curve if it is out of date."""
+    asked = curve_record.asked_of(designed)
+    uid = designed.session_uid
+    now = ""
+    try:
+        now = curve_record.digest(mesh_object, surface, asked)
+        if curve_record.is_current(designed, now):
+            _updates.failed.pop(uid, None)
+            return
+        if _updates.failed.get(uid, ("",))[0] == now:
+            return
+        curve_list.check_replaceable(designed)
+        request = design_request.for_curve(designed, mesh_object, surface, asked)
+    except mesh_data.InputError as error:
+        _updates.failed[uid] = now, f"{designed.name}: {error}"
+        return
+    _updates.requests.append(request)
+    _updates.curves.append(uid)
+
+
+def _write() -> None:
+    """Put the curves that have been found into their objects."""
+    work, requests, curves = _updates.work, _updates.requests, _updates.curves
+    _updates.work, _updates.requests, _updates.curves = None, [], []
+    objects = {found.session_uid: found for found in bpy.data.objects}
+    for request, uid, answer in zip(requests, curves, work.result(), strict=True):
+        designed = objects.get(uid)
+        if designed is None or request.mesh_object() is None:
+            continue
+        now = curve_record.digest(request.mesh_object(), request.surface, request.asked)
+        _updates.failed.pop(uid, None)
+        try:
+            curve_list.check_replaceable(designed)
+            request.check_unchanged()
+            curve_list.replace(designed, request, answer)
+        except mesh_data.InputError as error:
+            _updates.failed[uid] = now, f"{designed.name}: {error}"
+
+
+def _has_to_wait() -> bool:
+    """Whether Blender is rendering, or a tool of ours is at work on curves."""
+    running = (
+        operator.bl_idname
+        for window in bpy.context.window_manager.windows
+        for operator in window.modal_operators
+    )
+    return bpy.app.is_job_running("RENDER") or any(name.startswith("NICMM") for name in running)
+
+
+def _live_scenes() -> list:
+    return [scene for scene in bpy.data.scenes if scene.nicmm_live_update]
+
+
+def _live_curves() -> list:
+    found = {designed for scene in _live_scenes() for designed in scene.objects}
+    designed = [each for each in found if curve_record.has_record(each)]
+    usable = [each for each in designed if curve_record.mesh_of(each) is not None]
+    return sorted(usable, key=lambda each: each.name)
+
+
+@persistent
+def note_changes(scene, depsgraph) -> None:
+    """After Blender has brought its scene up to date."""
+    if not scene.nicmm_live_update:
+        return
+    meshes = {
+        update.id.original.session_uid
+        for update in depsgraph.updates
+        if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
+    }
+    if meshes:
+        _updates.note(meshes)
+
+
+@persistent
+def note_other_state(*_arguments) -> None:
+    """After undo, redo and opening a file."""
+    _updates.stop()
+    if _live_scenes():
+        _updates.note(set(), everything=True)
+
+
+@persistent
+def forget(*_arguments) -> None:
+    """Before another file is opened."""
+    _updates.stop()
+    _updates.reset()
+
+
+def _switched(_scene, _context) -> None:
+    note_other_state()
+
+
+HANDLERS = (
+    ("depsgraph_update_post", note_changes),
+    ("undo_post", note_other_state),
+    ("redo_post", note_other_state),
+    ("load_pre", forget),
+    ("load_post", note_other_state),
+)
+
+
+def register() -> None:
+    bpy.types.Scene.nicmm_live_update = BoolProperty(
+        name="Live Update",
+        description="Design the curves of this scene again whenever their mesh, or weights that "
+        "they depend on, have changed",
+        default=False,
+        update=_switched,
+    )
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister() -> None:
+    forget()
+    if bpy.app.timers.is_registered(tick):
+        bpy.app.timers.unregister(tick)
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).remove(function)
+    del bpy.types.Scene.nicmm_live_update

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Obstacle and alignment maps: made as vertex groups, painted, and shown in Weight Paint mode."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+
+from . import mesh_data
+from .long_solves import reporting
+
+ROLES = (
+    ("OBSTACLES", "Obstacles", "Where the curve must not go"),
+    ("ALIGNMENT", "Alignment", "What the curve follows"),
+)
+FIELDS = {"OBSTACLES": "obstacle_group", "ALIGNMENT": "alignment_group"}
+NAMES = {"OBSTACLES": "Obstacles", "ALIGNMENT": "Alignment"}
+
+SOURCES = (
+    ("PAINT", "Empty", "No weights yet; paint them", "BRUSH_DATA", 0),
+    ("SELECTION", "Selected Vertices", "The selected vertices", "RESTRICT_SELECT_OFF", 1),
+    ("CURVATURE", "Curvature", "Where the surface bends, either way", "SPHERECURVE", 2),
+    ("SHARP_EDGES", "Sharp Edges", "Edges whose faces meet at an angle", "MOD_EDGESPLIT", 3),
+    ("MARKED_SHARP", "Edges Marked Sharp", "Edges that are marked as sharp", "EDGESEL", 4),
+    ("SEAMS", "Seams", "Edges that are UV seams", "UV_EDGESEL", 5),
+)
+ATTRIBUTES = {"MARKED_SHARP": ("use_edge_sharp", "marked sharp"), "SEAMS": ("use_seam", "a seam")}
+
+
+class NICMM_OT_new_map(bpy.types.Operator):
+    """Make a vertex group that keeps curves away or attracts them, and show it in Weight Paint"""
+
+    bl_idname = "nicmm.new_map"
+    bl_label = "New Map"
+    bl_options = {"REGISTER", "UNDO"}
+
+    role: EnumProperty(name="Use As", description="What the weights do to curves", items=ROLES)
+    source: EnumProperty(name="From", description="Where the weights come from", items=SOURCES)
+    angle: FloatProperty(
+        name="Angle",
+        description="Angle between the normals of two faces from which their edge is sharp",
+        subtype="ANGLE",
+        default=np.radians(30.0),
+        min=0.0,
+        max=np.pi,
+    )
+    strength: FloatProperty(
+        name="Strength",
+        description="Largest weight. An obstacle of weight 1 is never entered",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    show: BoolProperty(
+        name="Weight Paint",
+        description="Switch to Weight Paint mode, which shows the weights and lets them be painted",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return _poll(cls, context)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "role")
+        layout.prop(self, "source")
+        if self.source == "SHARP_EDGES":
+            layout.prop(self, "angle")
+        if self.source != "PAINT":
+            layout.prop(self, "strength")
+        layout.prop(self, "show")
+
+    def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        mesh_object = mesh_data.mesh_object(context)
+        mesh_data.check_local(mesh_object, "its weights cannot be changed")
+        mesh_data.synchronise(mesh_object)
+        weights = self.strength * _weights(mesh_object, self.source, self.angle)
+        if self.source != "PAINT" and not weights.any():
+            self.report({"WARNING"}, f'Nothing on "{mesh_object.name}" gives a weight')
+        mode = mesh_object.mode
+        _enter(context, mesh_object, "OBJECT")
+        group = mesh_object.vertex_groups.new(name=NAMES[self.role])
+        for vertex in np.flatnonzero(weights).tolist():
+            group.add([vertex], float(weights[vertex]), "REPLACE")
+        setattr(context.scene.nicmm_curves, FIELDS[self.role], group.name)
+        mesh_object.vertex_groups.active_index = group.index
+        _enter(context, mesh_object, "WEIGHT_PAINT" if self.show else mode)
+        self.report({"INFO"}, f'Vertex group "{group.name}", {np.count_nonzero(weights)} vertices')
+        return {"FINISHED"}
+
+
+class NICMM_OT_paint_map(bpy.types.Operator):
+    """Paint the weights of a map, or go back to Object Mode"""
+
+    bl_idname = "nicmm.paint_map"
+    bl_label = "Paint Map"
+    bl_options = {"REGISTER", "UNDO"}
+
+    role: EnumProperty(name="Map", description="Which map to paint", items=ROLES)
+
+    @classmethod
+    def poll(cls, context):
+        return _poll(cls, context)
+
+    def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        mesh_object = mesh_data.mesh_object(context)
+        name = getattr(context.scene.nicmm_curves, FIELDS[self.role])
+        if is_painting(context, mesh_object, name):
+            _enter(context, mesh_object, "OBJECT")
+            return {"FINISHED"}
+        if not name:
+            raise mesh_data.InputError(
+                f"No vertex group is chosen for {NAMES[self.role]}. Choose one, or make a new map"
+            )
+        mesh_data.check_local(mesh_object, "its weights cannot be changed")
+        group = mesh_data.vertex_group(mesh_object, name)
+        mesh_object.vertex_groups.active_index = group.index
+        _enter(context, mesh_object, "WEIGHT_PAINT")
+        return {"FINISHED"}
+
+
+def is_painting(context, mesh_object, name: str) -> bool:
+    """Whether the weights of a group are shown and painted."""
+    active = None if mesh_object is None else mesh_object.vertex_groups.active
+    return context.mode == "PAINT_WEIGHT" and active is not None and active.name == name
+
+
+def draw_row(layout, properties, role: str, context, mesh_object) -> None:
+    """Draw the choice of a group with buttons to make and paint it."""
+    field = FIELDS[role]
+    row = layout.row(align=True)
+    row.prop_search(properties, field, mesh_object, "vertex_groups")
+    name = getattr(properties, field)
+    if name:
+        painting = is_painting(context, mesh_object, name)
+        paint = row.operator(
+            NICMM_OT_paint_map.bl_idname, text="", icon="BRUSH_DATA", depress=painting
+        )
+        paint.role = role
+    row.menu(MENUS[role].__name__, text="", icon="ADD")
+
+
+def _draw_menu(menu, role: str) -> None:
+    for identifier, name, _description, icon, _number in SOURCES:
+        entry = menu.layout.operator(NICMM_OT_new_map.bl_idname, text=name, icon=icon)
+        entry.role, entry.source = role, identifier
+
+
+class NICMM_MT_new_obstacles(bpy.types.Menu):
+    bl_label = "New Obstacles"
+
+    def draw(self, _context):
+        _draw_menu(self, "OBSTACLES")
+
+
+class NICMM_MT_new_alignment(bpy.types.Menu):
+    bl_label = "New Alignment"
+
+    def draw(self, _context):
+        _draw_menu(self, "ALIGNMENT")
+
+
+MENUS = {"OBSTACLES": NICMM_MT_new_obstacles, "ALIGNMENT": NICMM_MT_new_alignment}
+
+
+def _poll(cls, context) -> bool:
+    if mesh_data.mesh_object(context) is None:
+        cls.poll_message_set("Make a mesh object active")
+        return False
+    if context.mode not in {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}:
+        cls.poll_message_set("Switch to Object Mode, Edit Mode or Weight Paint")
+        return False
+    return True
+
+
+def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
+    """The weight of every vertex, (V,)."""
+    from .. import nicmm_core as nicmm
+
+    weights = np.zeros(len(mesh_object.data.vertices))
+    if source == "PAINT":
+        return weights
+    if source == "SELECTION":
+        weights[mesh_data.selected_vertices(mesh_object)] = 1.0
+        return weights
+    surface = mesh_data.triangles(mesh_object)
+    mesh = nicmm.Mesh(surface.solved, surface.faces)
+    if source == "CURVATURE":
+        return nicmm.curvature_map(mesh)
+    if source == "SHARP_EDGES":
+        return nicmm.sharp_edge_map(mesh, angle)
+    attribute, words = ATTRIBUTES[source]
+    edges = mesh_data.marked_edges(mesh_object, attribute)
+    if len(edges) == 0:
+        raise mesh_data.InputError(
+            f'No edge of "{mesh_object.name}" is {words}. Mark edges in Edit Mode '
+            "(Edge menu), or make the map from something else"
+        )
+    return nicmm.edge_map(mesh, edges)
+
+
+def _enter(context, mesh_object, mode: str) -> None:
+    """Switch the mesh to a mode, and make it active where a curve on it was."""
+    if context.view_layer.objects.active != mesh_object:
+        context.view_layer.objects.active = mesh_object
+    if mesh_object.mode != mode:
+        bpy.ops.object.mode_set(mode=mode)
+
+
+CLASSES = (
+    NICMM_OT_new_map,
+    NICMM_OT_paint_map,
+    NICMM_MT_new_obstacles,
+    NICMM_MT_new_alignment,
+)
+
+
+def register() -> None:
+    for found in CLASSES:
+        bpy.utils.register_class(found)
+
+
+def unregister() -> None:
+    for found in reversed(CLASSES):
+        bpy.utils.unregister_class(found)

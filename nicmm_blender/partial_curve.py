@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shows a curve that is not finished yet in every 3D viewport."""
+
+import bpy
+
+COLOUR = (1.0, 0.6, 0.1, 1.0)
+WIDTH = 2.0
+"""Pixels, times the scale of the interface."""
+
+
+class PartialCurve:
+    """A polyline in world space, drawn over everything until it is removed."""
+
+    def __init__(self) -> None:
+        self._positions: list = []
+        self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
+
+    def show(self, points, closed: bool) -> None:
+        """Show other points, (n, 3)."""
+        positions = points.tolist()
+        self._positions = positions + positions[:1] if closed else positions
+        redraw_viewports()
+
+    def remove(self) -> None:
+        """Show nothing more."""
+        bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")
+        redraw_viewports()
+
+    def _draw(self) -> None:
+        import gpu
+        from gpu_extras.batch import batch_for_shader
+
+        if len(self._positions) < 2:
+            return
+        shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+        batch = batch_for_shader(shader, "LINE_STRIP", {"pos": self._positions})
+        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        shader.uniform_float("lineWidth", WIDTH * bpy.context.preferences.system.ui_scale)
+        shader.uniform_float("color", COLOUR)
+        gpu.state.blend_set("ALPHA")
+        batch.draw(shader)
+        gpu.state.blend_set("NONE")
+
+
+def redraw_viewports() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Preferences of the extension: how it shares the computer, and whether PyTorch was found."""
+
+import functools
+import importlib.metadata
+import importlib.util
+
+import bpy
+from bpy.props import FloatProperty, IntProperty
+
+PACKAGE = __package__.rpartition(".")[0]
+"""Name of the extension for Blender."""
+
+PATIENCE = 0.4
+KEPT_MESHES = 2
+LIVE_DELAY = 0.3
+
+
+class NICMM_AP_preferences(bpy.types.AddonPreferences):
+    bl_idname = PACKAGE
+
+    patience: FloatProperty(
+        name="Wait For",
+        description="How long the window waits for a curve. What takes longer goes on with a "
+        "progress display while the view can be turned, and Esc stops it",
+        default=PATIENCE,
+        min=0.0,
+        max=10.0,
+        subtype="TIME_ABSOLUTE",
+    )
+    kept_meshes: IntProperty(
+        name="Meshes Kept in Memory",
+        description="Another curve on one of the last meshes is faster. Each keeps about a "
+        "kilobyte for every vertex",
+        default=KEPT_MESHES,
+        min=0,
+        max=64,
+    )
+    live_delay: FloatProperty(
+        name="Live Update After",
+        description="How long a mesh has to rest before its curves are updated",
+        default=LIVE_DELAY,
+        min=0.05,
+        max=10.0,
+        subtype="TIME_ABSOLUTE",
+    )
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in ("patience", "kept_meshes", "live_delay"):
+            column.prop(self, name)
+        box = layout.box()
+        for line in library_report():
+            box.label(text=line)
+
+
+@functools.cache
+def library_report() -> tuple:
+    """What the extension has found, in lines; loads none of it."""
+    lines = []
+    for module, name in (("scipy", "SciPy"), ("igl", "libigl")):
+        version = _version(module, name)
+        missing = f"{name} is missing: install the zip for this platform and this Blender"
+        lines.append(f"{name} {version}" if version else missing)
+    version = _version("torch", "torch")
+    lines.append(
+        f"PyTorch {version}: the method NICMM (Paper) can be used"
+        if version
+        else "PyTorch was not found. It would add the method NICMM (Paper), which is slower than "
+        "the usual one; nothing else needs it"
+    )
+    return (*lines, "Nothing here needs the network")
+
+
+def _version(module: str, distribution: str) -> str:
+    """Version of a package that can be imported, or an empty string."""
+    if importlib.util.find_spec(module) is None:
+        return ""
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "of unknown version"
+
+
+def _get(name: str, default):
+    """A preference; the usual value while the extension is not enabled by its preferences."""
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    found = None if addon is None else addon.preferences
+    return default if found is None else getattr(found, name)
+
+
+def patience() -> float:
+    """Seconds that the window waits for a curve before it goes on by turns."""
+    return _get("patience", PATIENCE)
+
+
+def kept_meshes() -> int:
+    return _get("kept_meshes", KEPT_MESHES)
+
+
+def live_delay() -> float:
+    return _get("live_delay", LIVE_DELAY)
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_AP_preferences)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_AP_preferences)

@@ -1,0 +1,321 @@
+"""The curves on a mesh, designing them again, and keeping them up to date."""
+
+import time
+from importlib import import_module
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender import scenes
+
+ROUNDING = 2e-6
+
+
+def module(extension, name):
+    return import_module(f"{extension.name}.nicmm_blender.{name}")
+
+
+@pytest.fixture
+def sphere(empty_scene):
+    return scenes.sphere()
+
+
+VERTICES = (42, 120, 123, 128)
+"""Of the sphere, once round it."""
+
+
+def draw(mesh_object, **settings):
+    """A designed curve on the mesh, which stays active."""
+    scenes.activate(mesh_object)
+    scenes.select(mesh_object, VERTICES)
+    bpy.ops.nicmm.design_curve(**settings)
+    curve = bpy.context.active_object
+    scenes.activate(mesh_object)
+    return curve
+
+
+def places(curve):
+    """Positions of the curve's points, of either kind of object, in its own space."""
+    if curve.type == "CURVE":
+        return scenes.points(curve)
+    values = np.empty(3 * len(curve.data.points), dtype=np.float32)
+    curve.data.points.foreach_get("position", values)
+    return values.reshape(-1, 3)
+
+
+def pull(mesh_object, share=0.2):
+    """Deform the mesh unevenly, as a user does."""
+    place = scenes.positions(mesh_object)
+    place[:, 2] += share * place[:, 0] ** 2
+    mesh_object.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
+    mesh_object.data.update()
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+@pytest.mark.parametrize("closed", [True, False])
+def test_update_is_designing_again(sphere, output, closed):
+    curve = draw(sphere, output=output, closed=closed, smoothness=2.0)
+    before = places(curve)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    np.testing.assert_allclose(places(curve), before, atol=ROUNDING)
+    pull(sphere)
+    expected = draw(sphere, output=output, closed=closed, smoothness=2.0)
+    assert bpy.ops.nicmm.update_curves(curve=curve.name) == {"FINISHED"}
+    np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
+    assert abs(places(curve)[:, 2].max() - before[:, 2].max()) > 0.05
+
+
+def test_update_keeps_the_object(sphere):
+    curve = draw(sphere, thickness=0.02)
+    curve.name = "Kante ñ 縁"
+    material = bpy.data.materials.new("Red")
+    curve.data.materials.append(material)
+    curve.modifiers.new("Smooth", "SMOOTH")
+    bevel = curve.data.bevel_depth
+    pull(sphere)
+    bpy.ops.nicmm.update_curves()
+    assert bpy.data.objects["Kante ñ 縁"] == curve
+    assert curve.data.bevel_depth == bevel
+    assert list(curve.data.materials) == [material]
+    assert [modifier.type for modifier in curve.modifiers] == ["SMOOTH"]
+    assert bpy.context.active_object == sphere
+
+
+def test_update_in_edit_mode_takes_what_is_being_edited(sphere):
+    curve = draw(sphere)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.resize(value=(2, 2, 2))
+    bpy.ops.nicmm.update_curves()
+    assert np.linalg.norm(places(curve), axis=1).min() > 1.9
+    assert bpy.context.mode == "EDIT_MESH"
+
+
+def test_settings_of_the_panel(sphere):
+    curve = draw(sphere)
+    bpy.context.scene.nicmm_curves.closed = False
+    bpy.ops.nicmm.update_curves(use_panel=True)
+    assert not curve.data.splines[0].use_cyclic_u
+    bpy.context.scene.nicmm_curves.closed = True
+    bpy.ops.nicmm.update_curves()
+    assert not curve.data.splines[0].use_cyclic_u
+
+
+def test_vertices_that_are_new_do_not_matter(sphere, capfd):
+    curve = draw(sphere)
+    controls = scenes.positions(sphere)[list(VERTICES)]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.nicmm.update_curves()
+    assert scenes.distances_to(controls, places(curve)).max() < 1e-5
+    assert "on triangles that are gone and were moved" in capfd.readouterr().out
+
+
+def test_one_of_several_fails(sphere, capfd):
+    good = draw(sphere)
+    group = sphere.vertex_groups.new(name="Wall")
+    bad = draw(sphere, obstacle_group="Wall")
+    sphere.vertex_groups.remove(group)
+    with pytest.raises(RuntimeError, match='no vertex group "Wall"'):
+        bpy.ops.nicmm.update_curves(curve=bad.name)
+    pull(sphere)
+    before = places(good)
+    with pytest.raises(RuntimeError, match="Wall"):
+        bpy.ops.nicmm.update_curves()
+    np.testing.assert_array_equal(places(good), before)
+
+
+def test_unreachable_ones_leave_the_others(sphere, capfd):
+    good = draw(sphere)
+    everywhere = sphere.vertex_groups.new(name="Wall")
+    bad = draw(sphere, obstacle_group="Wall")
+    everywhere.add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
+    before = places(good), places(bad)
+    pull(sphere)
+    bpy.ops.nicmm.update_curves()
+    assert np.abs(places(good).max(axis=0) - before[0].max(axis=0)).max() > 0.01
+    np.testing.assert_array_equal(places(bad), before[1])
+    assert 'the vertex group "Wall"' in capfd.readouterr().out
+
+
+def test_update_says_what_is_missing(sphere):
+    def refusal(**arguments):
+        with pytest.raises(RuntimeError) as caught:
+            bpy.ops.nicmm.update_curves(**arguments)
+        return str(caught.value)
+
+    assert f'No curve was designed on "{sphere.name}"' in refusal()
+    assert 'no designed curve "Nothing"' in refusal(curve="Nothing")
+    curve = draw(sphere)
+    scenes.activate(curve)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "is being edited" in refusal()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.data.objects.remove(sphere)
+    scenes.sphere()
+    assert "is gone" in refusal(curve=curve.name)
+
+
+def test_update_is_one_undo_step(sphere):
+    curve = draw(sphere)
+    name, before = curve.name, places(curve)
+    pull(sphere)
+    bpy.ops.ed.undo_push(message="Pull")
+    bpy.ops.nicmm.update_curves("EXEC_DEFAULT", True)
+    assert np.abs(places(bpy.data.objects[name]) - before[:1]).max() > 0.1
+    bpy.ops.ed.undo()
+    np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
+
+
+def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
+    curve_list = module(empty_scene, "curve_list")
+    mine = [draw(sphere), draw(sphere, output="STICKY")]
+    other = scenes.sphere()
+    draw(other)
+    record = module(empty_scene, "curve_record")
+    assert record.designed_on(sphere) == sorted(mine, key=lambda found: found.name)
+    scenes.activate(mine[1])
+    assert curve_list.mesh_of_context(bpy.context) == sphere
+    objects = bpy.data.objects
+    assert objects[bpy.context.window_manager.nicmm_active_curve] == mine[1]
+    bpy.context.window_manager.nicmm_active_curve = objects.find(mine[0].name)
+    assert bpy.context.active_object == mine[0]
+    assert bpy.context.selected_objects == [mine[0]]
+
+
+# Live update. A timer cannot tick in a test, so the tests do.
+
+
+@pytest.fixture
+def live(empty_scene, sphere):
+    bpy.context.scene.nicmm_live_update = True
+    return module(empty_scene, "live_update")
+
+
+def settle(live):
+    """Let the timer tick until it has nothing more to do; return how often it did."""
+    bpy.context.view_layer.update()
+    ticks = 0
+    while bpy.app.timers.is_registered(live.tick):
+        bpy.app.timers.unregister(live.tick)
+        while (pause := live.tick()) is not None:
+            ticks += 1
+            time.sleep(pause)
+    return ticks
+
+
+def test_live_update_is_off_at_first(empty_scene, sphere):
+    live = module(empty_scene, "live_update")
+    curve = draw(sphere)
+    before = places(curve)
+    pull(sphere)
+    assert settle(live) == 0
+    np.testing.assert_array_equal(places(curve), before)
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+def test_live_update_follows_the_mesh(live, sphere, output):
+    curve = draw(sphere, output=output)
+    settle(live)
+    pull(sphere)
+    assert settle(live) > 0
+    expected = draw(sphere)
+    np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
+
+
+def test_live_update_follows_weights_and_edit_mode(live, sphere):
+    walls = sphere.vertex_groups.new(name="Walls")
+    curve = draw(sphere, obstacle_group="Walls")
+    settle(live)
+    before = places(curve)
+    near = np.linalg.norm(scenes.positions(sphere) - before[len(before) // 8], axis=1) < 0.3
+    walls.add(np.flatnonzero(near).tolist(), 1.0, "REPLACE")
+    sphere.data.update_tag()
+    settle(live)
+    assert scenes.distances_to(before, places(curve)).max() > 0.02
+    bpy.ops.object.mode_set(mode="EDIT")
+    settle(live)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0, 1))
+    settle(live)
+    assert places(curve)[:, 2].min() > 0.5
+
+
+def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch):
+    curve = draw(sphere)
+    settle(live)
+    pull(sphere)
+    settle(live)
+    written = []
+    monkeypatch.setattr(live.curve_list, "replace", lambda *_: written.append(1))
+    for _ in range(3):
+        bpy.context.view_layer.update()
+        settle(live)
+    sphere.data.update_tag()  # said to be changed, but as it was
+    settle(live)
+    assert not written
+    assert places(curve) is not None
+
+
+def test_live_update_survives_undo(live, sphere):
+    name, mesh_name = draw(sphere).name, sphere.name
+    bpy.ops.ed.undo_push(message="Curve")
+    settle(live)
+    pull(sphere)
+    bpy.ops.ed.undo_push(message="Pull")
+    settle(live)
+    pulled = places(bpy.data.objects[name])
+    bpy.ops.ed.undo()
+    settle(live)
+    sphere = bpy.data.objects[mesh_name]
+    expected = places(draw(sphere))
+    np.testing.assert_allclose(places(bpy.data.objects[name]), expected, atol=ROUNDING)
+    assert np.abs(pulled.max(axis=0) - expected.max(axis=0)).max() > 0.01
+
+
+def test_change_during_work_starts_it_again(live, sphere):
+    curve = draw(sphere)
+    settle(live)
+    pull(sphere)
+    bpy.context.view_layer.update()
+    time.sleep(0.35)
+    live.tick()
+    pull(sphere, share=0.3)
+    settle(live)
+    expected = draw(sphere)
+    np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
+
+
+def test_what_cannot_be_updated_is_said_once(live, sphere):
+    wall = sphere.vertex_groups.new(name="Wall")
+    curve = draw(sphere, obstacle_group="Wall")
+    settle(live)
+    before = places(curve)
+    wall.add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
+    sphere.data.update_tag()
+    settle(live)
+    (message,) = live.messages(sphere)
+    assert message.startswith(curve.name) and '"Wall"' in message
+    np.testing.assert_array_equal(places(curve), before)
+    wall.remove(range(len(sphere.data.vertices)))
+    sphere.data.update_tag()
+    settle(live)
+    assert not live.messages(sphere)
+
+
+def test_live_update_in_a_reopened_file(live, sphere, tmp_path):
+    name = draw(sphere).name
+    settle(live)
+    before = places(bpy.data.objects[name])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
+    assert bpy.context.scene.nicmm_live_update
+    settle(live)
+    np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
+    pull(bpy.data.objects["Icosphere"])
+    settle(live)
+    assert np.abs(places(bpy.data.objects[name])[:, 2].max() - before[:, 2].max()) > 0.05

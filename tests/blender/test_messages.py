@@ -1,0 +1,92 @@
+"""Every message of the extension is explained in docs/troubleshooting.md."""
+
+import ast
+import re
+
+import pytest
+
+import build
+
+DOCUMENT = build.ROOT / "docs" / "troubleshooting.md"
+SHORTEST, WORDS = 12, 6
+"""Letters of a piece of a message that is worth looking for, and how much of it is."""
+
+# Of the core, what a request from Blender can be answered with.
+CORE = (
+    "design.py",
+    "free_surface.py",
+    "outputs/cut.py",
+    "outputs/region.py",
+    "path/legs.py",
+    "path/initial_loop.py",
+)
+# What only a caller of the core in Python can do wrong.
+OF_PYTHON = ("mesh is", "progress is", "curve has the control index", "side of", "points pass one")
+
+
+def pieces(node):
+    """The fixed parts of a message, without those that are put together from others."""
+    found = [
+        part.value
+        for part in ast.walk(node)
+        if isinstance(part, ast.Constant) and isinstance(part.value, str)
+    ]
+    begun = [
+        " ".join(plain(text).removeprefix("control points ").split()[:WORDS]) for text in found
+    ]
+    return [piece for piece in begun if len(piece) >= SHORTEST]
+
+
+def plain(text):
+    """Text without marks, as the document may write it."""
+    return " ".join(re.sub(r"[\W_]+", " ", text).split()).lower()
+
+
+def messages(paths, kinds):
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            raised = isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)
+            if raised and node.exc.args:
+                name = getattr(node.exc.func, "attr", getattr(node.exc.func, "id", ""))
+                if name in kinds and (found := pieces(node.exc.args[0])):
+                    yield f"{path.name}:{node.lineno}", found
+
+
+def of_blender():
+    return messages(sorted((build.ROOT / "nicmm_blender").glob("*.py")), {"InputError"})
+
+
+def of_core():
+    kinds = {"UnreachableError", "ControlPointError", "CurveError"}
+    for place, found in messages([build.ROOT / "nicmm_core" / name for name in CORE], kinds):
+        if not any(piece.startswith(OF_PYTHON) for piece in found):
+            yield place, found
+
+
+def polls():
+    for path in sorted((build.ROOT / "nicmm_blender").glob("*.py")):
+        for text in re.findall(r'poll_message_set\("([^"]+)"\)', path.read_text("utf-8")):
+            yield path.name, [plain(text)]
+
+
+@pytest.mark.parametrize("source", [of_blender, of_core, polls])
+def test_messages_are_explained(source):
+    explained = plain(DOCUMENT.read_text(encoding="utf-8"))
+    found = list(source())
+    assert len(found) > 5
+    missing = [place for place, parts in found if not any(part in explained for part in parts)]
+    assert not missing
+
+
+def test_statuses_are_explained():
+    explained = plain(DOCUMENT.read_text(encoding="utf-8"))
+    text = (build.ROOT / "nicmm_core" / "design_result.py").read_text(encoding="utf-8")
+    (status,) = (
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.ClassDef) and node.name == "Status"
+    )
+    for line in status.body:
+        if isinstance(line, ast.Assign) and line.targets[0].id not in ("CONVERGED", "CANCELLED"):
+            first = re.split("[;,]", line.value.value)[0]
+            assert plain(first) in explained, first

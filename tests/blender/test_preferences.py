@@ -1,0 +1,84 @@
+"""Preferences, and what all operators and panels have in common."""
+
+import importlib.metadata
+import importlib.util
+from importlib import import_module
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender import scenes
+
+OPERATORS = ("design_curve", "convert_curve", "edit_curve", "update_curves", "new_map", "paint_map")
+PANELS = ("NICMM_PT_design_curve", "NICMM_PT_maps", "NICMM_PT_curves")
+
+
+@pytest.fixture
+def preferences(empty_scene):
+    module = import_module(f"{empty_scene.name}.nicmm_blender.preferences")
+    module.library_report.cache_clear()
+    yield module
+    module.library_report.cache_clear()
+
+
+def test_all_operators_are_known_here(extension):
+    assert sorted(dir(bpy.ops.nicmm)) == sorted(OPERATORS)
+    assert {name for name in dir(bpy.types) if name.startswith("NICMM_PT_")} == set(PANELS)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_labels_and_tooltips_follow_blender(extension, name):
+    described = getattr(bpy.ops.nicmm, name).get_rna_type()
+    for found in (described, *described.properties):
+        if found.identifier == "rna_type":
+            continue
+        assert found.name[0].isupper(), found.identifier
+        assert found.description and not found.description.endswith("."), found.identifier
+        for item in getattr(found, "enum_items", ()):
+            assert item.name and not item.description.endswith("."), item.identifier
+    assert "UNDO" in getattr(bpy.types, f"NICMM_OT_{name}").bl_options
+
+
+def test_preferences_have_the_usual_values(empty_scene, preferences):
+    found = bpy.context.preferences.addons[empty_scene.name].preferences
+    assert found.patience == pytest.approx(preferences.PATIENCE) == preferences.patience()
+    assert found.kept_meshes == preferences.KEPT_MESHES
+    for name, described in found.bl_rna.properties.items():
+        if name not in ("rna_type", "bl_idname"):
+            assert described.description and not described.description.endswith(".")
+
+
+def test_so_many_meshes_are_kept(empty_scene, preferences):
+    designers = import_module(f"{empty_scene.name}.nicmm_blender.designers")
+    found = bpy.context.preferences.addons[empty_scene.name].preferences
+    designers.forget()
+    try:
+        for wanted, left in ((3, 3), (1, 1), (0, 0)):
+            found.kept_meshes = wanted
+            for _ in range(4):
+                sphere = scenes.sphere()
+                place = scenes.positions(sphere) * (1, 1, 1 + np.random.default_rng().random())
+                sphere.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
+                scenes.select(sphere, scenes.ring(sphere, 3))
+                bpy.ops.nicmm.design_curve()
+            assert len(designers._designers) == left
+    finally:
+        found.kept_meshes = preferences.KEPT_MESHES
+        designers.forget()
+
+
+def test_torch_is_reported_and_not_loaded(preferences, monkeypatch):
+    (scipy, igl, torch, network) = preferences.library_report()
+    assert scipy == f"SciPy {importlib.metadata.version('scipy')}"
+    assert igl == f"libigl {importlib.metadata.version('libigl')}"
+    assert torch.startswith("PyTorch 2") and "NICMM (Paper) can be used" in torch
+    assert "network" in network
+    preferences.library_report.cache_clear()
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name in ("torch", "igl") else found(name)
+    )
+    (_, igl, torch, _) = preferences.library_report()
+    assert igl.startswith("libigl is missing: install the zip")
+    assert torch.startswith("PyTorch was not found. It would add")
