@@ -19,9 +19,6 @@ from .mesh_data import InputError, in_words
 MOST_STEPS = 60
 """Steps from a change until the curve is taken as it is; most need fewer than five."""
 
-SAME_PLACE = 1e-9
-"""Distance in mesh diagonals up to which places are the same but for rounding."""
-
 SMOOTHER = 1.25
 """Factor of one step of smoothness."""
 
@@ -81,7 +78,6 @@ class EditSession:
             points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
         self.state = State(points, asked)
         self.waiting = False
-        self._led = False
         self._steps_left = 0
         self._done: list[State] = []
         self._undone: list[State] = []
@@ -265,7 +261,6 @@ class EditSession:
         target.append(self.state)
         self.state = source.pop()
         self.drop()
-        self._led = False
         resumed = self.curve is not None and self._resume(self.curve)
         if not (self.problem or (self.state.rested and resumed)):
             self._ask()
@@ -306,24 +301,9 @@ class EditSession:
         elif not self._steps_left:
             self.waiting = True
         self._take(design)
-        if self.state.curve is not None and design is not None:
-            self._led |= not self._passes_points()
-        if self._led and self.resting and not self.problem:
-            # Drawn over a fold in parts a curve may keep a loop that one from nothing has not.
-            self.state = replace(self.state, rested=False)
-            self.waiting = True
-
-    def _passes_points(self) -> bool:
-        """Whether the curve has come to all points, rather than part of the way there."""
-        curve, surface = self.curve, self.surface
-        index = curve.control_index
-        passed = surface.points(curve.faces[index], curve.barycentric[index])
-        away = np.linalg.norm(passed - self.positions(), axis=1)
-        return bool((away <= SAME_PLACE * surface.diagonal).all())
 
     def _design(self) -> None:
         self._rest()
-        self._led = False
         self.designer.forget()
         self._take(self._answer(self.designer.design))
 

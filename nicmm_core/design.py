@@ -200,9 +200,8 @@ class Designer:
 
         For live drawing: every call takes a few hundredths of a second on a mesh of any size, and
         the status is `ITERATION_LIMIT` until the curve is at rest; call again with the same
-        arguments until it is. A point that moved far is led there in several calls, between which
-        the curve passes it where it has come to. Arguments not listed here are those of
-        `design_curve`; the order is "given" and the method "nicmm".
+        arguments until it is. Arguments not listed here are those of `design_curve`; the order is
+        "given" and the method "nicmm".
 
         Parameters
         ----------
@@ -212,8 +211,8 @@ class Designer:
         Returns
         -------
         Design or None
-            None where the last curve cannot be led there, or where anything but control points and
-            smoothness differs; then `design` starts anew.
+            None where the last curve cannot be led there, as after a jump of a point, or where
+            anything but control points and smoothness differs; then `forget` and `design`.
 
         Raises
         ------

@@ -32,7 +32,7 @@ from .relaxation.curve_nodes import CurveSurface, unsigned_normals
 from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.exact_curve import ExactCurve, exact_curve
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
-from .relaxation.warm_start import WARM, moved_along, part_of_the_way
+from .relaxation.warm_start import LONGEST_MOVE, LONGEST_MOVE_OF_A_FRAME, WARM, moved_along
 from .request import Request, same_course, same_request
 
 STARTED = 0.6
@@ -43,9 +43,6 @@ SOON_DONE = 5
 
 CROWDED = 3
 """Frames for which strands that were in each other's way are taken to be so still."""
-
-PART_WAYS = (0.06, 0.015)
-"""How far control points are led at once where they cannot be led all the way, in curve lengths."""
 
 
 @dataclass(frozen=True)
@@ -167,18 +164,8 @@ class SurfaceDesigner:
         if last is not None and last.crowded:
             # Without would fail once more.
             config = replace(config, drawn_at_rest=False)
-        start = self._start_from_last(request)
-        if start is not None:
-            return self._relaxed(request, start, config, started)
-        for farthest in PART_WAYS:
-            nearer = self._part_of_the_way(request, farthest)
-            if nearer is None:
-                return None
-            start = self._start_from_last(nearer)
-            if start is not None:
-                design = self._relaxed(nearer, start, config, started)
-                return replace(design, status=Status.ITERATION_LIMIT)
-        return None
+        start = self._start_from_last(request, LONGEST_MOVE_OF_A_FRAME)
+        return None if start is None else self._relaxed(request, start, config, started)
 
     def resume(self, request: Request, curve: SurfaceCurve) -> bool:
         """Go on from a curve as if it were the last one, or forget where it is not on this surface.
@@ -242,29 +229,16 @@ class SurfaceDesigner:
             config = GUIDED if request.has_maps else RelaxationConfig()
             return self._relaxed(request, start, config, started)
 
-    def _start_from_last(self, request: Request) -> _Start | None:
+    def _start_from_last(self, request: Request, longest: float = LONGEST_MOVE) -> _Start | None:
         """The last curve with its control points moved; None where the request is too different."""
         last = self._last
         if last is None or not same_course(request, last.request):
             return None
         points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.exact, points)
+        curve = moved_along(last.start.surface, last.exact, points, longest)
         if curve is None:
             return None
         return replace(last.start, curve=curve, breaking=0)
-
-    def _part_of_the_way(self, request: Request, farthest: float) -> Request | None:
-        """A request between the last one and one that it cannot be led to at once."""
-        last = self._last
-        if last is None or not same_course(request, last.request):
-            return None
-        visited, surface = last.start.visited, last.start.surface
-        found = part_of_the_way(surface, last.exact, request.points[visited], farthest)
-        if found is None:
-            return None
-        given = np.empty(len(visited), dtype=np.int64)
-        given[visited] = np.arange(len(visited))
-        return replace(request, points=found[given])
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""

@@ -13,7 +13,6 @@ from ..array_types import FloatArray, IntArray
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
-from .face_walks import join, strictly_inside
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
@@ -22,15 +21,18 @@ WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
 
-WIDEST_DETOUR = 1.5
-"""Longest way of a control point over the faces, relative to its move in space."""
+LONGEST_MOVE_OF_A_FRAME = 0.03
+"""The same while it is dragged: over a fold of the surface a longer one would leave a loop."""
 
 TAKEN_ALONG = 4.0
 """Distance along the curve up to which nodes move with a control point, in moves."""
 
 
 def moved_along(
-    surface: CurveSurface, curve: ExactCurve, controls: SurfacePoints
+    surface: CurveSurface,
+    curve: ExactCurve,
+    controls: SurfacePoints,
+    longest: float = LONGEST_MOVE,
 ) -> ExactCurve | None:
     """A curve with its control points at new places nearby.
 
@@ -41,6 +43,8 @@ def moved_along(
         Simple, and through its control points in order.
     controls : SurfacePoints
         The new places, in the order visited.
+    longest : float
+        Farthest that one of them may have moved, relative to the curve's length.
 
     Returns
     -------
@@ -51,7 +55,7 @@ def moved_along(
     nodes, at_controls = curve.nodes, curve.control_nodes
     move = controls.positions(mesh) - nodes.positions[at_controls]
     away = np.linalg.norm(move, axis=1)
-    if away.max() > LONGEST_MOVE * float(nodes.lengths.sum()):
+    if away.max() > longest * float(nodes.lengths.sum()):
         return None
     moves = away > 0.0
     shift = _shifts(nodes, at_controls, move)
@@ -71,57 +75,6 @@ def moved_along(
     if changed is None or not is_simple(surface, changed):
         return None
     return changed
-
-
-def part_of_the_way(
-    surface: CurveSurface, curve: ExactCurve, controls: SurfacePoints, farthest: float
-) -> SurfacePoints | None:
-    """Control points that go from those of a curve towards new places, over the faces.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    curve : ExactCurve
-    controls : SurfacePoints
-        The new places, in the order visited.
-    farthest : float
-        How far they go, relative to the curve's length.
-
-    Returns
-    -------
-    SurfacePoints or None
-        None where no straight way leads to one of them without much of a detour.
-    """
-    mesh, nodes = surface.mesh, curve.nodes
-    longest = farthest * float(nodes.lengths.sum())
-    starts = nodes.places[curve.control_nodes]
-    origins, goals = starts.positions(mesh), controls.positions(mesh)
-    faces, barycentric = controls.faces.copy(), controls.barycentric.copy()
-    for far in np.flatnonzero(np.linalg.norm(goals - origins, axis=1) > longest):
-        here = np.array([far])
-        start = SurfacePoints(starts.faces[here], strictly_inside(starts.barycentric[here]))
-        line = _way_over_faces(surface, curve, start, controls[here], here)
-        if line is None:
-            return None
-        gone = np.linalg.norm(np.diff(line.positions(mesh), axis=0, prepend=origins[here]), axis=1)
-        at = max(int(np.searchsorted(np.cumsum(gone), longest, side="right")) - 1, 0)
-        faces[far], barycentric[far] = line.faces[at], line.barycentric[at]
-    return SurfacePoints(faces, barycentric)
-
-
-def _way_over_faces(
-    surface: CurveSurface,
-    curve: ExactCurve,
-    start: SurfacePoints,
-    goal: SurfacePoints,
-    control: IntArray,
-) -> SurfacePoints | None:
-    """Where the straight way of one control point crosses edges; None where none leads there."""
-    normals = curve.nodes.normals[curve.control_nodes[control]]
-    ends = nodes_at(surface, goal, curve.closed).normals
-    plane = normals + np.sign((normals * ends).sum() or 1.0) * ends
-    way = join(surface.mesh, start, goal, plane, WIDEST_DETOUR)
-    return way.crossings if way.reached.all() and len(way.crossings) else None
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:
