@@ -24,7 +24,7 @@ INSIDE = Path(__file__).resolve().with_name("inside.py")
 
 # Sideways and upwards on the front of Suzanne's head, in this order: a loop round the face.
 PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.45, -0.08))
-DRAGGED = 1
+DRAGGED, JUMPING = 3, 1
 PATIENCE = 240.0
 """Seconds that a step may take; software OpenGL is slow."""
 
@@ -170,6 +170,15 @@ def count_points(blender: Blender, count: int, more: str = "True") -> None:
     )
 
 
+def grab(blender: Blender, number: int):
+    """Press the mouse on a control point and return where."""
+    positions = f"helper.session().positions()[{number}]"
+    (start,) = blender.do(f"value = helper.pixels({positions})")
+    blender.move(start)
+    blender.mouse("mousedown", 1)
+    return start
+
+
 def drive(blender: Blender, archive: Path) -> None:
     step("Install the zip")
     check(blender.do("value = bpy.app.background") is False, "a window")
@@ -201,16 +210,11 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.shot("2-five-points")
 
     step("Drag one")
-    dragged = f"helper.session().positions()[{DRAGGED}]"
-    before = blender.do(f"value = {dragged}.tolist()")
-    (start,) = blender.do(f"value = helper.pixels({dragged})")
     blender.do("helper.frames.clear()")
-    blender.move(start)
-    blender.mouse("mousedown", 1)
+    start = grab(blender, DRAGGED)
     for part in range(1, 41):
-        blender.mouse("mousemove", round(start[0] + 1.5 * part), round(start[1] - 2.0 * part))
+        blender.mouse("mousemove", round(start[0] + 0.5 * part), round(start[1] - 1.5 * part))
         time.sleep(0.1)
-    blender.shot("3-drag")
     blender.mouse("mouseup", 1)
     count_points(blender, 5)
     frames = blender.do("value = helper.frames")
@@ -226,8 +230,19 @@ def drive(blender: Blender, archive: Path) -> None:
         f"{moves[-1]:.0f} ms, {sum(spent > FRAME for spent in moves)} above {FRAME:.0f} ms; any "
         f"event {most:.0f} ms; {anew} events with a design from nothing due"
     )
+
+    step("Drag another over the brow to the crown, where the curve is designed anew")
+    dragged = f"helper.session().positions()[{JUMPING}]"
+    before = blender.do(f"value = {dragged}.tolist()")
+    start = grab(blender, JUMPING)
+    for part in range(1, 11):
+        blender.mouse("mousemove", round(start[0] + 6.0 * part), round(start[1] - 8.0 * part))
+        time.sleep(0.1)
+    blender.wait(f"{RESTS} and {dragged}.tolist() != {before}", "a curve while the mouse rests")
+    blender.shot("3-drag")
+    blender.mouse("mouseup", 1)
+    count_points(blender, 5)
     after = blender.do(f"value = {dragged}.tolist()")
-    check(after != before, "the point moved")
 
     step("Ctrl-Z and back, insert on the curve, remove with Ctrl-click")
     blender.key("ctrl+z")
@@ -302,9 +317,7 @@ def drive(blender: Blender, archive: Path) -> None:
     count_points(blender, 6)
     again = blender.do("value = helper.session().polyline().tolist()")
     check(len(again) >= len(kept), "the curve of the file")
-    (start,) = blender.do("value = helper.pixels(helper.session().positions()[1])")
-    blender.move(start)
-    blender.mouse("mousedown", 1)
+    start = grab(blender, 1)
     for part in range(1, 21):
         blender.mouse("mousemove", round(start[0]), round(start[1] - 2.0 * part))
         time.sleep(0.1)
