@@ -176,6 +176,7 @@ def grab(blender: Blender, number: int):
     (start,) = blender.do(f"value = helper.pixels({positions})")
     blender.move(start)
     blender.mouse("mousedown", 1)
+    blender.wait(f"helper.running[0]._grabbed == {number}", "the point is grabbed")
     return start
 
 
