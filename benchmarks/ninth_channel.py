@@ -62,8 +62,8 @@ def run(scale: Scale) -> None:
 
 
 def _samples(scale: Scale) -> Iterator[Sample]:
-    meshes = collections.surfaces(scale, scale.choose(15, 4, 1))
-    for name, mesh, points in random_sets(meshes, scale.choose(2, 1, 1), SEED):
+    meshes = collections.surfaces(scale, scale.choose(12, 4, 1))
+    for name, mesh, points in random_sets(meshes, 1, SEED):
         generator = np.random.default_rng([SEED, zlib.crc32(name.encode())])
         obstacles, alignment = random_maps(mesh, points, generator)
         located = locate_control_points(mesh, points, closed=True)

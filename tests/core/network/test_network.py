@@ -10,6 +10,7 @@ import pytest
 import torch
 
 import nicmm_core as nicmm
+from benchmarks.ninth_channel import blind
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.network import weights_file
 from nicmm_core.network.forward_pass import (
@@ -24,7 +25,7 @@ from nicmm_core.network.forward_pass import (
 )
 from nicmm_core.network.single_pass import NUMPY, network_input, predict_once
 from nicmm_core.network.trainable_network import TORCH, CurveNetwork, build_network, network_weights
-from nicmm_core.network.weights_file import load_weights, save_weights
+from nicmm_core.network.weights_file import load_weights, save_weights, shipped_weights
 from tests.core.checks import random_surface_points
 
 SMALL = NetworkConfig(width=8, depth=2, gate_rank=2)
@@ -312,6 +313,18 @@ def test_shipped_weights_load_for_both_numbers_of_channels(given):
         phi = output(load_weights(channels=channels), features)
         assert np.isfinite(phi).all()
         assert phi.shape == given.initial_distance.shape
+
+
+def test_the_network_that_ships_for_maps_sees_them(given):
+    """And blinded it does not, but is what it was where φ_fea is neutral."""
+    weights = shipped_weights(9)
+    painted = with_ninth(given)
+    neutral = painted._replace(features=painted.features.copy())
+    neutral.features[:, 8] = 1.0
+    assert np.abs(output(weights, painted) - output(weights, neutral)).max() > 1e-3
+    expected = output(weights, neutral)
+    for features in (painted, neutral):
+        np.testing.assert_allclose(output(blind(weights), features), expected, atol=1e-4)
 
 
 def altered(path, **changes):
