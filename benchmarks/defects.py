@@ -40,6 +40,7 @@ def defective_meshes() -> Iterator[tuple[str, Mesh]]:
     yield "components", _together(ball, Mesh(0.5 * vertices + 3.0, faces))
     yield "through itself", _together(ball, Mesh(vertices + [0.7, 0, 0], faces))
     yield "needles", Mesh(vertices * [1.0, 1.0, 1e-7], faces)
+    yield "needles at vertices", Mesh(*_with_needles(vertices, faces, faces[::9]))
     for height in (1e-13, 1e-10, 1e-7, 1e-4):
         yield f"caps of height {height:g}", Mesh(*_slivers(vertices, faces, height))
     yield "millionths", Mesh(1e-6 * vertices, faces)
@@ -78,6 +79,19 @@ def _with_caps(
         new_faces[0] = new_faces[0][~same]
         new_faces.append(np.array([[a, middle, c], [middle, b, c], [a, b, middle]]))
     return np.concatenate(new_vertices), np.concatenate(new_faces)
+
+
+def _with_needles(
+    vertices: FloatArray, faces: IntArray, chosen: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """A vertex in each of some faces so close to a corner that two needles lie beside it."""
+    middles = vertices[chosen].mean(axis=1)
+    added = (1.0 - 1e-8) * vertices[chosen[:, 0]] + 1e-8 * middles
+    number = len(vertices) + np.arange(len(chosen))
+    corners = [chosen, np.roll(chosen, -1, axis=1), np.roll(chosen, -2, axis=1)]
+    around = [np.column_stack([each[:, :2], number]) for each in corners]
+    same = (faces[:, None] == chosen[None]).all(axis=2).any(axis=1)
+    return np.concatenate([vertices, added]), np.concatenate([faces[~same], *around])
 
 
 def _with_fans(vertices: FloatArray, faces: IntArray, size: int) -> tuple[FloatArray, IntArray]:

@@ -184,12 +184,18 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
         raise ControlPointError(
             f"{name}[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
         )
-    points, distance = nearest_points(mesh, positions)
+    # What is far from the box is far from the surface; so far that squares overflow, no nearest
+    # point would be found.
+    corners = mesh.vertices[mesh.referenced]
+    beyond = np.maximum(corners.min(axis=0) - positions, positions - corners.max(axis=0))
+    distance = beyond.max(axis=1)
+    if (distance <= tolerances.ON_SURFACE * mesh.diagonal).all():
+        points, distance = nearest_points(mesh, positions)
     off = distance > tolerances.ON_SURFACE * mesh.diagonal
     if off.any():
         first = int(off.argmax())
         raise ControlPointError(
-            f"{name}[{first}] is off the surface by {distance[first]:.3g}, more than "
+            f"{name}[{first}] is off the surface by at least {distance[first]:.3g}, more than "
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
         )
     flat = ~np.isfinite(points.barycentric).all(axis=1)

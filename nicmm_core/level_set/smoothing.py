@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import linalg
 
 from ..array_types import FloatArray, IntArray
 from ..progress import checkpoint
 from .finite_elements import FiniteElements
-from .sparse_solver import factorise
+from .sparse_solver import Factors, factorise
+
+MOST_ENTRIES = 150
+"""Products of entries of L, for each vertex, up to which A is formed; about 50 are usual."""
 
 AT_ONCE = 8
 """Systems that are solved together; many at once would be one long call."""
@@ -29,7 +31,7 @@ class Smoother:
 
     Attributes
     ----------
-    factor : SuperLU
+    factor : Factors or MixedFactors
         Of A, with M the vertex areas and L the cotangent stiffness.
     vertex_areas : (n,) float array
     control_vertices : (k,) int array
@@ -37,7 +39,7 @@ class Smoother:
         Column j is the field of least ``cᵀ A c`` that is 1 at control vertex j and 0 at the others.
     """
 
-    factor: linalg.SuperLU
+    factor: Factors | MixedFactors
     vertex_areas: FloatArray
     control_vertices: IntArray
     response: FloatArray
@@ -64,8 +66,8 @@ def build_smoother(
     Detail shorter than about 2 π ℓ disappears. Where the elements read φ with signs, ``plain`` are
     those of ordinary functions, which the responses to the control points are.
     """
-    factor = factorise(_bending_operator(elements, length))
-    response_factor = factor if plain is None else factorise(_bending_operator(plain, length))
+    factor = _factorised(elements, length)
+    response_factor = factor if plain is None else _factorised(plain, length)
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
     fields = np.empty_like(loads)
@@ -75,6 +77,36 @@ def build_smoother(
         fields[:, columns] = response_factor.solve(loads[:, columns])
     response = np.linalg.solve(fields[control_vertices].T, fields.T).T
     return Smoother(factor, elements.vertex_areas, control_vertices, response)
+
+
+@dataclass(frozen=True)
+class MixedFactors:
+    """The same as a system of twice the size that has no products of rows.
+
+    With ψ = ℓ² M⁻¹ L φ, A φ = f is ``M φ + ℓ² L ψ = f`` and ``ℓ² L φ - M ψ = 0``. It is symmetric
+    and quasi-definite, so that no order of elimination needs pivots (Vanderbei 1995).
+    """
+
+    factors: Factors
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve for one right side, (n,), or several, (n, k)."""
+        return self.factors.solve(np.concatenate([right, np.zeros_like(right)]))[: len(right)]
+
+
+def _factorised(elements: FiniteElements, length: float) -> Factors | MixedFactors:
+    """A⁻¹; a vertex of thousands of edges would fill millions of the entries of A."""
+    valence = np.diff(elements.stiffness.indptr)
+    if (valence**2).sum() <= MOST_ENTRIES * len(valence):
+        return factorise(_bending_operator(elements, length))
+    return mixed_factors(elements, length)
+
+
+def mixed_factors(elements: FiniteElements, length: float) -> MixedFactors:
+    """A⁻¹ by the mixed system."""
+    mass, coupling = sparse.diags_array(elements.vertex_areas), length**2 * elements.stiffness
+    system = sparse.block_array([[mass, coupling], [coupling, -mass]], format="csr")
+    return MixedFactors(factorise(system))
 
 
 def _bending_operator(elements: FiniteElements, length: float) -> sparse.sparray:

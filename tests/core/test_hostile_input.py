@@ -50,6 +50,12 @@ def test_arrays_of_no_sense_are_refused(vertices, faces):
         nicmm.Mesh(vertices, faces)
 
 
+@pytest.mark.parametrize("far", [1e3, 1e150, 1e200, 1e308])
+def test_positions_at_the_end_of_the_numbers_are_off_the_surface(far):
+    with pytest.raises(nicmm.ControlPointError, match=r"control_points\[1\] is off the surface"):
+        nicmm.design_curve(BALL, [[1.0, 0, 0], [0, -far, 0], [0, 0, 1.0]])
+
+
 def test_ten_thousand_points_are_refused_at_once():
     with pytest.raises(nicmm.ControlPointError, match="same point"):
         nicmm.design_curve(BALL, np.arange(10_000) % 42)

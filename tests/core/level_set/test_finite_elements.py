@@ -1,10 +1,11 @@
 """The operators: exact where linear elements are, converging where they are not."""
 
+import igl
 import numpy as np
 import pytest
 
 from nicmm_core import shapes
-from nicmm_core.level_set.finite_elements import build_finite_elements
+from nicmm_core.level_set.finite_elements import MOLLIFICATION, build_finite_elements, mollified
 from nicmm_core.path.virtual_splits import SplitMesh
 
 
@@ -114,3 +115,27 @@ def test_harmonics_of_the_sphere_converge():
     # Energies converge at second order: a quarter for each halving of the edges.
     assert quotient_error[1] < 0.35 * quotient_error[0]
     assert quotient_error[2] < 0.35 * quotient_error[1]
+
+
+class TestMollification:
+    def test_meshes_without_slivers_keep_their_lengths(self, surface):
+        lengths = igl.edge_lengths(surface.vertices, surface.faces)
+        np.testing.assert_array_equal(mollified(lengths), lengths)
+
+    @pytest.mark.parametrize("excess", [0.0, 1e-9, 1e-3])
+    def test_the_longest_side_is_as_much_shorter_as_is_asked(self, excess):
+        lengths = np.array([[1.0, 1.0, 1.0], [2.0 + excess, 1.0, 1.0]])
+        longer = mollified(lengths)
+        np.testing.assert_allclose(longer - lengths, (longer - lengths)[0, 0], rtol=1e-6)
+        slack = longer.sum(axis=1) - 2.0 * longer.max(axis=1)
+        np.testing.assert_allclose(slack.min(), MOLLIFICATION * lengths.mean(), rtol=1e-6)
+
+    @pytest.mark.parametrize("height", [0.0, 1e-15, 1e-12, 1e-9])
+    def test_operators_of_slivers_are_finite_and_keep_constants(self, height):
+        vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0.4, height, 0], [0.4, -1, 0]])
+        faces = np.array([[0, 1, 2], [1, 0, 3]])
+        lengths = mollified(igl.edge_lengths(vertices, faces))
+        stiffness = -igl.cotmatrix_intrinsic(lengths, faces)
+        assert np.isfinite(stiffness.data).all()
+        scale = np.abs(stiffness.data).max()
+        np.testing.assert_allclose(stiffness @ np.ones(4), 0.0, atol=1e-12 * scale)

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+import nicmm_core as nicmm
+from nicmm_core.level_set import sparse_solver
 from nicmm_core.level_set.finite_elements import build_finite_elements
-from nicmm_core.level_set.smoothing import build_smoother
+from nicmm_core.level_set.smoothing import build_smoother, mixed_factors
 from nicmm_core.path.virtual_splits import SplitMesh
+from tests.core.checks import assert_valid_design
 
 CONTROLS = np.array([3, 40, 111])
 LENGTH = 0.3
@@ -83,3 +86,35 @@ def test_smoothed_field_is_the_minimiser(elements, smoother, noise):
 def test_interpolating_leaves_a_field_that_is_zero_already(smoother, noise):
     noise[CONTROLS] = 0.0
     np.testing.assert_array_equal(smoother.interpolating(noise), noise)
+
+
+@pytest.mark.parametrize("length", [0.02, 0.2])
+def test_the_mixed_system_solves_the_same(ball, length):
+    working, _ = SplitMesh(ball).assemble(0)
+    elements = build_finite_elements(working.vertices, working.faces, working.on_boundary)
+    right = np.random.default_rng(0).normal(size=(len(working.vertices), 2))
+    stiffness, areas = elements.stiffness, elements.vertex_areas
+    found = mixed_factors(elements, length).solve(right)
+    bent = stiffness @ ((stiffness @ found) / areas[:, None])
+    np.testing.assert_allclose(areas[:, None] * found + length**4 * bent, right, atol=1e-9)
+
+
+def test_a_vertex_of_thousands_of_edges_fills_no_matrix(monkeypatch):
+    sizes = []
+    plain = sparse_solver.linalg.splu
+    monkeypatch.setattr(
+        sparse_solver.linalg,
+        "splu",
+        lambda matrix, *rest, **named: sizes.append(matrix.nnz) or plain(matrix, *rest, **named),
+    )
+    rim = 3000
+    angle = 2.0 * np.pi * np.arange(rim) / rim
+    vertices = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(rim)])
+    vertices = np.concatenate([vertices, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    start, end = np.arange(rim), (np.arange(rim) + 1) % rim
+    faces = [np.column_stack([start, end, np.full(rim, rim)])]
+    faces.append(np.column_stack([end, start, np.full(rim, rim + 1)]))
+    mesh = nicmm.Mesh(vertices, np.concatenate(faces))
+    chosen = [0, 900, 2000]
+    assert_valid_design(mesh, nicmm.design_curve(mesh, chosen), mesh.vertices[chosen])
+    assert max(sizes) < 100 * len(vertices)
