@@ -19,6 +19,7 @@ MENUS = (
     "VIEW3D_MT_edit_mesh_context_menu",
     "VIEW3D_MT_curve_add",
 )
+HANDLERS = ("depsgraph_update_post", "undo_post", "redo_post", "load_pre", "load_post")
 ENABLE = """
 import sys
 import bpy
@@ -105,6 +106,11 @@ def test_disabling_removes_everything(extension):
         assert not hasattr(bpy.types, "NICMM_PT_design_curve")
         assert not hasattr(bpy.types, "NICMM_PG_settings")
         assert not hasattr(bpy.types.Scene, "nicmm_curves")
+        assert not hasattr(bpy.types.Scene, "nicmm_live_update")
+        assert not hasattr(bpy.types.WindowManager, "nicmm_active_curve")
+        assert not [name for name in dir(bpy.types) if name.startswith("NICMM_")]
+        for handlers in (getattr(bpy.app.handlers, name) for name in HANDLERS):
+            assert not [one for one in handlers if one.__module__.startswith(extension.name)]
         for menu in MENUS:
             assert not [name for name in entries(menu) if name.startswith(extension.name)]
     finally:
