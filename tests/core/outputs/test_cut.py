@@ -2,22 +2,20 @@
 
 from collections import Counter
 
-import igl
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
+from benchmarks import collections
 from nicmm_core import shapes
 from nicmm_core.curve import curve_on_mesh
-from nicmm_core.files import read_mesh
 from nicmm_core.outputs.cut import cut_mesh
 from nicmm_core.outputs.polygons import cut_polygons
 from tests.core.checks import flipped, grid, renumbered, scaled
 from tests.core.outputs.checks import assert_valid_cut, edges_with_counts, longest_edge
 from tests.core.outputs.curves import KINDS, designed
-from tests.core.test_corpus import some_files
 
 NO_CONTROLS = np.zeros(0, dtype=np.int64)
 
@@ -53,15 +51,15 @@ def test_curve_of_the_papers_method(closed):
     assert_valid_cut(ball, cut_mesh(ball, design.curves[0]), design.curves[0])
 
 
-@pytest.mark.skipif(not some_files(), reason="the collection of meshes is not beside this folder")
-@pytest.mark.parametrize("path", some_files(), ids=lambda path: path.stem)
-def test_scans(path):
-    coarse = read_mesh(path)
-    mesh = nicmm.Mesh(*igl.loop(coarse.vertices.copy(), coarse.faces.copy(), 1))
-    chosen = np.random.default_rng(1).choice(len(mesh.vertices), 4, replace=False)
-    for closed in (True, False):
-        curve = nicmm.design_curve(mesh, chosen, order="shortest", closed=closed).curves[0]
-        assert_valid_cut(mesh, cut_mesh(mesh, curve), curve)
+@pytest.mark.skipif(
+    not collections.COLLECTIONS.exists(), reason="the meshes are not beside this folder"
+)
+def test_scans():
+    for number, (_, mesh) in enumerate(collections.shrec16(6, subdivisions=1)):
+        chosen = np.random.default_rng(number).choice(len(mesh.vertices), 4, replace=False)
+        for closed in (True, False):
+            curve = nicmm.design_curve(mesh, chosen, order="shortest", closed=closed).curves[0]
+            assert_valid_cut(mesh, cut_mesh(mesh, curve), curve)
 
 
 def test_edge_of_three_faces_is_cut_in_all_of_them():
