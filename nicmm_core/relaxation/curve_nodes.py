@@ -105,7 +105,9 @@ class Nodes:
         # Barycentric coordinates of the move: least squares in the plane of the face.
         p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
         f, g = (one * self.sideways).sum(axis=1), (other * self.sideways).sum(axis=1)
-        determinant = np.maximum(p * r - q * q, tolerances.TINY)
+        # No smaller than what rounding leaves of it where two long sides make hardly any angle.
+        determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
+        determinant = np.maximum(determinant, tolerances.TINY)
         u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
         change = np.stack([-u - v, u, v], axis=1)
         corner_normals = _corner_normals(surface, faces)

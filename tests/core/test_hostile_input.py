@@ -99,3 +99,10 @@ def test_crashes_and_hangs_are_results_of_the_fuzzer():
     assert [one.result for one in done] == ["one", None, "two", None, "three"]
     assert [one.output.strip() for one in done] == ["hello one", "", "hello two", "", "hello three"]
     assert "died" in done[1].failure and "no answer" in done[3].failure
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", [1746, 5864])
+def test_what_a_whole_run_has_found(number):
+    """Positions without a nearest point; faces whose derivatives overflowed."""
+    assert hostile_input.answer(number).faults == []
