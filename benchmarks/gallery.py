@@ -20,8 +20,8 @@ from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.mesh import Mesh, unique_edges
 
 from . import collections, renders, report
+from .lanes import lane_beside
 from .methods import METHODS
-from .polylines import NearestPoints
 from .scale import Scale
 
 SEED = 16
@@ -35,9 +35,10 @@ RING_RADIUS = 0.22
 """Distance of the control points from the middle of their ring, in √area."""
 
 OBSTACLE_RADIUS = 0.08
-ALIGNMENT_RADIUS = 0.05
-ALIGNMENT_OFFSET = 0.06
-"""How far beside the free curve the alignment region lies, in √area as the radii are."""
+"""Of the paint on the free curve, in √area."""
+
+FOLLOWED_WITHIN = 0.015
+"""Distance from the middle of a lane at which a curve is near it, in diagonals."""
 
 FEWEST_VERTICES, MOST_VERTICES = 1500, 12000
 
@@ -59,9 +60,10 @@ class Region:
     places : (p, 3) float array
         Its middle: a point, or a line beside the free curve.
     radius : float
-        Distance from the middle at which the paint has faded.
+        Distance from the middle at which an obstacle's paint has faded, or from which on a curve
+        does not follow a lane.
     weights : (V,) float array
-        The map: 1 within half the radius.
+        The map.
     """
 
     kind: str
@@ -72,11 +74,11 @@ class Region:
     def share(self, mesh: Mesh, curve: SurfaceCurve) -> float:
         """Share of the curve inside an obstacle, or of an alignment line that has the curve near.
 
-        Inside is where the paint is stronger than ½, and near is the same distance.
+        Inside is where the paint is stronger than ½.
         """
         even, segment = resample(curve.points, 1024)
         if self.kind == ALIGNMENT:
-            return float((cKDTree(even).query(self.places)[0] < 0.75 * self.radius).mean())
+            return float((cKDTree(even).query(self.places)[0] < self.radius).mean())
         corners = self.weights[mesh.faces[curve.faces[segment]]]
         return float(((curve.barycentric[segment] * corners).sum(axis=1) > 0.5).mean())
 
@@ -153,7 +155,7 @@ def run(scale: Scale) -> None:
     renders.render_sheet([example.picture(example.name) for example in examples], many, scale)
     body = (
         f"Seed {SEED}, `{METHOD}`, {POINTS} control points on a ring about a random vertex of each "
-        f"mesh, obstacles on the free curve and alignment regions beside it.\n\n"
+        f"mesh, obstacles on the free curve and lanes beside it (`lanes`).\n\n"
         + report.figure(alignment, "Alignment (Fig. 13): without and with the blue region")
         + "\n\n"
         + report.figure(obstacles, "An obstacle (Fig. 14): white without it, blue with it")
@@ -219,6 +221,9 @@ def _example(
         try:
             free = nicmm.design_curve(mesh, points, order="shortest", method=METHOD)
             region = None if kind is None else _region(mesh, free.curves[0], kind)
+            if kind is not None and region is None:
+                print(f"  {name}: no room for a lane", flush=True)
+                continue
             guided = None if region is None else _guided(mesh, points, region)
         except nicmm.NicmmError as error:
             print(f"  {name}: {error}", flush=True)
@@ -268,27 +273,21 @@ def _ring(mesh: Mesh, generator: np.random.Generator) -> IntArray | None:
     return np.array(chosen)
 
 
-def _region(mesh: Mesh, curve: SurfaceCurve, kind: str) -> Region:
-    """An obstacle on the curve, or a strip beside it to follow.
+def _region(mesh: Mesh, curve: SurfaceCurve, kind: str) -> Region | None:
+    """An obstacle on the curve, or a lane beside it to follow; None without room for a lane.
 
     Both lie in the middle of the longest stretch between two control points.
     """
-    unit = float(np.sqrt(mesh.face_areas.sum()))
+    if kind == ALIGNMENT:
+        lane = lane_beside(mesh, curve)
+        if lane is None:
+            return None
+        return Region(kind, lane.line, FOLLOWED_WITHIN * mesh.diagonal, lane.weights)
+    radius = OBSTACLE_RADIUS * float(np.sqrt(mesh.face_areas.sum()))
     stretch = _longest_stretch(curve)
-    if kind == OBSTACLE:
-        places, radius = stretch[len(stretch) // 2][None], OBSTACLE_RADIUS * unit
-    else:
-        middle = stretch[len(stretch) // 4 : -len(stretch) // 4]
-        surface = NearestPoints(mesh)
-        _, faces, barycentric = surface.project(middle)
-        along = np.gradient(middle, axis=0)
-        across = np.cross(surface.normals(faces, barycentric), along)
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        beside = middle + ALIGNMENT_OFFSET * unit * across
-        places = surface.curve(beside, np.zeros(0, dtype=np.int64)).points
-        radius = ALIGNMENT_RADIUS * unit
-    distance = cKDTree(places).query(mesh.vertices)[0]
-    return Region(kind, places, radius, np.clip(2.0 - 2.0 * distance / radius, 0.0, 1.0))
+    middle = stretch[len(stretch) // 2][None]
+    distance = cKDTree(middle).query(mesh.vertices)[0]
+    return Region(kind, middle, radius, np.clip(2.0 - 2.0 * distance / radius, 0.0, 1.0))
 
 
 def _longest_stretch(curve: SurfaceCurve) -> FloatArray:
