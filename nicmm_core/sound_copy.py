@@ -421,14 +421,20 @@ class _Sides:
 def _with_areas(
     mesh: Mesh, faces: IntArray, vertex: IntArray, face: IntArray, place: IntArray
 ) -> MeshCopy:
-    """A copy with these faces, in which every face has an area where that is possible."""
+    """A copy with these faces, in which every face has an area where that is possible.
+
+    Vertices that stand for one vertex of the mesh are moved apart.
+    """
     vertices = mesh.vertices[vertex]
     short = SHORT * mesh.diagonal
     flat = _flat(vertices, faces, short)
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MeshCopy(mesh, mesh, face, vertex)
     origin = np.zeros(3)
-    if flat.any():
+    # Straight ways from one copy of a vertex would pass exactly through the others.
+    doubled = np.ones(len(vertices), dtype=bool)
+    doubled[np.unique(place, return_index=True)[1]] = False
+    if flat.any() or doubled.any():
         # Far from the origin a small move would be lost to rounding.
         origin = vertices[faces[0, 0]]
         vertices = vertices - origin
@@ -437,7 +443,7 @@ def _with_areas(
         generator = np.random.default_rng(SEED)
         for _ in range(ATTEMPTS):
             checkpoint()
-            moving = np.zeros(len(vertices), dtype=bool)
+            moving = doubled.copy()
             moving[faces[still]] = True
             moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
             vertices = np.where(moving[:, None], start + moves, vertices)

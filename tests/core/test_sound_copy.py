@@ -89,7 +89,16 @@ def test_copies_keep_faces_and_have_no_defects(name):
         assert (unique_edges(copy.mesh.faces)[1] <= 2).all()
         assert (copy.mesh.face_areas > 0.0).all()
         moved = copy.mesh.vertices[corners] + copy.origin - there
-        assert np.abs(moved).max() <= 2e-3 * mesh.mean_edge_length + 1e-9
+        start, end = mesh.vertices[mesh.edges].transpose(1, 0, 2)
+        assert np.abs(moved).max() <= 1e-3 * np.linalg.norm(end - start, axis=1).max() + 1e-9
+
+
+def test_copies_of_one_vertex_are_at_different_places():
+    """Otherwise a straight way from a control point at one would pass exactly through another."""
+    copy = first_copy(MESHES["touching at vertices"])
+    doubled = np.unique(copy.place, return_counts=True)[1].max()
+    assert doubled > 1
+    assert len(np.unique(copy.mesh.vertices, axis=0)) == len(copy.mesh.vertices)
 
 
 def test_only_vertices_of_faces_without_area_move():

@@ -76,7 +76,7 @@ def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
     directly = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
     apart, _ = cKDTree(directly.points).query(by_cells.points)
     assert apart.max() < 0.02
-    assert by_cells.length == pytest.approx(directly.length, rel=1e-3)
+    assert by_cells.length == pytest.approx(directly.length, rel=2e-3)
 
 
 def test_points_in_one_cell_are_told_apart(large):
