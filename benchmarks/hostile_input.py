@@ -20,7 +20,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.files import CURVE_FORMATS, MESH_FORMATS, read_mesh, write_curve, write_mesh
+from nicmm_core.files import MESH_FORMATS, read_mesh, write_curve, write_mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.weights_file import SHIPPED, load_weights
 from nicmm_core.surface_points import locate_control_points
@@ -227,8 +227,6 @@ def _output(generator: np.random.Generator, result: Answer) -> None:
         "/proc/x.json", "~/x.csv", "ü/x.obj",
     )  # fmt: skip
     path = _chosen(generator, (*paths, *OBJECTS[:20]))
-    if isinstance(path, str) and path in ("/", "."):
-        path += _chosen(generator, ("", *MESH_FORMATS, *CURVE_FORMATS))
     mesh = _sound_mesh(generator)
     match generator.integers(3):
         case 0:

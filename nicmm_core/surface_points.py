@@ -149,7 +149,8 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> Surf
             "one row a face"
         )
     _check_range(f"{name}.faces", faces, len(mesh.faces), "faces")
-    sums = barycentric.sum(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):  # of what is refused
+        sums = barycentric.sum(axis=1)
     bad = (
         ~np.isfinite(barycentric).all(axis=1)
         | (barycentric < -tolerances.SNAP).any(axis=1)
