@@ -104,5 +104,5 @@ def test_crashes_and_hangs_are_results_of_the_fuzzer():
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("number", [1746, 5864, 7294])
 def test_what_a_whole_run_has_found(number):
-    """Positions without a nearest point; faces whose derivatives overflowed; infinite coordinates."""
+    """Positions without a nearest point; derivatives that overflowed; infinite coordinates."""
     assert hostile_input.answer(number).faults == []
