@@ -116,6 +116,9 @@ SURELY = 0.1
 STRAIGHT = 2e-3
 """Share of bending in the energy below which a curve is straight enough not to go on for it."""
 
+TWICE = 4.0 / 3.0
+"""Fall of the energy, relative to half its slope along a step, from which twice of it may pay."""
+
 SMALL_MOVE = 0.1
 """Moves that do not disturb the spacing, in mean steps."""
 
@@ -352,8 +355,9 @@ class _Relaxation:
             moved, stayed = sideways(surface, nodes, move)
             reached = elastic_energy(moved, weights)
             lowered = reached < energy
-            if lowered:
-                # Gauss-Newton's matrix is too stiff where the curve bends a lot.
+            # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
+            # both energies with the slope here is lower at twice the step after such a fall.
+            if lowered and energy - reached > -TWICE * float(system.slope @ move):
                 farther, also_stayed = sideways(surface, nodes, 2.0 * move)
                 if elastic_energy(farther, weights) < reached:
                     moved, stayed, farthest = farther, also_stayed, 2.0 * farthest
