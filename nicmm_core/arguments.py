@@ -40,18 +40,24 @@ def check_torch() -> None:
         ) from error
 
 
-def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
-    """Weights in [0, 1] at the vertices, (V,), or an ArgumentError that names them."""
-    if weights is None:
-        return None
+def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -> FloatArray:
+    """One number a vertex, (V,), or an ArgumentError that names them; they may be infinite."""
     try:
-        checked = real_array(weights)
+        checked = real_array(values)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
     if checked.shape != (len(mesh.vertices),):
         raise ArgumentError(
-            f"{name} has shape {checked.shape}; pass one weight a vertex, ({len(mesh.vertices)},)"
+            f"{name} has shape {checked.shape}; pass one {kind} a vertex, ({len(mesh.vertices)},)"
         )
+    return checked
+
+
+def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
+    """Weights in [0, 1] at the vertices, (V,), or an ArgumentError that names them."""
+    if weights is None:
+        return None
+    checked = checked_vertex_values(name, weights, mesh, "weight")
     bad = ~((checked >= 0.0) & (checked <= 1.0))
     if bad.any():
         first = int(bad.argmax())

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from . import tolerances
+from .arguments import checked_vertex_values
 from .array_types import BoolArray, FloatArray, IntArray
 from .errors import ArgumentError
-from .mesh import Mesh, real_array, unique_edges
+from .mesh import Mesh, unique_edges
 from .relaxation.curve_nodes import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
@@ -220,14 +221,7 @@ def value_map(
     ArgumentError
         If values are missing or no numbers, or the limits are the same.
     """
-    try:
-        checked = real_array(values)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"values cannot be read as numbers ({error})") from error
-    if checked.shape != (len(mesh.vertices),):
-        raise ArgumentError(
-            f"values has shape {checked.shape}; pass one value a vertex, ({len(mesh.vertices)},)"
-        )
+    checked = checked_vertex_values("values", values, mesh, "value")
     bad = ~np.isfinite(checked)
     if bad.any():
         first = int(bad.argmax())
