@@ -97,6 +97,7 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
         default="CURVE",
     )
     thickness: _OUTPUT["thickness"]
+    tube: _OUTPUT["tube"]
     curve: bpy.props.StringProperty(
         name="Curve Object",
         description="The designed curve to edit. Empty for the active one, or for a new curve "
@@ -139,6 +140,8 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
         if not self.curve:
             layout.prop(self, "output")
             layout.prop(self, "thickness")
+            if self.output == "STICKY":
+                layout.prop(self, "tube")
 
     # For scripts, and for the redo panel.
 
@@ -175,6 +178,7 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
     # In a window.
 
     def invoke(self, context, event):
+        settings.choose_tube(self)
         if context.space_data is None or context.space_data.type != "VIEW_3D":
             return self.execute(context)
         return reporting(self, lambda: self._invoke(context, event))

@@ -75,7 +75,7 @@ def open_session(context, edited, asked: Asked) -> Opened:
 def keep(context, opened: Opened, edited, settings):
     """Write a session's curve into the object that was edited, or a new one; return that.
 
-    `settings` has the `output` and the `thickness` of a new one.
+    `settings` has the `output`, the `thickness` and the `tube` of a new one.
     """
     session, mesh_object = opened.session, opened.mesh_object
     surface, curves = session.surface, [session.curve]

@@ -51,6 +51,10 @@ class NICMM_OT_design_curve(
     def draw(self, context):
         settings.draw(self.layout, self, mesh_data.mesh_object(context))
 
+    def invoke(self, context, event):
+        settings.choose_tube(self)
+        return super().invoke(context, event)
+
     def requests(self, context) -> list:
         mesh_object = mesh_data.mesh_object(context)
         mesh_data.synchronise(mesh_object)
@@ -118,6 +122,10 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
     def draw(self, context):
         settings.draw_output(self.layout, self)
         self.layout.prop(self, "keep_original")
+
+    def invoke(self, context, _event):
+        settings.choose_tube(self)
+        return self.execute(context)
 
     def execute(self, context):
         return reporting(self, lambda: self._execute(context))

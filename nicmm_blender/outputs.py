@@ -52,7 +52,7 @@ def as_object(mesh_object, surface, curves, settings):
     """Make a curve object, not yet in any collection."""
     thickness = settings.thickness * surface.diagonal
     if settings.output == "STICKY":
-        return sticky_curves.add(mesh_object, surface, curves, thickness)
+        return sticky_curves.add(mesh_object, surface, curves, thickness, settings.tube)
     return curve_object.polyline_object(mesh_object, _polylines(surface, curves), thickness)
 
 

@@ -4,6 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
+from . import sticky_curves
+
 
 class DesignProperties:
     """What the operator and the scene's settings have in common."""
@@ -70,6 +72,15 @@ class DesignProperties:
     )
 
 
+def _tube_property(default: bool):
+    return BoolProperty(
+        name="Tube",
+        description="Show the sticky curve as a mesh round it. Before Blender 5.0 the viewport "
+        "draws hair curves themselves with a few points only",
+        default=default,
+    )
+
+
 class OutputProperties:
     """What becomes of a curve; for a new one and for one that is converted."""
 
@@ -99,6 +110,7 @@ class OutputProperties:
         precision=4,
         step=0.1,
     )
+    tube: _tube_property(False)
     mark_seam: BoolProperty(
         name="Mark Seam",
         description="Make the edges along the curve UV seams",
@@ -172,6 +184,17 @@ PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotat
 class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGroup):
     """Settings of the sidebar panel, kept with the scene."""
 
+    tube: _tube_property(not sticky_curves.are_drawn_with_all_points())
+
+
+def choose_tube(operator) -> None:
+    """Begin with a tube where it looks better; for operators that the window calls, not scripts.
+
+    What the caller has set, or the user chose the last time, stays.
+    """
+    if not operator.properties.is_property_set("tube", ghost=False):
+        operator.tube = not sticky_curves.are_drawn_with_all_points()
+
 
 def draw(layout, properties, mesh_object) -> None:
     """Draw the settings for a curve on `mesh_object`, which may be None; for the redo panel."""
@@ -209,6 +232,7 @@ def draw_output(layout, properties) -> None:
     cuts = output in {"EDGES", "PARTS"} or (output == "REGION" and properties.region_cut)
     shown = {
         "thickness": output in {"CURVE", "STICKY"},
+        "tube": output == "STICKY",
         "region_as": output == "REGION",
         "region_cut": output == "REGION",
         "parts_as": output == "PARTS",

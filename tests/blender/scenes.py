@@ -11,6 +11,14 @@ def sphere(subdivisions=3):
     return bpy.context.active_object
 
 
+def monkey():
+    """Suzanne, of quads and triangles, with a closed curve's vertices selected round the crown."""
+    bpy.ops.mesh.primitive_monkey_add()
+    made = bpy.context.active_object
+    select(made, [73, 365, 74, 366])
+    return made
+
+
 def activate(chosen):
     """Make an object the active and the only selected one, as a click on it does."""
     bpy.ops.object.select_all(action="DESELECT")
@@ -74,3 +82,16 @@ def points(curve_object, spline=0):
 def distances_to(targets, polyline):
     """Distance of each target to the nearest point of a polyline."""
     return np.linalg.norm(targets[:, None] - polyline[None], axis=2).min(axis=1)
+
+
+def get(sequence, name, width=1, dtype=np.float32):
+    values = np.empty(len(sequence) * width, dtype=dtype)
+    sequence.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
+
+
+def evaluated_points(curves_object):
+    """Positions of the points of a hair curves object after its modifiers."""
+    bpy.context.view_layer.update()
+    data = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return get(data.points, "position", 3).astype(float)

@@ -7,7 +7,7 @@ import pytest
 import bmesh
 
 from tests.blender import scenes
-from tests.blender.scenes import triangles
+from tests.blender.scenes import evaluated_points, get, triangles
 
 ROUNDING = 2e-6
 MODES = pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
@@ -15,11 +15,7 @@ MODES = pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 
 @pytest.fixture
 def monkey(empty_scene):
-    """Suzanne, of quads and triangles, with a closed curve's vertices selected round the crown."""
-    bpy.ops.mesh.primitive_monkey_add()
-    monkey = bpy.context.active_object
-    scenes.select(monkey, [73, 365, 74, 366])
-    return monkey
+    return scenes.monkey()
 
 
 def design(mode, **settings):
@@ -37,12 +33,6 @@ def drawn(mesh_object):
     curve = bpy.context.active_object
     assert curve is not mesh_object
     return curve
-
-
-def get(sequence, name, width=1, dtype=np.float32):
-    values = np.empty(len(sequence) * width, dtype=dtype)
-    sequence.foreach_get(name, values)
-    return values.reshape(-1, width) if width > 1 else values
 
 
 def seams(mesh_object):
@@ -366,92 +356,6 @@ def n_rim_edges(mesh_object):
     count = sum(len(edge.link_faces) == 1 for edge in edited.edges)
     edited.free()
     return count
-
-
-# Sticky curves
-
-
-def sticky(mesh_object, **settings):
-    bpy.context.view_layer.objects.active = mesh_object
-    design("OBJECT", output="STICKY", **settings)
-    (found,) = [candidate for candidate in bpy.data.objects if candidate.type == "CURVES"]
-    return found
-
-
-def evaluated_points(curves_object):
-    bpy.context.view_layer.update()
-    data = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    return get(data.points, "position", 3).astype(float)
-
-
-def on_deformed_mesh(mesh_object, curves_object):
-    """Where the stored triangles and coordinates are on the mesh after its modifiers."""
-    bpy.context.view_layer.update()
-    deformed = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    place = get(deformed.vertices, "co", 3).astype(float)
-    attributes = curves_object.data.attributes
-    corners = np.stack(
-        [get(attributes[f"vertex_{k}"].data, "value", dtype=np.int32) for k in (1, 2, 3)], axis=1
-    )
-    weights = get(attributes["barycentric"].data, "vector", 3).astype(float)
-    return np.einsum("nj,njk->nk", weights, place[corners])
-
-
-@pytest.mark.parametrize("closed", [True, False])
-def test_sticky_curve_is_the_curve(monkey, closed):
-    expected = scenes.points(drawn_with(monkey, closed=closed))
-    curves = sticky(monkey, closed=closed)
-    assert curves.parent is monkey
-    np.testing.assert_allclose(evaluated_points(curves), expected, atol=ROUNDING)
-    data = curves.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    assert get(data.attributes["curve_type"].data, "value", dtype=np.int32).tolist() == [1]
-    assert [bool(v) for v in get(data.attributes["cyclic"].data, "value", dtype=bool)] == [closed]
-    faces = get(curves.data.attributes["face"].data, "value", dtype=np.int32)
-    corners = get(curves.data.attributes["vertex_1"].data, "value", dtype=np.int32)
-    assert all(
-        int(vertex) in monkey.data.polygons[int(face)].vertices
-        for face, vertex in zip(faces, corners, strict=True)
-    )
-
-
-def drawn_with(mesh_object, **settings):
-    bpy.context.view_layer.objects.active = mesh_object
-    bpy.ops.nicmm.design_curve(**settings)
-    return bpy.context.active_object
-
-
-def test_sticky_curve_follows_a_cast_and_an_armature(monkey):
-    monkey.location = (0.3, -1.0, 2.0)
-    monkey.rotation_euler = (0.3, 0.5, -1.0)
-    curves = sticky(monkey)
-    at_rest = evaluated_points(curves)
-
-    bpy.ops.object.armature_add(location=monkey.location)
-    armature = bpy.context.active_object
-    bpy.ops.object.mode_set(mode="EDIT")
-    first = armature.data.edit_bones[0]
-    second = armature.data.edit_bones.new("Second")
-    second.head, second.tail = first.tail, (1.0, 0.0, 1.0)
-    names = [first.name, "Second"]
-    bpy.ops.object.mode_set(mode="OBJECT")
-    place = scenes.positions(monkey)
-    for name, share in zip(names, (place[:, 0] + 1.5, 1.5 - place[:, 0]), strict=True):
-        group = monkey.vertex_groups.new(name=name)
-        for vertex, weight in enumerate(np.clip(share / 3.0, 0, 1)):
-            group.add([vertex], float(weight), "REPLACE")
-    monkey.modifiers.new("Armature", "ARMATURE").object = armature
-    armature.pose.bones[names[0]].rotation_quaternion = (0.9, 0.3, 0.3, 0.0)
-    armature.pose.bones[names[1]].rotation_quaternion = (0.8, -0.3, 0.0, 0.5)
-    armature.pose.bones[names[1]].location = (0.2, 0.1, 0.4)
-    bent = evaluated_points(curves)
-    assert np.linalg.norm(bent - at_rest, axis=1).max() > 0.1
-    assert np.abs(bent - on_deformed_mesh(monkey, curves)).max() < 1e-6
-
-    cast = monkey.modifiers.new("Cast", "CAST")
-    cast.factor = 0.7
-    cast_points = evaluated_points(curves)
-    assert np.linalg.norm(cast_points - bent, axis=1).max() > 0.1
-    assert np.abs(cast_points - on_deformed_mesh(monkey, curves)).max() < 1e-6
 
 
 # Converting

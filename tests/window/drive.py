@@ -337,7 +337,8 @@ def drive(blender: Blender, archive: Path) -> None:
         check(
             blender.do(
                 "with helper.in_view():\n"
-                f"    value = list(bpy.ops.nicmm.convert_curve({arguments}))"
+                # As a menu calls it, not as a script does.
+                f'    value = list(bpy.ops.nicmm.convert_curve("INVOKE_DEFAULT", {arguments}))'
             )
             == ["FINISHED"],
             f"convert to {name}",
