@@ -16,7 +16,7 @@ def are_drawn_with_all_points() -> bool:
     """Whether Blender draws hair curves point by point, in the viewport and in EEVEE.
 
     Before Blender 5.0 it draws every strand with 8 points, or 16, 32 or 64 where the scene's
-    Additional Subdivisions say so. The shape Cylinder came together with all points.
+    Additional Subdivision says so. The shape Cylinder came together with all points.
     """
     shapes = bpy.types.RenderSettings.bl_rna.properties["hair_type"].enum_items
     return "CYLINDER" in shapes
