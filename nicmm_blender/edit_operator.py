@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from . import curve_record, designers, mesh_data, settings
+from . import curve_record, designers, mesh_data, polls, settings
 from .curve_record import Asked
 from .edit_overlay import Overlay
 from .edit_view import view_of
@@ -119,13 +119,8 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if mesh_data.mesh_object(context) is None:
-            cls.poll_message_set("Make a mesh or a designed curve active")
-            return False
-        if context.mode not in {"OBJECT", "EDIT_MESH"}:
-            cls.poll_message_set("Switch to Object Mode or Edit Mode")
-            return False
-        return True
+        has_mesh = mesh_data.mesh_object(context) is not None
+        return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.OBJECT_OR_EDIT)
 
     def draw(self, context):
         layout = self.layout

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from . import mesh_data
+from . import mesh_data, polls
 from .long_solves import reporting
 
 ROLES = (
@@ -173,13 +173,8 @@ MENUS = {"OBSTACLES": NICMM_MT_new_obstacles, "ALIGNMENT": NICMM_MT_new_alignmen
 
 
 def _poll(cls, context) -> bool:
-    if mesh_data.mesh_object(context) is None:
-        cls.poll_message_set("Make a mesh object active")
-        return False
-    if context.mode not in {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}:
-        cls.poll_message_set("Switch to Object Mode, Edit Mode or Weight Paint")
-        return False
-    return True
+    has_mesh = mesh_data.mesh_object(context) is not None
+    return polls.usable(cls, context, has_mesh, polls.NO_MESH, polls.OBJECT_EDIT_OR_WEIGHTS)
 
 
 def _weights(mesh_object, source: str, angle: float) -> np.ndarray:

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from . import curve_object, curve_record, design_request, mesh_data, outputs, settings
+from . import curve_object, curve_record, design_request, mesh_data, outputs, polls, settings
 from .long_solves import LongSolves, reporting
 
 ORDER_NAMES = {  # by the core's name, and whether the points are what is selected
@@ -39,14 +39,8 @@ class NICMM_OT_design_curve(
 
     @classmethod
     def poll(cls, context):
-        mesh_object = mesh_data.mesh_object(context)
-        if mesh_object is None:
-            cls.poll_message_set("Make a mesh object active")
-            return False
-        if context.mode not in {"OBJECT", "EDIT_MESH"}:
-            cls.poll_message_set("Switch to Object Mode or Edit Mode")
-            return False
-        return True
+        has_mesh = mesh_data.mesh_object(context) is not None
+        return polls.usable(cls, context, has_mesh, polls.NO_MESH, polls.OBJECT_OR_EDIT)
 
     def draw(self, context):
         settings.draw(self.layout, self, mesh_data.mesh_object(context))
@@ -111,13 +105,8 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not curve_record.has_record(context.active_object):
-            cls.poll_message_set("Make a curve active that was designed on a mesh")
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode")
-            return False
-        return True
+        has_curve = curve_record.has_record(context.active_object)
+        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.OBJECT)
 
     def draw(self, context):
         settings.draw_output(self.layout, self)

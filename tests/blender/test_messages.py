@@ -64,9 +64,16 @@ def of_core():
 
 
 def polls():
+    """What grey buttons say: constants of polls.py, and what other modules say directly."""
     for path in sorted((build.ROOT / "nicmm_blender").glob("*.py")):
-        for text in re.findall(r'poll_message_set\("([^"]+)"\)', path.read_text("utf-8")):
-            yield path.name, [plain(text)]
+        text = path.read_text("utf-8")
+        for said in re.findall(r'poll_message_set\("([^"]+)"\)', text):
+            yield path.name, [plain(said)]
+        if path.name == "polls.py":
+            values = [part.value for part in ast.parse(text).body if isinstance(part, ast.Assign)]
+            for said in (part for value in values for part in ast.walk(value)):
+                if isinstance(said, ast.Constant) and " " in said.value:
+                    yield path.name, [plain(said.value)]
 
 
 @pytest.mark.parametrize("source", [of_blender, of_core, polls])
