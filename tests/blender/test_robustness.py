@@ -338,6 +338,33 @@ def test_curve_whose_mesh_is_elsewhere(empty_scene):
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
 
 
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+def test_deleted_mesh_stays_in_the_file_as_long_as_a_curve_on_it(empty_scene, tmp_path, output):
+    sphere = scenes.sphere()
+    sphere.location = (1.0, 2.0, 3.0)
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve(output=output)
+    names = sphere.name, bpy.context.active_object.name
+    place = bpy.context.active_object.matrix_world.copy()
+    scenes.activate(sphere)
+    bpy.ops.object.delete()
+    path = str(tmp_path / "deleted.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    sphere, curve = (bpy.data.objects[name] for name in names)
+    assert not sphere.users_scene and curve.matrix_world == place
+    bpy.context.scene.collection.objects.link(sphere)
+    scenes.activate(curve)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+
+    bpy.context.scene.collection.objects.unlink(sphere)
+    scenes.activate(curve)
+    bpy.ops.object.delete()
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert not bpy.data.objects
+
+
 def test_broken_numbers_are_said(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
