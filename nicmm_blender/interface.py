@@ -78,7 +78,7 @@ class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
 
 
 def draw_in_menu(menu, _context) -> None:
-    menu.layout.separator()
+    _begin(menu)
     menu.layout.operator(NICMM_OT_design_curve.bl_idname, icon=ICON)
     menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
 
@@ -93,11 +93,17 @@ def draw_conversions(menu, context) -> None:
     """One entry for each output, where a designed curve is active."""
     if not curve_record.has_record(context.active_object):
         return
-    menu.layout.separator()
+    _begin(menu)
     menu.layout.operator_menu_enum(
         NICMM_OT_convert_curve.bl_idname, "output", text="Convert Designed Curve", icon=CONVERT_ICON
     )
     menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=EDIT_ICON)
+
+
+def _begin(menu) -> None:
+    menu.layout.separator()
+    # Some of Blender's menus call operators as scripts do; ours ask what suits the window.
+    menu.layout.operator_context = "INVOKE_REGION_WIN"
 
 
 MENUS = (
