@@ -39,7 +39,6 @@ FRAME = 50.0
 
 OUTPUTS = (
     ("curve", 'output="CURVE"'),
-    ("sticky", 'output="STICKY"'),
     ("edges", 'output="EDGES"'),
     ("region", 'output="REGION", region_cut=True'),
     ("parts", 'output="PARTS", parts_as="OBJECTS"'),
@@ -329,15 +328,24 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.wait("not helper.running", "cancel")
     check(blender.do(f"value = {written}") == kept, "Esc leaves the curve as it was")
 
-    step("Every output")
+    step("Sticky curves by the menu")
+    open_again(blender, path)
+    convert_to_sticky_curves(blender)
+    blender.wait("any(o.type == 'CURVES' for o in bpy.data.objects)", "a sticky curve")
+    tube = blender.do(
+        "shown = bpy.context.evaluated_depsgraph_get().object_instances\n"
+        "value = any(each.parent and each.parent.type == 'CURVES' for each in shown)"
+    )
+    few_points = blender.do("value = bpy.app.version < (5, 0, 0)")
+    check(tube == few_points, "a tube where Blender draws strands with a few points")
+    blender.shot("10-sticky")
+
+    step("Every other output")
     for name, arguments in OUTPUTS:
-        blender.do(f"bpy.ops.wm.open_mainfile(filepath={path!r})")
-        blender.wait("'Suzanne Curve' in bpy.data.objects", "the file")
-        blender.do("helper.look()")
+        open_again(blender, path)
         check(
             blender.do(
                 "with helper.in_view():\n"
-                # As a menu calls it, not as a script does.
                 f'    value = list(bpy.ops.nicmm.convert_curve("INVOKE_DEFAULT", {arguments}))'
             )
             == ["FINISHED"],
@@ -351,6 +359,22 @@ def drive(blender: Blender, archive: Path) -> None:
                 "    found.location.y -= 0.6 * (found.name != 'Suzanne')"
             )
         blender.shot(f"10-{name}")
+
+
+def open_again(blender: Blender, path: str) -> None:
+    blender.do(f"bpy.ops.wm.open_mainfile(filepath={path!r})")
+    blender.wait("'Suzanne Curve' in bpy.data.objects", "the file")
+    blender.do("helper.look()")
+
+
+def convert_to_sticky_curves(blender: Blender) -> None:
+    """Object > Convert > Convert Designed Curve > Sticky Curves, by the keys."""
+    blender.move(blender.do("value = helper.pixels([0, -0.8, 0])")[0])
+    blender.do('with helper.in_view():\n    bpy.ops.wm.call_menu(name="VIEW3D_MT_object_convert")')
+    # Our entries are the last two; the second entry of the submenu is meant.
+    for key in ("Up", "Up", "Right", "Down", "Return"):
+        time.sleep(1.0)
+        blender.key(key)
 
 
 def main() -> None:

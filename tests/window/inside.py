@@ -125,16 +125,15 @@ def watch_tool():
 def answer():
     """Do the next command, if there is one."""
     for command in sorted(FOLDER.glob("*.command")):
-        reply = {}
         scope = {"bpy": bpy, "np": np, "helper": Helper, "watch_tool": watch_tool}
         try:
             exec(command.read_text(), scope)
-            reply["value"] = scope.get("value")
+            reply = json.dumps({"value": scope.get("value")})
         except Exception:
-            reply["error"] = traceback.format_exc()
+            reply = json.dumps({"error": traceback.format_exc()})
         command.unlink()
         partial = command.with_suffix(".partial")
-        partial.write_text(json.dumps(reply))
+        partial.write_text(reply)
         partial.rename(command.with_suffix(".reply"))
     return 0.05
 
