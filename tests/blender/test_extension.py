@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -77,6 +79,34 @@ def test_menus_and_panel(extension):
     for menu in MENUS:
         assert f"{extension.name}.nicmm_blender.interface" in entries(menu)
     assert bpy.types.NICMM_PT_design_curve.bl_category == "NICMM"
+
+
+class Layout:
+    """Notes how entries of a menu call their operators; Blender's own menus often `execute`."""
+
+    def __init__(self):
+        self.operator_context, self.entries = "EXEC_REGION_WIN", []
+
+    def separator(self):
+        pass
+
+    def operator(self, name, **_options):
+        self.entries.append((name, self.operator_context))
+
+    def operator_menu_enum(self, name, _property, **options):
+        self.operator(name, **options)
+
+
+def test_entries_of_menus_call_operators_as_the_window_does(empty_scene):
+    interface = import_module(f"{empty_scene.name}.nicmm_blender.interface")
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 3))
+    bpy.ops.nicmm.design_curve()
+    for draw in (interface.draw_in_menu, interface.draw_conversions):
+        layout = Layout()
+        draw(SimpleNamespace(layout=layout), bpy.context)
+        assert len(layout.entries) == 2
+        assert {how for _, how in layout.entries} == {"INVOKE_REGION_WIN"}
 
 
 def test_labels_and_tooltips_follow_blender(extension):
