@@ -160,7 +160,7 @@ class SurfaceDesigner:
         last = self._last
         if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        config = replace(WARM, iterations=iterations, drawn_iterations=1)
+        config = replace(WARM, iterations=iterations, drawn_iterations=1, steps=1)
         if last is not None and last.crowded:
             # Without would fail once more.
             config = replace(config, drawn_at_rest=False)

@@ -4,9 +4,10 @@ A level set is as fine as its mesh, and two strands of it a few edges apart hold
 settles is where the curve runs. From there nodes move on the surface until the energy of Eq. 6
 and 7, taken along the curve, rests (`elastic_energy`).
 
-Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. The curve is
-drawn after every step, and strands push each other: a node whose stretch could not be drawn, or
-would cross another, stays for that step. So every state in between is a simple curve.
+Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. An iteration
+is a few steps of the nodes, after which the curve is drawn, and strands push each other: a node
+whose stretch could not be drawn, or would cross another, stays for that iteration. So every state
+in between is a simple curve.
 
 A curve that is near its rest already, as one whose control point was dragged, may do without that:
 its nodes move freely, and it is drawn once they rest. If it then crosses itself, it is done again
@@ -57,6 +58,8 @@ class RelaxationConfig:
     ----------
     levels : tuple of int
         Numbers of nodes, rising.
+    steps : int
+        Most in an iteration. Drawing costs as much as two of them.
     longest_move : float
         Farthest that the linearised energy is trusted; the curve may move twice as far if that is
         seen to lower the energy further.
@@ -75,17 +78,18 @@ class RelaxationConfig:
     iterations : int
         The cap, over all levels of one attempt.
     drawn_at_rest : bool
-        Whether to try first without drawing the curve after every step.
+        Whether to try first without drawing the curve after every iteration.
     drawn_iterations : int
-        The cap where it is drawn after every step, if that is lower.
+        The cap where it is drawn after every iteration, if that is lower.
     """
 
     levels: tuple[int, ...] = (128, 512)
-    longest_move: float = 4.0
+    steps: int = 6
+    longest_move: float = 2.0
     damping: float = 1e-6
     most_damping: float = 1e2
-    least_decrease: float = 2e-3
-    least_decrease_before: float = 3e-2
+    least_decrease: float = 4e-3
+    least_decrease_before: float = 0.1
     stretch: float = 1.6
     iterations: int = 100
     drawn_at_rest: bool = False
@@ -108,7 +112,10 @@ RELEASES = 2
 """Times in a level that nodes which could not follow are tried again when the others rest."""
 
 HELD_TRIES = 3
-"""Steps that are tried without the nodes that could not follow the one before."""
+"""Iterations that are tried without the nodes that could not follow the one before."""
+
+WORTHWHILE = 0.05
+"""Share of the fall so far that another step of the same iteration has to promise."""
 
 SURELY = 0.1
 """Share of the least decrease below which a step is not tried: damping makes forecasts small."""
@@ -219,14 +226,26 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
 
 
 @dataclass(frozen=True)
-class _Step:
-    """A step that lowered the energy."""
+class _Moved:
+    """Nodes after one or more steps, each of which lowered the energy."""
+
+    nodes: Nodes
+    energy: float
+    stayed: BoolArray  # (n,) nodes that came to a boundary
+    damping: float  # of the first step
+    farthest: float  # move, in mean steps from node to node
+
+
+@dataclass(frozen=True)
+class _Iteration:
+    """Steps that lowered the energy, drawn."""
 
     curve: ExactCurve  # as it was last drawn
     nodes: Nodes
+    energy: float
     held: BoolArray  # (n,) nodes that could not follow
-    damping: float  # for the next step
-    farthest: float  # move, in mean steps
+    damping: float  # for the next one
+    farthest: float  # move, in mean steps from node to node
 
 
 class _LostError(Exception):
@@ -272,7 +291,7 @@ class _Relaxation:
         last_iteration: int,
         simple: bool,
     ) -> ExactCurve:
-        """Steps with one number of nodes until the energy falls by less than the least share."""
+        """Iterations with one number of nodes until the energy falls by less than a share."""
         config, least_damping = self.config, self._least_damping(level)
         damping = least_damping
         curve = self.drawn = self._respaced(curve, level, simple)
@@ -284,28 +303,28 @@ class _Relaxation:
             before = elastic_energy(nodes, weights)
             system = elastic_system(self.surface, nodes, weights)
             scale = max(bending_energy(nodes), STRAIGHT * before)
-            step = None
+            done = None
             if self._may_fall(curve, system, held) > SURELY * least * scale:
                 if self.iterations == last_iteration:
                     self.stopped = "cap"
                     break
                 self.iterations += 1
-                step = self._step(curve, nodes, held, system, weights, damping, simple)
-            if step is not None:
-                curve, nodes, damping, held = step.curve, step.nodes, step.damping, held | step.held
+                done = self._iteration(curve, nodes, held, system, weights, before, damping, simple)
+            if done is not None:
+                curve, nodes, damping, held = done.curve, done.nodes, done.damping, held | done.held
                 self.drawn = curve
-                done = 1.0 - (last_iteration - self.iterations) / config.iterations
-                if self.watch is not None and not self.watch(done, nodes.positions):
+                share = 1.0 - (last_iteration - self.iterations) / config.iterations
+                if self.watch is not None and not self.watch(share, nodes.positions):
                     self.stopped = "cancelled"
                     break
                 scale = max(bending_energy(nodes), STRAIGHT * before)
-            if step is None or before - elastic_energy(nodes, weights) <= least * scale:
+            if done is None or before - done.energy <= least * scale:
                 if releases == RELEASES or not held.any():
                     break
                 # At rest with nodes that once could not follow: perhaps they can now.
                 releases, damping = releases + 1, least_damping
                 held = np.zeros(len(held), dtype=bool)
-            moved = step is not None and step.farthest > SMALL_MOVE
+            moved = done is not None and done.farthest > SMALL_MOVE
             if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
                 curve = self.drawn = self._respaced(self._drawn(curve, nodes), level, simple)
                 nodes = curve.nodes
@@ -328,54 +347,118 @@ class _Relaxation:
         free[curve.control_nodes] = False
         return free
 
-    def _step(
+    def _iteration(
         self,
         curve: ExactCurve,
         nodes: Nodes,
         held: BoolArray,
         system: ElasticSystem,
         weights: Balance,
+        energy: float,
         damping: float,
         simple: bool,
-    ) -> _Step | None:
-        """The least damped step that lowers the energy; None when there is none."""
-        config, surface = self.config, self.surface
-        energy = elastic_energy(nodes, weights)
-        spacing = float(nodes.lengths.mean())
+    ) -> _Iteration | None:
+        """Steps from a curve, drawn if it is to stay simple; None when none lowers the energy."""
         free = self._free(curve, held)
         tries = 0
-        while damping <= config.most_damping and free.any():
-            move = damped_step(system, free, damping)
-            farthest = float(np.abs(move).max()) / spacing
-            if not np.isfinite(farthest):
+        while True:
+            moved = self._steps(nodes, energy, free, system, weights, damping)
+            if moved is None:
                 return None
-            if farthest > config.longest_move:
-                move *= config.longest_move / farthest
-                farthest = config.longest_move
-            moved, stayed = sideways(surface, nodes, move)
-            reached = elastic_energy(moved, weights)
-            lowered = reached < energy
-            # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
-            # both energies with the slope here is lower at twice the step after such a fall.
-            if lowered and energy - reached > -TWICE * float(system.slope @ move):
-                farther, also_stayed = sideways(surface, nodes, 2.0 * move)
-                if elastic_energy(farther, weights) < reached:
-                    moved, stayed, farthest = farther, also_stayed, 2.0 * farthest
-            if lowered and simple:
-                drawn_curve, kept = redrawn(surface, curve, moved)
+            reached, stayed, drawn_curve, after = moved.nodes, moved.stayed, curve, moved.energy
+            if simple:
+                drawn_curve, kept = redrawn(self.surface, curve, reached)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
                     tries += 1
                     continue
-                moved, stayed = drawn_curve.nodes, stayed | kept
-                lowered = not kept.any() or elastic_energy(moved, weights) < energy
-                if lowered:
-                    curve = drawn_curve
-            if lowered:
-                damping = max(damping / DAMPING_FACTOR, self._least_damping(len(free)))
-                return _Step(curve, moved, stayed, damping, farthest)
+                reached, stayed = drawn_curve.nodes, stayed | kept
+                if kept.any():
+                    after = elastic_energy(reached, weights)
+            if after < energy:
+                less = max(moved.damping / DAMPING_FACTOR, self._least_damping(len(free)))
+                return _Iteration(drawn_curve, reached, after, stayed, less, moved.farthest)
+            damping = moved.damping * DAMPING_FACTOR
+
+    def _steps(
+        self,
+        nodes: Nodes,
+        energy: float,
+        free: BoolArray,
+        system: ElasticSystem,
+        weights: Balance,
+        damping: float,
+    ) -> _Moved | None:
+        """As many steps as are worthwhile; None when not even one lowers the energy."""
+        moved = self._first_step(nodes, energy, free, system, weights, damping)
+        if moved is None:
+            return None
+        damping = max(moved.damping / DAMPING_FACTOR, self._least_damping(len(free)))
+        for _ in range(self.config.steps - 1):
+            least = WORTHWHILE * (energy - moved.energy)
+            further = self._further_step(moved, free & ~moved.stayed, weights, damping, least)
+            if further is None:
+                break
+            moved = further
+        return moved
+
+    def _first_step(
+        self,
+        nodes: Nodes,
+        energy: float,
+        free: BoolArray,
+        system: ElasticSystem,
+        weights: Balance,
+        damping: float,
+    ) -> _Moved | None:
+        """The least damped step that lowers the energy; None when there is none."""
+        surface = self.surface
+        while damping <= self.config.most_damping and free.any():
+            move, farthest = self._trusted(nodes, damped_step(system, free, damping))
+            if not np.isfinite(farthest):
+                return None
+            moved, stayed = sideways(surface, nodes, move)
+            reached = elastic_energy(moved, weights)
+            # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
+            # both energies with the slope here is lower at twice the step after such a fall.
+            if reached < energy and energy - reached > -TWICE * float(system.slope @ move):
+                farther, also_stayed = sideways(surface, nodes, 2.0 * move)
+                reached_there = elastic_energy(farther, weights)
+                if reached_there < reached:
+                    return _Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
+            if reached < energy:
+                return _Moved(moved, reached, stayed, damping, farthest)
             damping *= DAMPING_FACTOR
         return None
+
+    def _further_step(
+        self, moved: _Moved, free: BoolArray, weights: Balance, damping: float, least: float
+    ) -> _Moved | None:
+        """A step, or half of it, that lowers the energy; None when it promises less than that."""
+        surface, nodes = self.surface, moved.nodes
+        system = elastic_system(surface, nodes, weights)
+        if not free.any():
+            return None
+        move = damped_step(system, free, damping)
+        if not predicted_fall(system, move) > least:
+            return None
+        move, farthest = self._trusted(nodes, move)
+        for share in (1.0, 0.5):
+            reached, stayed = sideways(surface, nodes, share * move)
+            energy = elastic_energy(reached, weights)
+            if energy < moved.energy:
+                stayed = moved.stayed | stayed
+                farthest = moved.farthest + share * farthest
+                return _Moved(reached, energy, stayed, moved.damping, farthest)
+        return None
+
+    def _trusted(self, nodes: Nodes, move: FloatArray) -> tuple[FloatArray, float]:
+        """A move no longer than the linearised energy is trusted, and its length in mean steps."""
+        farthest = float(np.abs(move).max()) / float(nodes.lengths.mean())
+        longest = self.config.longest_move
+        if farthest > longest:
+            return move * (longest / farthest), longest
+        return move, farthest
 
     def _drawn(self, curve: ExactCurve, nodes: Nodes) -> ExactCurve:
         """The curve through its nodes, which may have moved since it was last drawn."""
