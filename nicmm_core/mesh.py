@@ -106,6 +106,7 @@ class Mesh:
     @cached_property
     def unpaired_edges(self) -> tuple[IntArray, IntArray]:
         """Edges that one face has, or more than two, and how many; (e, 2) and (e,), ascending."""
+        checkpoint()
         face, corner = np.nonzero(self.face_neighbours < 0)
         checkpoint()
         start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]

@@ -122,6 +122,7 @@ def welded_vertices(mesh: Mesh) -> IntArray:
 def _joined_copy(mesh: Mesh, welded: IntArray, linked: bool) -> MeshCopy | None:
     """The copy in which sides of faces whose ends are the same welded vertices may be joined."""
     is_welded = bool((welded != np.arange(len(welded))).any())
+    checkpoint()
     kept = np.arange(len(mesh.faces))
     if mesh.branches or is_welded:
         kept = _without_twins(welded[mesh.faces])
@@ -165,13 +166,15 @@ class _Sides:
         self._faces = faces
         # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
         # welded to one, the vertices themselves decide.
-        corners = np.arange(faces.size).reshape(-1, 3)
-        first, second = corners[:, [1, 2, 0]].ravel(), corners[:, [2, 0, 1]].ravel()
-        vertices = faces.ravel()
         checkpoint()
+        corner = 3 * np.arange(len(faces))[:, None]
+        first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
+        checkpoint()
+        vertices = faces.ravel()
         one, other = welded[vertices[first]], welded[vertices[second]]
         checkpoint()
         swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
+        checkpoint()
         self._low = np.where(swapped, second, first)
         self._high = np.where(swapped, first, second)
         checkpoint()
