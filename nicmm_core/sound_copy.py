@@ -164,9 +164,9 @@ class _Sides:
 
     def __init__(self, faces: IntArray, welded: IntArray) -> None:
         self._faces = faces
+        checkpoint()
         # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
         # welded to one, the vertices themselves decide.
-        checkpoint()
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         checkpoint()
