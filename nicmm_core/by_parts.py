@@ -71,9 +71,11 @@ def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     checkpoint()
     begins = np.ones(len(keys), dtype=bool)
     np.not_equal(in_order[1:], in_order[:-1], out=begins[1:])
-    start = np.flatnonzero(begins)
     checkpoint()
-    return order, start, np.diff(start, append=len(keys))
+    start = np.flatnonzero(begins)
+    count = np.diff(start, append=len(keys))
+    checkpoint()
+    return order, start, count
 
 
 def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
@@ -145,7 +147,9 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
         root = root[root]
     is_root = root == np.arange(size)
     checkpoint()
-    return int(is_root.sum()), (np.cumsum(is_root) - 1)[root]
+    label = (np.cumsum(is_root) - 1)[root]
+    checkpoint()
+    return int(is_root.sum()), label
 
 
 def parts(length: int) -> Iterator[slice]:

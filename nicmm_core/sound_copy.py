@@ -171,7 +171,9 @@ class _Sides:
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         checkpoint()
         vertices = faces.ravel()
-        one, other = welded[vertices[first]], welded[vertices[second]]
+        one = welded[vertices[first]]
+        checkpoint()
+        other = welded[vertices[second]]
         checkpoint()
         swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
         checkpoint()
@@ -195,6 +197,7 @@ class _Sides:
     def plain_pairs(self) -> IntArray:
         """Sides of edges that two faces have, shape (p, 2)."""
         first = self._first[self._count == 2]
+        checkpoint()
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
@@ -349,7 +352,9 @@ class _Sides:
         """
         corner = self._faces.ravel()
         one, other = pairs.T
+        checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
+        checkpoint()
         columns = np.concatenate([self._low[other], self._high[other]])
         n_labels, label = components(len(corner), rows, columns)
         source = np.zeros(n_labels, dtype=np.int64)
