@@ -35,6 +35,7 @@ MEASUREMENTS = (
     "sharp_edges",
     "peers",
     "degraded",
+    "courses",
     "resolution",
     "gallery",
     "variational_order",

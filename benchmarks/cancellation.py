@@ -74,8 +74,9 @@ def run(scale: Scale) -> None:
     )  # fmt: skip
     body = (
         f"Seed {SEED}. CPU time between two places where a design asks whether to go on; the "
-        f"progress function itself is called at most every {progress.INTERVAL:g} s. Times beyond "
-        "that are single calls of NumPy, SciPy or libigl on arrays of the size of the mesh.\n\n"
+        f"progress function itself is called at most every {progress.INTERVAL:g} s. What sorts, "
+        "groups or searches arrays of the size of the mesh does so by parts (`by_parts`); the "
+        "longest times are single calls of NumPy and libigl that pass over such arrays once.\n\n"
         + report.table(header, rows)
     )
     report.write_section("cancellation", "Cancelling", body, scale)
@@ -105,12 +106,21 @@ def _asking() -> str:
 
 def _requests(
     scale: Scale,
-) -> Iterator[tuple[str, nicmm.Mesh, IntArray, dict[str, object]]]:
+) -> Iterator[tuple[str, nicmm.Mesh, IntArray | FloatArray, dict[str, object]]]:
     """Name, mesh, points and arguments."""
     creature = shapes.creature(1, faces=1_300, subdivisions=0)
     for subdivisions in range(scale.choose(2, 2, 1), scale.choose(6, 4, 2)):
         mesh = nicmm.Mesh(*igl.loop(creature.vertices, creature.faces, subdivisions))
         yield f"{subdivisions} Loop subdivisions", mesh, _drawn(mesh, 5), {"order": "shortest"}
+    positions = mesh.vertices[_drawn(mesh, 5)]
+    yield "the same, points in space", mesh, positions, {"order": "shortest"}
+    far = np.linalg.norm(mesh.vertices - mesh.vertices[0], axis=1)
+    obstacles = (far < 0.05 * mesh.diagonal).astype(np.float64)
+    maps = {"order": "shortest", "obstacles": obstacles, "clearance": 0.01 * mesh.diagonal}
+    yield "the same, an obstacle", mesh, _drawn(mesh, 5), maps
+    corners = mesh.vertices[mesh.faces].reshape(-1, 3)
+    soup = nicmm.Mesh(corners, np.arange(len(corners)).reshape(-1, 3))
+    yield "the same, a soup of triangles", soup, _drawn(soup, 5), {"order": "shortest"}
     ball = shapes.sphere(scale.choose(6, 5, 3))
     needles = nicmm.Mesh(ball.vertices * [1.0, 1.0, 1e-7], ball.faces)
     yield "needles", needles, _drawn(needles, 5), {"order": "shortest"}

@@ -8,14 +8,17 @@ import igl
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from .array_types import BoolArray, FloatArray, IntArray
+from .by_parts import components, grouped, parts
 from .errors import MeshError
 from .progress import checkpoint
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
+
+FACES_OF_A_TREE = 100_000
+"""At most; a tree of them is built in a tenth of a second, in which nobody can be asked."""
 
 
 class Mesh:
@@ -44,7 +47,9 @@ class Mesh:
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         self.vertices = _checked_vertices(vertices)
+        checkpoint()
         self.faces = _checked_faces(faces, len(self.vertices))
+        checkpoint()
         if self.diagonal < SMALLEST:
             raise MeshError(
                 f"vertices of all faces lie within {self.diagonal:g}, as good as at one place; "
@@ -56,7 +61,7 @@ class Mesh:
     @cached_property
     def diagonal(self) -> float:
         """Diagonal of the bounding box of the vertices that faces use, in mesh units."""
-        corners = self.vertices[np.unique(self.faces)]
+        corners = self.vertices[self.referenced]
         return float(np.linalg.norm(np.ptp(corners, axis=0)))
 
     @cached_property
@@ -67,11 +72,12 @@ class Mesh:
     @cached_property
     def face_normals(self) -> FloatArray:
         """Unit normal of each face, shape (F, 3); zero where it has no area."""
-        corner = self.vertices[self.faces]
-        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        checkpoint()
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        return normal / np.where(length > 0.0, length, 1.0)
+        normals = np.empty(self.faces.shape)
+        for part in parts(len(self.faces)):
+            normal = _area_vectors(self.vertices, self.faces[part])
+            length = np.linalg.norm(normal, axis=1, keepdims=True)
+            normals[part] = normal / np.where(length > 0.0, length, 1.0)
+        return normals
 
     @cached_property
     def face_neighbours(self) -> IntArray:
@@ -80,15 +86,9 @@ class Mesh:
         -1 where there is none, or where more than two faces have the side.
         """
         n_faces = len(self.faces)
-        checkpoint()
-        low, high = _sorted_ends(self.faces[:, [1, 2, 0]], self.faces[:, [2, 0, 1]])
-        checkpoint()
-        keys = low * (int(self.faces.max()) + 1) + high  # side 3 f + j of face f, corner j
-        order = np.argsort(keys, kind="stable")
-        checkpoint()
-        _, first, count = np.unique(keys[order], return_index=True, return_counts=True)
-        checkpoint()
+        order, first, count = grouped(side_keys(self.faces))  # side 3 f + j of face f, corner j
         one, other = order[first[count == 2]], order[first[count == 2] + 1]
+        checkpoint()
         neighbours = np.full(3 * n_faces, -1)
         neighbours[one], neighbours[other] = other // 3, one // 3
         return neighbours.reshape(n_faces, 3)
@@ -96,33 +96,44 @@ class Mesh:
     @cached_property
     def edges(self) -> IntArray:
         """Undirected edges, shape (E, 2), in no particular order."""
-        sides = self.faces[:, [[1, 2], [2, 0], [0, 1]]]  # (F, 3, 2), opposite each corner
         across = self.face_neighbours
         checkpoint()
-        of_two = sides[across > np.arange(len(self.faces))[:, None]]
-        others = np.unique(np.sort(sides[across < 0], axis=1), axis=0)
-        return np.concatenate([of_two, others])
+        face, corner = np.nonzero(across > np.arange(len(self.faces))[:, None])
+        checkpoint()
+        of_two = np.stack([self.faces[face, corner - 2], self.faces[face, corner - 1]], axis=1)
+        return np.concatenate([of_two, self.unpaired_edges[0]])
+
+    @cached_property
+    def unpaired_edges(self) -> tuple[IntArray, IntArray]:
+        """Edges that one face has, or more than two, and how many; (e, 2) and (e,), ascending."""
+        checkpoint()
+        face, corner = np.nonzero(self.face_neighbours < 0)
+        checkpoint()
+        start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]
+        size = len(self.vertices)
+        return _edges(_edge_keys(start, end, size), size)
 
     @cached_property
     def branches(self) -> bool:
         """Whether more than two faces share some edge."""
-        sides = np.sort(self.faces[:, [[1, 2], [2, 0], [0, 1]]][self.face_neighbours < 0], axis=1)
-        checkpoint()
-        return len(np.unique(sides, axis=0)) < len(sides)
+        return bool((self.unpaired_edges[1] > 1).any())
 
     @cached_property
-    def face_tree(self) -> igl.AABB:
-        """A tree of boxes round the faces, to find the nearest one."""
-        tree = igl.AABB()
-        tree.init(self.vertices, self.faces)
-        return tree
+    def face_trees(self) -> list[tuple[slice, igl.AABB]]:
+        """Trees of boxes round faces, to find the nearest one, and which faces are in each."""
+        trees = []
+        for first in range(0, len(self.faces), FACES_OF_A_TREE):
+            checkpoint()
+            faces = slice(first, first + FACES_OF_A_TREE)
+            tree = igl.AABB()
+            tree.init(self.vertices, self.faces[faces])
+            trees.append((faces, tree))
+        return trees
 
     @cached_property
     def mean_edge_length(self) -> float:
         """Mean length of the edges, in mesh units."""
-        start, end = self.edges.T
-        checkpoint()
-        return float(np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1).mean())
+        return float(edge_lengths(self.vertices, self.edges).mean())
 
     @cached_property
     def vertex_faces(self) -> sparse.csr_array:
@@ -147,14 +158,8 @@ class Mesh:
 
         Faces are connected when they share a vertex.
         """
-        n_vertices = len(self.vertices)
-        edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]]])
-        ones = np.ones(len(edges), dtype=np.int8)
-        checkpoint()
-        graph = sparse.coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
-        _, label = csgraph.connected_components(graph, directed=False)
-        checkpoint()
-        return label[self.faces[:, 0]]
+        one, other = self.faces[:, :2].T.ravel(), self.faces[:, 1:].T.ravel()
+        return components(len(self.vertices), one, other)[1][self.faces[:, 0]]
 
     @cached_property
     def referenced(self) -> BoolArray:
@@ -183,11 +188,27 @@ def real_array(values: ArrayLike) -> FloatArray:
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
+    areas = np.empty(len(faces))
+    for part in parts(len(faces)):
+        areas[part] = 0.5 * np.linalg.norm(_area_vectors(vertices, faces[part]), axis=1)
+    return areas
+
+
+def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Normals that are twice as long as the areas, shape (F, 3)."""
     checkpoint()
     corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    checkpoint()
-    return 0.5 * np.linalg.norm(normal, axis=1)
+    return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+
+
+def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
+    """Length of each edge, shape (E,)."""
+    lengths = np.empty(len(edges))
+    for part in parts(len(edges)):
+        checkpoint()
+        start, end = edges[part].T
+        lengths[part] = np.linalg.norm(vertices[start] - vertices[end], axis=1)
+    return lengths
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -200,27 +221,41 @@ def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
     (E,) int array
         1 on the boundary, 2 inside, more where the surface branches.
     """
+    return _edges(side_keys(faces), int(faces.max()) + 1)
+
+
+def side_keys(faces: IntArray) -> IntArray:
+    """A number for the side opposite each corner, shape (3 F,), the same for sides of one edge."""
     size = int(faces.max()) + 1
-    low, high = _sorted_ends(faces, faces[:, [1, 2, 0]])
+    keys = np.empty(faces.shape, dtype=np.int64)
+    for corner in range(3):
+        checkpoint()
+        keys[:, corner] = _edge_keys(faces[:, corner - 2], faces[:, corner - 1], size)
+    return keys.ravel()
+
+
+def _edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
+    """One number an edge: rows of two columns would take several times as long to sort."""
+    return np.minimum(start, end) * size + np.maximum(start, end)
+
+
+def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
+    """Edges that have some keys, (E, 2), and how often each is there, (E,)."""
+    order, first, count = grouped(keys)
+    distinct = keys[order[first]]
     checkpoint()
-    # One key an edge: unique rows of a two-column array would take several times as long.
-    keys, count = np.unique(low * size + high, return_counts=True)
-    return np.stack([keys // size, keys % size], axis=1), count
-
-
-def _sorted_ends(start: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
-    """The smaller and the larger ends of sides of faces, each in one row."""
-    return np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
+    return np.stack([distinct // size, distinct % size], axis=1), count
 
 
 def unoriented_vertices(faces: IntArray) -> IntArray:
     """Vertices of edges that two faces run along in the same direction, ascending."""
     size = int(faces.max()) + 1
     checkpoint()
-    start, end = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
-    directed, count = np.unique(start * size + end, return_counts=True)
-    twice = directed[count > 1]
-    return np.unique([twice // size, twice % size])
+    start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
+    checkpoint()
+    order, first, count = grouped(start * size + end)
+    twice = order[first[count > 1]]
+    return np.unique([start[twice], end[twice]])
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
@@ -232,12 +267,14 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
         ) from error
     if checked.ndim != 2 or checked.shape[1] != 3:
         raise MeshError(f"vertices has shape {checked.shape}; pass positions of shape (V, 3)")
+    checkpoint()
     bad = ~np.isfinite(checked).all(axis=1)
     if bad.any():
         raise MeshError(
             f"vertices has {bad.sum()} positions that are NaN or infinite, the first at index "
             f"{bad.argmax()}; remove or repair them"
         )
+    checkpoint()
     if checked.size and np.abs(checked).max() > LARGEST:
         raise MeshError(
             f"vertices has coordinates up to {np.abs(checked).max():g}, with which nothing can be "

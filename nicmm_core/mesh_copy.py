@@ -77,6 +77,7 @@ class MeshCopy:
         """Weights at the vertices; the greatest of vertices that are one in the copy."""
         if weights is None:
             return None
+        checkpoint()
         result = np.zeros(len(self.mesh.vertices))
         np.maximum.at(result, self.mesh.faces, weights[self.original.faces[self.face]])
         return result
@@ -88,7 +89,7 @@ class MeshCopy:
         curves = [self._curve(curve) for curve in design.curves]
         status = design.status
         # Strands that pass different copies of one vertex touch there.
-        doubled = len(np.unique(self.place)) < len(self.place)
+        doubled = bool((np.bincount(self.place) > 1).any())
         if doubled and not all(map(self._is_simple, design.curves)):
             status = Status.NOT_ONE_CURVE
         return replace(

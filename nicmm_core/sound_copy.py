@@ -22,23 +22,12 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, unique_edges
+from .by_parts import components, distinct_rows, grouped
+from .mesh import Mesh, edge_lengths, unique_edges
 from .mesh_copy import MeshCopy
 from .progress import checkpoint
-
-FLAT = 1e-4
-"""Sine between the longest and the shortest edge of a face below which it counts as without area.
-
-Cotangents are found from lengths of edges, with which no sine below 1e-8 can be told from none, and
-a bending energy with cotangents of a millionth degree is no energy of the surface any more.
-"""
-
-SHORT = 1e-12
-"""Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
-
-MOVED = 1e-3
-"""How far vertices of faces without area are moved, in lengths of their shortest edge."""
 
 ATTEMPTS = 4
 """Of moving vertices, until every face has an area."""
@@ -118,23 +107,22 @@ def welded_vertices(mesh: Mesh) -> IntArray:
     Only places whose coordinates are the same to the last digit are one. Edges that two faces have
     are closed already, so closed surfaces that touch each other stay apart.
     """
-    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]
+    edges, count = mesh.unpaired_edges
     checkpoint()
-    edges, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
-    rim = np.unique(edges[count == 1])
+    on_rim = np.zeros(len(mesh.vertices), dtype=bool)
+    on_rim[edges[count == 1]] = True
+    rim = np.flatnonzero(on_rim)
     welded = np.arange(len(mesh.vertices))
-    if len(rim):
-        # Adding zero makes one zero of both.
-        _, first, place = np.unique(
-            mesh.vertices[rim] + 0.0, axis=0, return_index=True, return_inverse=True
-        )
-        welded[rim] = rim[first[place.ravel()]]
+    checkpoint()
+    first, place = distinct_rows(mesh.vertices[rim])
+    welded[rim] = rim[first[place]]
     return welded
 
 
 def _joined_copy(mesh: Mesh, welded: IntArray, linked: bool) -> MeshCopy | None:
     """The copy in which sides of faces whose ends are the same welded vertices may be joined."""
     is_welded = bool((welded != np.arange(len(welded))).any())
+    checkpoint()
     kept = np.arange(len(mesh.faces))
     if mesh.branches or is_welded:
         kept = _without_twins(welded[mesh.faces])
@@ -159,7 +147,7 @@ def _cut_copy(
 
 def _without_twins(faces: IntArray) -> IntArray:
     """Indices of the faces without those whose corners an earlier one has, ascending."""
-    return np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
+    return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
 
 
 class _Sides:
@@ -176,29 +164,29 @@ class _Sides:
 
     def __init__(self, faces: IntArray, welded: IntArray) -> None:
         self._faces = faces
+        checkpoint()
         # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
         # welded to one, the vertices themselves decide.
-        first, second = self._corners(1), self._corners(2)
+        corner = 3 * np.arange(len(faces))[:, None]
+        first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
+        checkpoint()
         vertices = faces.ravel()
-        one, other = welded[vertices[first]], welded[vertices[second]]
+        one = welded[vertices[first]]
+        checkpoint()
+        other = welded[vertices[second]]
+        checkpoint()
         swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
-        self._low, self._high = np.where(swapped, [second, first], [first, second])
+        checkpoint()
+        self._low = np.where(swapped, second, first)
+        self._high = np.where(swapped, first, second)
         checkpoint()
         size = int(vertices.max()) + 1
         keys = np.minimum(one, other) * size + np.maximum(one, other)
+        checkpoint()
         nowhere = np.flatnonzero(one == other)  # such a side joins nothing
         keys[nowhere] = size * size + nowhere
         del one, other, swapped, first, second
-        self._order = np.argsort(keys, kind="stable")
-        checkpoint()
-        _, self._first, self._count = np.unique(
-            keys[self._order], return_index=True, return_counts=True
-        )
-        checkpoint()
-
-    def _corners(self, step: int) -> IntArray:
-        corner = np.arange(self._faces.size)
-        return corner - corner % 3 + (corner + step) % 3
+        self._order, self._first, self._count = grouped(keys)
 
     @property
     def branches(self) -> bool:
@@ -209,6 +197,7 @@ class _Sides:
     def plain_pairs(self) -> IntArray:
         """Sides of edges that two faces have, shape (p, 2)."""
         first = self._first[self._count == 2]
+        checkpoint()
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
@@ -234,9 +223,7 @@ class _Sides:
         Edges where the same parts meet share the work: on each run of them two parts are joined.
         """
         n_faces = len(self._faces)
-        faces = self.plain_pairs // 3
-        graph = sparse.coo_array((np.ones(len(faces)), faces.T), shape=(n_faces, n_faces))
-        part = csgraph.connected_components(graph, directed=False)[1]
+        part = components(n_faces, *(self.plain_pairs // 3).T)[1]
         groups: dict[tuple[int, ...], list[IntArray]] = {}
         for sides in self._branching:
             parts = tuple(np.unique(part[sides // 3]).tolist())
@@ -365,21 +352,22 @@ class _Sides:
         """
         corner = self._faces.ravel()
         one, other = pairs.T
+        checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
+        checkpoint()
         columns = np.concatenate([self._low[other], self._high[other]])
-        checkpoint()
-        graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(corner),) * 2)
-        n_labels, label = csgraph.connected_components(graph, directed=False)
-        checkpoint()
+        n_labels, label = components(len(corner), rows, columns)
         source = np.zeros(n_labels, dtype=np.int64)
         source[label] = corner
         # One of the copies keeps the number of the vertex.
-        first = np.unique(source, return_index=True)[1]
-        checkpoint()
+        order, begin, _ = grouped(source)
+        first = order[begin]
         number = np.full(n_labels, -1)
         number[first] = source[first]
         new = np.flatnonzero(number < 0)
+        checkpoint()
         number[new] = n_vertices + np.arange(len(new))
+        checkpoint()
         corners = number[label]
         vertex = np.concatenate([np.arange(n_vertices), source[new]])
         for _ in range(ROUNDS):
@@ -397,6 +385,7 @@ class _Sides:
         Then the faces on both sides of the cut still have both vertices in common. A further edge
         is cut for it. Gives the corners, the vertices, and whether anything had to be done.
         """
+        checkpoint()
         partner = np.arange(len(corners))
         partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
         own = []
@@ -425,31 +414,39 @@ def _with_areas(
 
     Vertices that stand for one vertex of the mesh are moved apart.
     """
+    checkpoint()
     vertices = mesh.vertices[vertex]
-    short = SHORT * mesh.diagonal
+    checkpoint()
+    short = tolerances.AT_ONE_PLACE * mesh.diagonal
     flat = _flat(vertices, faces, short)
+    checkpoint()
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MeshCopy(mesh, mesh, face, vertex)
     origin = np.zeros(3)
     # Straight ways from one copy of a vertex would pass exactly through the others.
     doubled = np.ones(len(vertices), dtype=bool)
-    doubled[np.unique(place, return_index=True)[1]] = False
+    order, first, _ = grouped(place)
+    doubled[order[first]] = False
+    checkpoint()
     if flat.any() or doubled.any():
         # Far from the origin a small move would be lost to rounding.
         origin = vertices[faces[0, 0]]
         vertices = vertices - origin
         start, still = vertices, flat
-        reach = MOVED * _shortest_edges(vertices, faces, short)
+        checkpoint()
+        reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
         generator = np.random.default_rng(SEED)
         for _ in range(ATTEMPTS):
             checkpoint()
             moving = doubled.copy()
             moving[faces[still]] = True
             moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
+            checkpoint()
             vertices = np.where(moving[:, None], start + moves, vertices)
             still = _flat(vertices, faces, short)
             if not still.any():
                 break
+    checkpoint()
     return MeshCopy(mesh, Mesh(vertices, faces), face, place, origin)
 
 
@@ -467,7 +464,7 @@ def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
         lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
         twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         flat[block] = lengths[:, 0] <= short
-        flat[block] |= twice_area <= FLAT * lengths[:, 0] * lengths[:, 2]
+        flat[block] |= twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
     return flat
 
 
@@ -477,12 +474,11 @@ def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> Floa
     Shorter ones join vertices to one place. Zero where no edge is longer.
     """
     edges, _ = unique_edges(faces)
-    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    at_one_place = edges[lengths <= short].T
-    shape = (len(vertices), len(vertices))
-    graph = sparse.coo_array((np.ones(at_one_place.shape[1]), at_one_place), shape=shape)
-    n_places, place = csgraph.connected_components(graph, directed=False)
+    lengths = edge_lengths(vertices, edges)
+    checkpoint()
+    n_places, place = components(len(vertices), *edges[lengths <= short].T)
     shortest = np.full(n_places, np.inf)
     for end in edges[lengths > short].T:
+        checkpoint()
         np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]

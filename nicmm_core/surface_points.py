@@ -241,7 +241,7 @@ def nearest_points(
     """
     faces = mesh.faces if among is None else mesh.faces[among]
     if among is None:
-        squared, nearest, places = mesh.face_tree.squared_distance(mesh.vertices, faces, positions)
+        squared, nearest, places = _nearest_of_all(mesh, positions)
     else:
         squared, nearest, places = igl.point_mesh_squared_distance(positions, mesh.vertices, faces)
     chosen = np.atleast_1d(nearest).astype(np.int64)
@@ -251,6 +251,20 @@ def nearest_points(
     barycentric /= barycentric.sum(axis=1, keepdims=True)
     found = chosen if among is None else among[chosen]
     return SurfacePoints(found, barycentric), np.sqrt(np.atleast_1d(squared))
+
+
+def _nearest_of_all(mesh: Mesh, positions: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Squared distance, face and place of the points nearest to k positions."""
+    squared = np.full(len(positions), np.inf)
+    nearest = np.zeros(len(positions), dtype=np.int64)
+    places = np.zeros((len(positions), 3))
+    for part, tree in mesh.face_trees:
+        here = tree.squared_distance(mesh.vertices, mesh.faces[part], positions)
+        nearer = np.atleast_1d(here[0]) < squared
+        squared[nearer] = np.atleast_1d(here[0])[nearer]
+        nearest[nearer] = part.start + np.atleast_1d(here[1])[nearer]
+        places[nearer] = np.atleast_2d(here[2])[nearer]
+    return squared, nearest, places
 
 
 def first_hits(
@@ -270,13 +284,17 @@ def first_hits(
     (k,) float array
         How far along each ray, in lengths of its direction; infinite where it meets nothing.
     """
-    rays = (np.ascontiguousarray(ends, dtype=np.float64) for ends in (origins, directions))
-    faces, along, places = mesh.face_tree.intersect_ray_first(mesh.vertices, mesh.faces, *rays)
-    hit = faces >= 0
-    places = np.where(hit[:, None], places, 0.0)
+    rays = [np.ascontiguousarray(ends, dtype=np.float64) for ends in (origins, directions)]
+    faces, along = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    places = np.zeros((len(origins), 2))
+    for part, tree in mesh.face_trees:
+        of_part = tree.intersect_ray_first(mesh.vertices, mesh.faces[part], *rays)
+        sooner = (of_part[0] >= 0) & (of_part[1] < along)
+        faces[sooner] = part.start + of_part[0][sooner]
+        along[sooner], places[sooner] = of_part[1][sooner], of_part[2][sooner]
     barycentric = np.stack([1.0 - places.sum(axis=1), *places.T], axis=1).clip(0.0)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
-    return SurfacePoints(faces, barycentric), np.where(hit, along, np.inf)
+    return SurfacePoints(faces, barycentric), along
 
 
 def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:

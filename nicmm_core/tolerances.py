@@ -23,5 +23,18 @@ INSIDE = 1e-6
 FLAT = 1e-6
 """Curvature up to which a surface is a plane, in one over bounding-box diagonals."""
 
+WITHOUT_AREA = 1e-4
+"""Sine between the longest and the shortest edge of a face below which it counts as without area.
+
+Cotangents are found from lengths of edges, with which no sine below 1e-8 can be told from none, and
+a bending energy with cotangents of a millionth degree is no energy of the surface any more.
+"""
+
+AT_ONE_PLACE = 1e-12
+"""Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
+
+MOVED = 1e-3
+"""How far vertices of faces without area are moved, in lengths of their shortest edge."""
+
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor; what is divided by it is zero too."""

@@ -3,11 +3,13 @@
 Some vertices of the fine mesh are chosen as seeds, about evenly spread. Every vertex belongs to the
 seed that it is nearest to along edges, and three seeds whose cells meet in a face make a coarse
 face. Distances run along the surface, so two sheets that come close stay apart, and nothing is
-asked of the mesh but that it is connected. One run of Dijkstra's algorithm does it.
+asked of the mesh but that it is connected. One run of Dijkstra's algorithm does it, on a large mesh
+one for each slab of it.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
-from ..mesh import Mesh
+from ..mesh import Mesh, edge_lengths
 from ..progress import checkpoint
 from ..surface_points import SurfacePoints, nearest_points
 
@@ -33,6 +35,19 @@ NORMAL_WEIGHT = 0.6
 
 Twice that, for opposite normals, is more than one: the two sides of a plate and of a thin limb have
 seeds of their own.
+"""
+
+SLAB = 150_000
+"""Vertices of a slab; a run of Dijkstra's algorithm over them takes a tenth of a second.
+
+Nobody can be asked meanwhile whether to go on, nor by another thread: it holds Python's lock.
+"""
+
+MARGIN = 4.0
+"""What a slab is widened by on both sides, in least distances of seeds.
+
+Seeds are one of these apart and candidates half of one, so hardly any vertex is as far as two from
+its nearest seed, along edges a little more.
 """
 
 
@@ -122,16 +137,12 @@ def build_coarse_mesh(
     checkpoint()
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
     checkpoint()
-    seed = _seeds(mesh, vertex_normals, areas, count)
+    distance = PACKING * np.sqrt(areas.sum() / count)
+    seed = _seeds(mesh, vertex_normals, areas, CANDIDATES * count, distance)
     graph = _edge_graph(mesh)
-    checkpoint()
-    _, _, nearest = csgraph.dijkstra(
-        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
-    )
-    checkpoint()
-    cell_of = np.full(len(mesh.vertices), -1)
-    cell_of[seed] = np.arange(len(seed))
-    cell = np.where(nearest >= 0, cell_of[np.maximum(nearest, 0)], -1)
+    cell = _nearest_seeds(mesh.vertices, graph, seed, MARGIN * distance)
+    if (cell[faces] < 0).any():
+        cell = _nearest_seeds(mesh.vertices, graph, seed, np.inf)
     corners = cell[faces]
     apart = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     checkpoint()
@@ -144,29 +155,68 @@ def build_coarse_mesh(
 
 def _edge_graph(mesh: Mesh) -> sparse.csr_array:
     """Lengths of the edges, each in one place, shape (V, V)."""
-    start, end = mesh.edges.T
-    checkpoint()
-    length = np.linalg.norm(mesh.vertices[start] - mesh.vertices[end], axis=1)
+    length = edge_lengths(mesh.vertices, mesh.edges)
     checkpoint()
     size = len(mesh.vertices)
-    return sparse.csr_array((length, (start, end)), shape=(size, size))
+    return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
 
 
-def _seeds(mesh: Mesh, normals: FloatArray, areas: FloatArray, count: int) -> IntArray:
+def _nearest_seeds(
+    vertices: FloatArray, graph: sparse.csr_array, seed: IntArray, margin: float
+) -> IntArray:
+    """Which seed each vertex is nearest to along edges, shape (V,).
+
+    -1 where there is none, or, on meshes of more than one slab, none as near as the margin. Ways
+    no longer than that from a vertex of a slab stay in the widened slab, so what is found there
+    holds on the whole mesh.
+    """
+    n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
+    along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]
+    checkpoint()
+    bounds = np.quantile(along, np.linspace(0.0, 1.0, n_slabs + 1))
+    if n_slabs == 1:
+        margin = np.inf
+    is_seed = np.zeros(len(vertices), dtype=bool)
+    is_seed[seed] = True
+    number = np.cumsum(is_seed) - 1  # seeds are ascending
+    nearest = np.full(len(vertices), -1)
+    for low, high in itertools.pairwise(bounds):
+        checkpoint()
+        near = np.flatnonzero((along >= low - margin) & (along <= high + margin))
+        seeds = np.flatnonzero(is_seed[near])
+        if not len(seeds):
+            continue
+        part = graph if len(near) == len(along) else graph[near][:, near]
+        checkpoint()
+        _, _, found = csgraph.dijkstra(
+            part, directed=False, indices=seeds, min_only=True, return_predecessors=True,
+            limit=margin,
+        )  # fmt: skip
+        own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
+        nearest[near[own]] = number[near[found[own]]]
+    checkpoint()
+    return nearest
+
+
+def _seeds(
+    mesh: Mesh, normals: FloatArray, areas: FloatArray, n_candidates: int, distance: float
+) -> IntArray:
     """Vertices that keep a distance from one another, ascending."""
     generator = np.random.default_rng(0)
     there = np.flatnonzero(areas > 0.0)
     # The smallest of exponential times by area: a draw by area, without replacement.
     times = generator.exponential(size=len(there)) / areas[there]
-    candidates = there[np.argsort(times)[: CANDIDATES * count]]
-    distance = PACKING * np.sqrt(areas.sum() / count)
+    checkpoint()
+    candidates = there[np.argsort(times)[:n_candidates]]
     scaled = np.concatenate(
         [mesh.vertices[candidates] / distance, NORMAL_WEIGHT * normals[candidates]], axis=1
     )
+    checkpoint()
     near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")
     size = len(candidates)
     graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))
     graph = sparse.csr_array(graph + graph.T)
+    checkpoint()
     free = np.ones(size, dtype=bool)
     chosen = []
     for place in range(size):

@@ -48,6 +48,7 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Unit normals weighted by corner angle, shape (n, 3); zero where they cancel."""
     checkpoint()
     normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
+    checkpoint()
     return np.nan_to_num(normals)
 
 

@@ -22,7 +22,7 @@ from scipy.sparse import csgraph
 
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh
+from ..mesh import Mesh, edge_lengths
 from ..progress import checkpoint
 from .redistancing import DistanceSurface, spread
 
@@ -114,7 +114,7 @@ def _response(mesh: Mesh, level: IntArray, start: FloatArray, width: float) -> F
     """
     response = np.zeros(len(level))
     edges = mesh.edges
-    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    length = edge_lengths(mesh.vertices, edges)
     # From the strongest down: what lies under a stronger Gaussian need not spread its own.
     for step in np.unique(level[level > 0])[::-1].tolist():
         checkpoint()
@@ -175,8 +175,7 @@ def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
     """Distance of painted vertices to the nearest one of a lower level, or to the boundary."""
     result = np.zeros(len(level))
     rim = np.zeros(len(level), dtype=bool)
-    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]
-    rim[sides] = True
+    rim[mesh.unpaired_edges[0]] = True
     edge_length = mesh.mean_edge_length
     for step in np.unique(level[level > 0]).tolist():
         checkpoint()

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh
+from ..by_parts import components, grouped
+from ..mesh import Mesh, side_keys
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]
@@ -113,21 +113,24 @@ def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
         The vertex of each fan.
     """
     faces = mesh.faces
-    n_vertices = len(mesh.vertices)
-    # Corner 3 f + c is a node; two corners at one vertex are joined by a common edge there.
+    order, begin, _ = grouped(side_keys(faces))  # side 3 f + j opposite corner j of face f
+    # The corners at the ends of each side, in the order of their vertices.
     corner = np.arange(faces.size).reshape(-1, 3)
-    vertex = np.concatenate([faces.ravel(), faces.ravel()])
-    other = np.concatenate([np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()])
-    node = np.concatenate([corner.ravel(), corner.ravel()])
+    start, end = corner[:, [1, 2, 0]].ravel(), corner[:, [2, 0, 1]].ravel()
+    turned = faces.ravel()[start] > faces.ravel()[end]
     checkpoint()
-    by_edge = np.argsort(vertex * n_vertices + other, kind="stable")
+    start, end = np.where(turned, end, start), np.where(turned, start, end)
+    same = np.ones(len(order), dtype=bool)
+    same[begin] = False
+    place = np.flatnonzero(same)
+    one, other = order[place - 1], order[place]
     checkpoint()
-    vertex, other, node = vertex[by_edge], other[by_edge], node[by_edge]
-    same = (vertex[1:] == vertex[:-1]) & (other[1:] == other[:-1])
-    entries = (np.ones(same.sum(), dtype=np.int8), (node[:-1][same], node[1:][same]))
-    graph = sparse.coo_array(entries, shape=(faces.size, faces.size))
+    n_fans, fan = components(
+        faces.size,
+        np.concatenate([start[one], end[one]]),
+        np.concatenate([start[other], end[other]]),
+    )
     checkpoint()
-    n_fans, fan = csgraph.connected_components(graph, directed=False)
     vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
     vertex_of_fan[fan] = faces.ravel()
     return fan.reshape(-1, 3), vertex_of_fan

@@ -7,9 +7,9 @@ import nicmm_core as nicmm
 from benchmarks import corpus
 from benchmarks.checker import judge
 from benchmarks.defects import defective_meshes
-from nicmm_core import shapes, surface_designer
+from nicmm_core import shapes, surface_designer, tolerances
 from nicmm_core.mesh import unique_edges
-from nicmm_core.sound_copy import FLAT, SOUND_COPIES, sound_copy, welded_vertices
+from nicmm_core.sound_copy import SOUND_COPIES, sound_copy, welded_vertices
 from nicmm_core.surface_points import locate_points
 from tests.core.checks import grid, joined
 
@@ -108,7 +108,7 @@ def test_only_vertices_of_faces_without_area_move():
     copy = first_copy(nicmm.Mesh(vertices, faces))
     offset = copy.mesh.vertices - vertices
     offset -= np.median(offset, axis=0)
-    flat = triangle_heights(vertices[faces]) <= FLAT
+    flat = triangle_heights(vertices[faces]) <= tolerances.WITHOUT_AREA
     assert flat.any()
     still = np.setdiff1d(np.arange(len(vertices)), faces[flat])
     np.testing.assert_allclose(offset[still], 0.0, atol=1e-15)

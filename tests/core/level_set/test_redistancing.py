@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nicmm_core import shapes
+from nicmm_core import Mesh, shapes
+from nicmm_core.level_set import redistancing
 from nicmm_core.level_set.redistancing import build_distance_surface, redistanced
 
 NOTHING = np.zeros(0, dtype=np.int64)
@@ -81,3 +82,29 @@ def test_distance_never_rises_faster_than_edges_are_long(ball, seed):
     start, end = ball.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
     length = np.linalg.norm(ball.vertices[start] - ball.vertices[end], axis=1)
     assert (np.abs(found[start] - found[end]) <= length * (1.0 + 1e-9)).all()
+
+
+def twisted_prism(around, rows, height, twist):
+    """Rings of obtuse triangles: each ring of vertices is turned by some steps from the last."""
+    ring, place = np.divmod(np.arange(rows * around), around)
+    angle = 2.0 * np.pi * (place + twist * ring) / around
+    vertices = np.stack([np.cos(angle), np.sin(angle), height * ring], axis=1)
+    low = np.arange((rows - 1) * around)
+    beside = low - low % around + (low + 1) % around
+    lower = np.stack([low, beside, low + around], axis=1)
+    upper = np.stack([beside, beside + around, low + around], axis=1)
+    return Mesh(vertices, np.concatenate([lower, upper]))
+
+
+@pytest.mark.parametrize("twist", [3, 8])
+def test_needles_in_a_ring_do_not_lower_one_anothers_distance(monkeypatch, twist):
+    """Of the hostile input one case took 11,000 rounds on 3,400 vertices."""
+    mesh = twisted_prism(100, 10, 0.001, twist)
+    rounds = []
+    monkeypatch.setattr(redistancing, "checkpoint", lambda: rounds.append(1))
+    line = mesh.vertices[:, 0] - 0.01
+    found = np.abs(redistanced(distance_surface(mesh), line, NOTHING))
+    assert len(rounds) < 200
+    # A quarter of the circle at most, and no less than the plane is away.
+    assert found.max() < 0.5 * np.pi + 0.05
+    assert (found >= np.abs(line) - 1e-9).all()

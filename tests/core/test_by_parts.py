@@ -1,0 +1,142 @@
+"""Part by part comes out what NumPy and SciPy find in one call."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import sparse
+from scipy.sparse import csgraph
+
+import nicmm_core as nicmm
+from nicmm_core import by_parts, mesh, shapes
+from nicmm_core.by_parts import components, distinct_rows, grouped, stable_order
+from nicmm_core.coarsening import coarse_mesh
+from nicmm_core.surface_points import first_hits, nearest_points
+
+SEEDS = st.integers(0, 10_000)
+
+
+@pytest.fixture(autouse=True)
+def small_parts(monkeypatch):
+    monkeypatch.setattr(by_parts, "PART", 7)
+
+
+def some_keys(seed):
+    """Few or many distinct ones, of either type, in no order or in order."""
+    generator = np.random.default_rng(seed)
+    size, kinds = generator.integers(0, 90), generator.choice([1, 5, 40, 1000])
+    keys = generator.integers(-kinds, kinds, size=size)
+    if generator.random() < 0.3:
+        keys = np.sort(keys)
+    return keys if generator.random() < 0.5 else keys * generator.choice([0.0, -0.5, np.pi])
+
+
+@given(SEEDS)
+def test_order_and_groups(seed):
+    keys = some_keys(seed)
+    expected = np.argsort(keys, kind="stable")
+    np.testing.assert_array_equal(stable_order(keys), expected)
+    order, start, count = grouped(keys)
+    _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+    np.testing.assert_array_equal(order, expected)
+    np.testing.assert_array_equal(order[start], first)
+    np.testing.assert_array_equal(count, counts)
+
+
+@given(SEEDS)
+def test_distinct_rows(seed):
+    generator = np.random.default_rng(seed)
+    rows = generator.integers(-2, 3, size=(generator.integers(0, 60), 3)) * 0.5
+    first, number = distinct_rows(rows)
+    _, expected, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    np.testing.assert_array_equal(first, expected)
+    np.testing.assert_array_equal(number, inverse.ravel())
+
+
+@given(SEEDS)
+def test_components(seed):
+    generator = np.random.default_rng(seed)
+    size = int(generator.integers(1, 60))
+    one, other = generator.integers(size, size=(2, generator.integers(0, 80)))
+    graph = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    count, expected = csgraph.connected_components(graph, directed=False)
+    found, label = components(size, one, other)
+    assert found == count
+    np.testing.assert_array_equal(label, expected)
+
+
+def test_no_call_gets_more_than_a_part(monkeypatch):
+    """Else a large mesh would hold up whoever wants to stop; and in between there is a question."""
+    sorted_at_once, asked = [], []
+    argsort, connected = np.argsort, csgraph.connected_components
+
+    def watched_sort(keys, **arguments):
+        if keys.dtype != np.uint16:  # of parts' numbers, by radix
+            sorted_at_once.append(len(keys))
+        return argsort(keys, **arguments)
+
+    def watched_components(graph, directed):
+        sorted_at_once.append(graph.nnz)
+        return connected(graph, directed=directed)
+
+    monkeypatch.setattr(np, "argsort", watched_sort)
+    monkeypatch.setattr(csgraph, "connected_components", watched_components)
+    monkeypatch.setattr(by_parts, "PART", 100)
+    monkeypatch.setattr(by_parts, "checkpoint", lambda: asked.append(1))
+    keys = np.random.default_rng(0).permutation(10_000)
+    stable_order(keys)
+    components(10_000, keys, keys[::-1])
+    assert len(sorted_at_once) == 200 <= len(asked)
+    assert max(sorted_at_once) < 160  # parts are of about the same size
+
+
+@pytest.fixture
+def bumpy():
+    ball = shapes.sphere(4)
+    generator = np.random.default_rng(2)
+    return ball.vertices * generator.uniform(0.97, 1.03, (len(ball.vertices), 1)), ball.faces
+
+
+def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
+    """All that a design does by parts on a large mesh, here on one of 5,120 faces."""
+    points = [3, 700, 1500, 2400]
+    monkeypatch.setattr(by_parts, "PART", 10**9)
+    whole = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
+    monkeypatch.setattr(by_parts, "PART", 700)
+    monkeypatch.setattr(coarse_mesh, "SLAB", 600)
+    in_parts = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
+    np.testing.assert_array_equal(in_parts.curves[0].points, whole.curves[0].points)
+
+
+@pytest.mark.parametrize("margin", [0.2, 1.0])
+def test_a_slab_finds_the_nearest_seeds_within_its_margin(bumpy, monkeypatch, margin):
+    """Exactly those that the whole mesh has at distances up to the margin."""
+    surface = nicmm.Mesh(*bumpy)
+    graph = coarse_mesh._edge_graph(surface)
+    seed = np.sort(np.random.default_rng(0).choice(len(surface.vertices), 40, replace=False))
+    distance, _, source = csgraph.dijkstra(
+        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
+    )
+    monkeypatch.setattr(coarse_mesh, "SLAB", 600)
+    found = coarse_mesh._nearest_seeds(surface.vertices, graph, seed, margin)
+    near = distance <= margin
+    assert 40 < near.sum() and (near.all() == (margin == 1.0))
+    np.testing.assert_array_equal(seed[found[near]], source[near])
+    assert (found[~near] == -1).all()
+
+
+def test_trees_of_some_faces_find_the_same_as_one_of_all(bumpy, monkeypatch):
+    generator = np.random.default_rng(1)
+    positions = generator.uniform(-1.2, 1.2, (50, 3))
+    rays = 3.0 * positions, -positions + 0.2 * generator.normal(size=(50, 3))
+    found = []
+    for size in (10**9, 900):
+        monkeypatch.setattr(mesh, "FACES_OF_A_TREE", size)
+        surface = nicmm.Mesh(*bumpy)
+        near, distance = nearest_points(surface, positions)
+        hits, along = first_hits(surface, *rays)
+        found.append((near.positions(surface), distance, hits.faces, hits.barycentric, along))
+    assert len(surface.face_trees) == 6
+    for whole, split in zip(*found, strict=True):
+        np.testing.assert_allclose(split, whole, atol=1e-12)
+    assert 0 < (hits.faces >= 0).sum() < 50
