@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..array_types import FloatArray
 from ..crossings import crossing_segments
 from ..curve import SurfaceCurve
 from ..design_result import is_one_curve
 from ..mesh import Mesh
+from ..path.leg_search import length_factor
 from ..surface_points import SurfacePoints
 from .contour import extract_curves
 from .problem import Problem
@@ -68,3 +71,40 @@ def zero_set(
     controls = problem.loop.control_vertices
     curves = extract_curves(mesh, problem.working, field, controls, problem.bundle)
     return ZeroSet(field, breaking, curves)
+
+
+def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
+    """The zero set, or that of φ₀ or of the initial path, whichever is shortest by the map.
+
+    Lengths count as they do for the path, less in a lane and more in an obstacle. A level set that
+    has found a better way is no longer than the path that it was made from. One that is longer has
+    lost its way: near sharp edges, where maps are most of all, it may swing round an end of an open
+    curve or round a corner of the surface, and so may φ₀.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh that the problem was built on.
+    problem : Problem
+        With a feature map.
+    zeros : ZeroSet
+    """
+    fields = [problem.initial_distance, problem.distance]
+    candidates = [zeros, *(zero_set(mesh, problem, field, True) for field in fields)]
+    simple = [one for one in candidates if one.is_simple_curve(mesh, problem.loop.closed)]
+    lengths = [_length_by_map(mesh, problem, one.curves[0]) for one in simple]
+    return simple[int(np.argmin(lengths))] if simple else zeros
+
+
+def _length_by_map(mesh: Mesh, problem: Problem, curve: SurfaceCurve) -> float:
+    """Length of a curve where every part counts as for the initial path, in mesh units."""
+    assert problem.feature_map is not None
+    known = problem.working.input_vertex >= 0
+    importance = np.ones(len(mesh.vertices))
+    importance[problem.working.input_vertex[known]] = problem.feature_map[known]
+    factor = length_factor((importance[mesh.faces[curve.faces]] * curve.barycentric).sum(axis=1))
+    positions = curve.points
+    if curve.closed:
+        positions, factor = np.concatenate([positions, positions[:1]]), np.append(factor, factor[0])
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return float(steps @ (0.5 * (factor[:-1] + factor[1:])))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..level_set.losses import energy_surface, loss_terms
 from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
-from ..level_set.zero_set import ZeroSet, zero_set
+from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
 from ..mesh import Mesh
 from ..path.band_refinement import PIECES_TO_START
 from ..progress import part
@@ -23,7 +23,16 @@ SingleArray = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Predicted:
-    """What the network says to a request on a mesh."""
+    """What the network says to a request on a mesh.
+
+    Attributes
+    ----------
+    problem : Problem
+    solution : Solution
+        The network's level set.
+    zeros : ZeroSet
+        Of it, or with maps of what `shortest_by_map` takes instead.
+    """
 
     problem: Problem
     solution: Solution
@@ -49,7 +58,10 @@ def predicted(mesh: Mesh, request: Request) -> Predicted:
         problem = requested_problem(mesh, request, PIECES_TO_START)
     with part(0.8, 1.0):
         solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
-        return Predicted(problem, solution, zero_set(mesh, problem, solution.field))
+        zeros = zero_set(mesh, problem, solution.field)
+        if request.has_maps:
+            zeros = shortest_by_map(mesh, problem, zeros)
+        return Predicted(problem, solution, zeros)
 
 
 def predict_once(weights: NetworkWeights, problem: Problem) -> Solution:

@@ -54,6 +54,11 @@ WHOLE_SHARE = 0.5
 """Share of the faces beyond which a part of the surface is no cheaper to search than the whole."""
 
 
+def length_factor(importance: FloatArray) -> FloatArray:
+    """What a length counts for where φ_fea has these values, any shape."""
+    return np.maximum(importance**2, LEAST_WEIGHT)
+
+
 @dataclass(frozen=True)
 class Obstacles:
     """What a leg has to keep off.
@@ -126,7 +131,7 @@ class LegSearch:
         self._kept: tuple[int, Patch] | None = None
         self._least_factor = 1.0
         if importance is not None:
-            self._least_factor = min(1.0, max(float((importance**2).min()), LEAST_WEIGHT))
+            self._least_factor = min(1.0, float(length_factor(importance).min()))
 
     def shortest(self, source: int, target: int, obstacles: Obstacles) -> Leg | None:
         """The shortest free leg; None when there is none.
@@ -241,7 +246,7 @@ class LegSearch:
         if self._importance is not None:
             importance = self._importance_at(vertices)
             at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
-            weight = np.maximum(at_nodes**2, LEAST_WEIGHT)
+            weight = length_factor(at_nodes)
         return Patch(
             vertices=vertices,
             edges=edges,

@@ -6,10 +6,11 @@ There |∇φ| = 1, the level-set term vanishes and the integrals over the surfac
 
 The length keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a
 circle in the plane neither grows nor shrinks, so that the balance has no length of its own. φ_fea
-is 1 where no map has a say, and there the curve is what it would be without any. An obstacle, where
-φ_fea is more, adds to the tension. Along a lane it is less; there only where the curve runs counts
-and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of length.
-Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).
+is 1 where no map has a say, and there the curve is what it would be without any. τ_fea goes with
+the size of the surface, and is a few times τ on curves so short that this is more. An obstacle,
+where φ_fea is more, adds to the tension. Along a lane it is less; there only where the curve runs
+counts and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of
+length. Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).
 
 The unknowns are sideways moves of nodes in their tangent planes. A node's residuals know only its
 two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
@@ -34,6 +35,14 @@ FEATURE_TENSION = 600.0
 
 It sets how tightly the curve may bend to follow a map: about 1/√600, 4 % of that length. The ratio
 of the level set's energy, 30, leaves the curve too stiff for what people paint.
+"""
+
+OVER_TENSION = 4.0
+"""What τ_fea has of τ besides, so that short curves follow a map too.
+
+τ falls with the square of the curve's length and does not know of the surface: a curve over a
+quarter of √area has as much tension as a map has to bend it, and a shorter one more. With this part
+any curve may bend for a map to half the radius of a circle of its length; long ones hardly feel it.
 """
 
 CONTACT = 10.0
@@ -62,12 +71,27 @@ class Balance:
     held: FloatArray | None = None
 
 
-def balance(surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool) -> Balance:
-    """The weights at a curve; ``apart`` keeps its strands apart."""
+def balance(
+    surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, taut: float = 1.0
+) -> Balance:
+    """The weights at a curve.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+    smoothness : float
+        Divides the tension and what a map has to say.
+    apart : bool
+        Whether strands are kept apart.
+    taut : float
+        Factor of the tension alone.
+    """
     tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2) / smoothness
-    weights = Balance(tension, 0.0)
+    weights = Balance(taut * tension, 0.0)
     if surface.feature_map is not None:
-        weights = Balance(tension, 0.0, surface.feature_weight / smoothness, _ds(nodes))
+        feature = surface.feature_weight / smoothness + OVER_TENSION * tension
+        weights = replace(weights, feature=feature, held=_ds(nodes))
     if not apart:
         return weights
     return replace(weights, contact=CONTACT * elastic_energy(nodes, weights) / len(nodes.positions))

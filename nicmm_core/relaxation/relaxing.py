@@ -81,6 +81,9 @@ class RelaxationConfig:
         Whether to try first without drawing the curve after every iteration.
     drawn_iterations : int
         The cap where it is drawn after every iteration, if that is lower.
+    taut : float
+        Factor of the tension in a pass with the fewest nodes before all others, which there is
+        where this is above 1.
     """
 
     levels: tuple[int, ...] = (128, 512)
@@ -94,12 +97,15 @@ class RelaxationConfig:
     iterations: int = 100
     drawn_at_rest: bool = False
     drawn_iterations: int = 100
+    taut: float = 1.0
 
 
-GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2)
+GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, taut=30.0)
 """Where a map guides: a lane has to be found while nodes are few, since many hardly move.
 
-Few nodes take long steps along the surface, and they do so until they rest.
+Few nodes take long steps along the surface, and they do so until they rest. Such steps would blow a
+fold of the start up to a bow from lane to lane, at rest there but far from the lowest energy; under
+30 times the tension, which a lane still withstands, folds are pulled straight.
 """
 
 DAMPING_NODES = 128
@@ -272,11 +278,14 @@ class _Relaxation:
         cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
         last_iteration = self.iterations + cap
         self.stopped = "converged"
+        passes = [(level, 1.0) for level in config.levels]
+        if config.taut > 1.0:
+            passes.insert(0, (config.levels[0], config.taut))
         try:
-            for level in config.levels:
-                last = level == config.levels[-1]
+            for number, (level, taut) in enumerate(passes):
+                last = number == len(passes) - 1
                 least = config.least_decrease if last else config.least_decrease_before
-                curve = self._level(curve, level, least, last_iteration, simple)
+                curve = self._level(curve, level, least, last_iteration, simple, taut)
                 if self.stopped != "converged":
                     break
         except _LostError:
@@ -290,6 +299,7 @@ class _Relaxation:
         least: float,
         last_iteration: int,
         simple: bool,
+        taut: float,
     ) -> ExactCurve:
         """Iterations with one number of nodes until the energy falls by less than a share."""
         config, least_damping = self.config, self._least_damping(level)
@@ -299,7 +309,7 @@ class _Relaxation:
         held = np.zeros(len(nodes.positions), dtype=bool)
         releases = 0
         while True:
-            weights = balance(self.surface, nodes, self.smoothness, apart=simple)
+            weights = balance(self.surface, nodes, self.smoothness, simple, taut)
             before = elastic_energy(nodes, weights)
             system = elastic_system(self.surface, nodes, weights)
             scale = max(bending_energy(nodes), STRAIGHT * before)

@@ -10,6 +10,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import (
+    OVER_TENSION,
     Balance,
     ElasticSystem,
     balance,
@@ -157,6 +158,18 @@ def test_smoothness_divides_the_tension(flat_disc):
         assert quarter == pytest.approx(whole / 4.0)
 
 
+@pytest.mark.parametrize("mapped", [False, True])
+def test_a_taut_curve_has_more_tension_and_the_same_map(flat_disc, mapped):
+    feature_map = np.full(len(flat_disc.vertices), 0.5) if mapped else None
+    surface = surface_of(flat_disc, feature_map, 7.0)
+    nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), True)
+    plain = balance(surface, nodes, 2.0, apart=False)
+    taut = balance(surface, nodes, 2.0, apart=False, taut=30.0)
+    assert taut.tension == pytest.approx(30.0 * plain.tension)
+    assert taut.feature == plain.feature
+    assert bool(plain.feature) is mapped
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
     """The curve's energy rises by a constant, and no move changes that."""
@@ -164,13 +177,14 @@ def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
     nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), closed)
     plain = balance(surface_of(flat_disc), nodes, 1.0, apart=False)
     mapped = balance(surface, nodes, 1.0, apart=False)
-    assert (mapped.tension, mapped.feature) == (plain.tension, 17.0)
+    feature = 17.0 + OVER_TENSION * plain.tension
+    assert (mapped.tension, mapped.feature) == (plain.tension, pytest.approx(feature))
     one, other = (elastic_system(surface, nodes, weights) for weights in (plain, mapped))
     scale = np.abs(one.slope).max()
     np.testing.assert_allclose(one.slope, other.slope, rtol=0, atol=1e-9 * scale)
     np.testing.assert_allclose(one.bands, other.bands, rtol=1e-9)
     rise = elastic_energy(nodes, mapped) - elastic_energy(nodes, plain)
-    assert rise == pytest.approx(17.0 * feature_energy(nodes))
+    assert rise == pytest.approx(feature * feature_energy(nodes))
 
 
 def test_a_lane_does_not_pay_for_length_in_it(flat_disc):
@@ -194,7 +208,7 @@ def test_an_obstacle_adds_to_the_tension(flat_disc):
     twos = np.full(len(flat_disc.vertices), 2.0)
     nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=twos)
     weights = balance(surface_of(flat_disc, twos, 5.0), nodes, 1.0, apart=False)
-    length = (weights.tension + 4.0 * 5.0) * nodes.lengths.sum()
+    length = (weights.tension + 4.0 * weights.feature) * nodes.lengths.sum()
     assert elastic_energy(nodes, weights) == pytest.approx(bending_energy(nodes) + length)
 
 

@@ -11,8 +11,13 @@ from nicmm_core import shapes
 from nicmm_core.crossings import crossing_segments
 from nicmm_core.curve import geodesic_curvature, resample
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
-from nicmm_core.relaxation.elastic_energy import bending_energy, feature_energy
-from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
+from nicmm_core.relaxation.elastic_energy import (
+    FEATURE_TENSION,
+    OVER_TENSION,
+    bending_energy,
+    feature_energy,
+)
+from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import (
     apart,
@@ -262,26 +267,26 @@ def test_obstacles_are_avoided(flat_disc):
     x = np.linspace(-0.6, 0.6, 30)
     start = curve_through(flat_disc, np.stack([x, 0.01 + 0 * x, 0 * x], axis=1), [0, 29], False)
     aside = relaxed(flat_disc, start, feature=hill, weight=30.0)
-    straight = relaxed(flat_disc, start, feature=hill, weight=1e-6)
-    assert aside.feature < 0.6 * straight.feature
+    straight = relaxed(flat_disc, start)
+    surface = CurveSurface(flat_disc, unsigned_normals(flat_disc), hill)
+    through = feature_energy(nodes_at(surface, straight.exact.nodes.places, closed=False))
+    assert aside.feature < 0.6 * through
     assert aside.curve.points[:, 1].max() > 0.15
     assert aside.curve.length > straight.curve.length
     assert np.abs(straight.curve.points[:, 1]).max() < 0.02
 
 
 def test_a_flat_map_is_a_tension(flat_disc):
-    """Of (φ_fea² - 1) times the weight, so φ_fea = 1 is none."""
+    """Of (φ_fea² - 1) τ_fea, so φ_fea = 1 is none; 3 times a weight is 3/4 of four times that."""
     start = star(flat_disc, controls=[0, 13, 22, 41])
     flat = np.ones(len(flat_disc.vertices))
-    free, neutral, one, other = (
+    free, neutral, one = (
         relaxed(flat_disc, start, feature=feature, weight=weight)
-        for feature, weight in (
-            (None, 0.0),
-            (flat, 20.0),
-            (2.0 * flat, 5.0),
-            (1.75**0.5 * flat, 20.0),
-        )
+        for feature, weight in ((None, 0.0), (flat, 20.0), (2.0 * flat, 5.0))
     )
+    own = OVER_TENSION * (2.0 * np.pi / one.curve.length) ** 2
+    weight = 4.0 * (5.0 + own) - own
+    other = relaxed(flat_disc, start, feature=1.75**0.5 * flat, weight=weight)
     assert apart(free.curve.points, neutral.curve.points) < 1e-9
     assert apart(one.curve.points, other.curve.points) < 2e-3
     assert one.feature == pytest.approx(4.0 / 1.75 * other.feature, rel=1e-3)
@@ -302,6 +307,40 @@ def test_a_lane_is_followed_and_left_smoothly(flat_disc):
     assert np.abs(points[inside, 1] - 0.08).max() < 0.02
     assert points[:, 1].min() > -0.02 and points[:, 1].max() < 0.1
     assert result.curve.length < 1.05 * 1.4
+
+
+@pytest.mark.parametrize("length", [0.05, 0.4, 1.2])
+def test_a_lane_is_followed_by_short_curves_too(length):
+    """Its width and its distance are shares of the curve's length, its weight is the surface's."""
+    mesh = scaled(shapes.disc(24), length)
+    x, y, _ = mesh.vertices.T / length
+    lane = np.sqrt(1.0 - np.exp(-((y - 0.06) ** 2) / (2 * 0.08**2)))
+    way = length * np.linspace(-0.5, 0.5, 40)
+    start = curve_through(mesh, np.stack([way, 0 * way, 0 * way], axis=1), [0, 39], False)
+    # τ_fea of a surface whose area is 1, which is where the three curves lie.
+    result = relaxed(mesh, start, feature=lane, weight=FEATURE_TENSION, config=GUIDED)
+    points = result.curve.points / length
+    inside = np.abs(points[:, 0]) < 0.2
+    assert np.abs(points[inside, 1] - 0.06).max() < 0.02
+
+
+def test_a_fold_of_the_start_is_pulled_straight(flat_disc):
+    """With few nodes and no tension to speak of it would grow to a bow, at rest but far off."""
+    _, y, _ = flat_disc.vertices.T
+    lane = np.sqrt(1.0 - np.exp(-(y**2) / (2 * 0.04**2)))
+    fold = [(-0.4, 0.0), (0.02, 0.0), (0.02, 0.08), (-0.02, 0.08), (-0.02, 0.04)]
+    fold += [(-0.06, 0.04), (-0.06, 0.12), (0.06, 0.12), (0.06, 0.0), (0.4, 0.0)]
+    line = np.array(fold)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], 100)]))
+    flat = np.stack([np.interp(at, arc, line[:, axis]) for axis in (0, 1)] + [0 * at], axis=1)
+    start = curve_through(flat_disc, flat, [0, len(at) - 1], closed=False)
+    for smoothness in (1.0, 4.0):
+        result = relaxed(
+            flat_disc, start, smoothness, GUIDED, feature=lane, weight=FEATURE_TENSION / np.pi
+        )
+        assert np.abs(result.curve.points[:, 1]).max() < 0.01
+        assert result.stopped == "converged"
 
 
 def test_strands_that_would_cross_stay_apart(flat_disc):
