@@ -38,7 +38,7 @@ from .request import Request, same_course, same_request
 STARTED = 0.6
 """About how much of the time is over when relaxation begins."""
 
-SOON_DONE = 5
+SOON_DONE = 10
 """The cap of a relaxation, in numbers of iterations that most need."""
 
 CROWDED = 3
@@ -160,7 +160,7 @@ class SurfaceDesigner:
         last = self._last
         if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
-        config = replace(WARM, iterations=iterations, drawn_iterations=1, steps=1)
+        config = replace(WARM, iterations=iterations, drawn_iterations=1)
         if last is not None and last.crowded:
             # Without would fail once more.
             config = replace(config, drawn_at_rest=False)

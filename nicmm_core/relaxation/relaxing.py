@@ -59,10 +59,11 @@ class RelaxationConfig:
     levels : tuple of int
         Numbers of nodes, rising.
     steps : int
-        Most in an iteration. Drawing costs as much as two of them.
+        Most in an iteration.
     longest_move : float
         Farthest that the linearised energy is trusted; the curve may move twice as far if that is
-        seen to lower the energy further.
+        seen to lower the energy further. Longer moves between one drawing and the next fold the
+        curve where it bends.
     damping : float
         At the start of a level of 128 nodes, relative to the greatest diagonal entry. Far below 1,
         because that measures the stiffness of a zigzag from node to node, against which a slow
@@ -87,11 +88,11 @@ class RelaxationConfig:
     """
 
     levels: tuple[int, ...] = (128, 512)
-    steps: int = 6
+    steps: int = 8
     longest_move: float = 2.0
     damping: float = 1e-6
     most_damping: float = 1e2
-    least_decrease: float = 4e-3
+    least_decrease: float = 2e-3
     least_decrease_before: float = 0.1
     stretch: float = 1.6
     iterations: int = 100

@@ -15,8 +15,13 @@ from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig
 
-WARM = RelaxationConfig(levels=(512,), least_decrease=1e-3, drawn_at_rest=True)
-"""Relaxation from there: the curve is fine already and near its rest."""
+WARM = RelaxationConfig(
+    levels=(512,), steps=1, longest_move=4.0, least_decrease=1e-3, drawn_at_rest=True
+)
+"""Relaxation from there: the curve is fine already and near its rest.
+
+Nothing is drawn on the way, so that an iteration is one step.
+"""
 
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""

@@ -288,7 +288,7 @@ def test_a_flat_map_is_a_tension(flat_disc):
     weight = 4.0 * (5.0 + own) - own
     other = relaxed(flat_disc, start, feature=1.75**0.5 * flat, weight=weight)
     assert apart(free.curve.points, neutral.curve.points) < 1e-9
-    assert apart(one.curve.points, other.curve.points) < 2e-3
+    assert apart(one.curve.points, other.curve.points) < 5e-3
     assert one.feature == pytest.approx(4.0 / 1.75 * other.feature, rel=1e-3)
     assert one.curve.length < 0.97 * free.curve.length
 

@@ -201,4 +201,4 @@ def test_a_dragged_curve_keeps_its_nodes(ball):
     again = relax(surface, moved, 1.0, WARM)
     assert len(again.exact.nodes.positions) == len(first.exact.nodes.positions)
     assert again.iterations <= 2
-    assert apart(again.curve.points, first.curve.points) < 2e-3
+    assert apart(again.curve.points, first.curve.points) < 1e-2
