@@ -109,7 +109,7 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
     _add_mesh(picture, placed - centre, width)
     for number, (curve, colour) in enumerate(picture.curves):
         material = _material(f"Curve {number}", colour)
-        _add_tube(curve.points @ axes.T / unit - centre, TUBE * width, material)
+        _add_tube(curve, curve.points @ axes.T / unit - centre, TUBE * width, material)
     balls = _material("Control points", BLACK)
     for place in _control_positions(picture) @ axes.T / unit - centre:
         _add_ball(place, BALL * width, balls)
@@ -244,14 +244,15 @@ def _add_mesh(picture: Picture, vertices: FloatArray, width: float) -> None:
         wire.use_even_offset = False
 
 
-def _add_tube(points: FloatArray, radius: float, material: Any) -> None:
+def _add_tube(curve: SurfaceCurve, points: FloatArray, radius: float, material: Any) -> None:
     data = bpy.data.curves.new("Curve", "CURVE")
     data.dimensions = "3D"
     data.bevel_depth = radius
+    data.use_fill_caps = True
     spline = data.splines.new("POLY")
     spline.points.add(len(points) - 1)
     spline.points.foreach_set("co", np.pad(points, ((0, 0), (0, 1))).astype(np.float32).ravel())
-    spline.use_cyclic_u = True
+    spline.use_cyclic_u = curve.closed
     data.materials.append(material)
     _linked("Curve", data)
 
