@@ -226,7 +226,7 @@ class SurfaceDesigner:
                     breaking=zeros.breaking_vertices,
                 )
         with part(STARTED, 1.0):
-            config = GUIDED if request.has_maps else RelaxationConfig()
+            config = RelaxationConfig() if request.alignment is None else GUIDED
             return self._relaxed(request, start, config, started)
 
     def _start_from_last(self, request: Request, longest: float = LONGEST_MOVE) -> _Start | None:
