@@ -102,7 +102,7 @@ class RelaxationConfig:
 
 
 GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, taut=30.0)
-"""Where a map guides: a lane has to be found while nodes are few, since many hardly move.
+"""Where a map attracts: a lane has to be found while nodes are few, since many hardly move.
 
 Few nodes take long steps along the surface, and they do so until they rest. Such steps would blow a
 fold of the start up to a bow from lane to lane, at rest there but far from the lowest energy; under
@@ -233,6 +233,25 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
 
 
 @dataclass(frozen=True)
+class _State:
+    """A curve between two iterations, with its energy linearised."""
+
+    curve: ExactCurve  # as it was last drawn
+    nodes: Nodes
+    held: BoolArray  # (n,) nodes that could not follow
+    weights: Balance
+    energy: float
+    system: ElasticSystem
+
+    @property
+    def free(self) -> BoolArray:
+        """Nodes that may move, (n,)."""
+        free = ~self.held
+        free[self.curve.control_nodes] = False
+        return free
+
+
+@dataclass(frozen=True)
 class _Moved:
     """Nodes after one or more steps, each of which lowered the energy."""
 
@@ -314,13 +333,14 @@ class _Relaxation:
             before = elastic_energy(nodes, weights)
             system = elastic_system(self.surface, nodes, weights)
             scale = max(bending_energy(nodes), STRAIGHT * before)
+            state = _State(curve, nodes, held, weights, before, system)
             done = None
-            if self._may_fall(curve, system, held) > SURELY * least * scale:
+            if self._may_fall(state) > SURELY * least * scale:
                 if self.iterations == last_iteration:
                     self.stopped = "cap"
                     break
                 self.iterations += 1
-                done = self._iteration(curve, nodes, held, system, weights, before, damping, simple)
+                done = self._iteration(state, damping, simple)
             if done is not None:
                 curve, nodes, damping, held = done.curve, done.nodes, done.damping, held | done.held
                 self.drawn = curve
@@ -345,99 +365,75 @@ class _Relaxation:
     def _least_damping(self, n_nodes: int) -> float:
         return self.config.damping * (DAMPING_NODES / n_nodes) ** 3
 
-    def _may_fall(self, curve: ExactCurve, system: ElasticSystem, held: BoolArray) -> float:
+    def _may_fall(self, state: _State) -> float:
         """By how much the least damped step is going to lower the energy."""
-        free = self._free(curve, held)
+        free = state.free
         if not free.any():
             return 0.0
         damping = self._least_damping(len(free))
-        return predicted_fall(system, damped_step(system, free, damping))
+        return predicted_fall(state.system, damped_step(state.system, free, damping))
 
-    def _free(self, curve: ExactCurve, held: BoolArray) -> BoolArray:
-        free = ~held
-        free[curve.control_nodes] = False
-        return free
-
-    def _iteration(
-        self,
-        curve: ExactCurve,
-        nodes: Nodes,
-        held: BoolArray,
-        system: ElasticSystem,
-        weights: Balance,
-        energy: float,
-        damping: float,
-        simple: bool,
-    ) -> _Iteration | None:
+    def _iteration(self, state: _State, damping: float, simple: bool) -> _Iteration | None:
         """Steps from a curve, drawn if it is to stay simple; None when none lowers the energy."""
-        free = self._free(curve, held)
+        free = state.free
         tries = 0
         while True:
-            moved = self._steps(nodes, energy, free, system, weights, damping)
+            moved = self._steps(state, free, damping)
             if moved is None:
                 return None
-            reached, stayed, drawn_curve, after = moved.nodes, moved.stayed, curve, moved.energy
+            curve, nodes, energy, stayed = state.curve, moved.nodes, moved.energy, moved.stayed
             if simple:
-                drawn_curve, kept = redrawn(self.surface, curve, reached)
+                curve, kept = redrawn(self.surface, state.curve, nodes)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
                     tries += 1
                     continue
-                reached, stayed = drawn_curve.nodes, stayed | kept
+                nodes, stayed = curve.nodes, stayed | kept
                 if kept.any():
-                    after = elastic_energy(reached, weights)
-            if after < energy:
-                less = max(moved.damping / DAMPING_FACTOR, self._least_damping(len(free)))
-                return _Iteration(drawn_curve, reached, after, stayed, less, moved.farthest)
+                    energy = elastic_energy(nodes, state.weights)
+            if energy < state.energy:
+                return _Iteration(
+                    curve, nodes, energy, stayed, self._less_damping(moved), moved.farthest
+                )
             damping = moved.damping * DAMPING_FACTOR
 
-    def _steps(
-        self,
-        nodes: Nodes,
-        energy: float,
-        free: BoolArray,
-        system: ElasticSystem,
-        weights: Balance,
-        damping: float,
-    ) -> _Moved | None:
+    def _steps(self, state: _State, free: BoolArray, damping: float) -> _Moved | None:
         """As many steps as are worthwhile; None when not even one lowers the energy."""
-        moved = self._first_step(nodes, energy, free, system, weights, damping)
+        moved = self._first_step(state, free, damping)
         if moved is None:
             return None
-        damping = max(moved.damping / DAMPING_FACTOR, self._least_damping(len(free)))
+        damping = self._less_damping(moved)
         for _ in range(self.config.steps - 1):
-            least = WORTHWHILE * (energy - moved.energy)
-            further = self._further_step(moved, free & ~moved.stayed, weights, damping, least)
+            least = WORTHWHILE * (state.energy - moved.energy)
+            further = self._further_step(moved, free, state.weights, damping, least)
             if further is None:
                 break
             moved = further
         return moved
 
-    def _first_step(
-        self,
-        nodes: Nodes,
-        energy: float,
-        free: BoolArray,
-        system: ElasticSystem,
-        weights: Balance,
-        damping: float,
-    ) -> _Moved | None:
+    def _less_damping(self, moved: _Moved) -> float:
+        """The damping to go on with after a step that lowered the energy."""
+        return max(moved.damping / DAMPING_FACTOR, self._least_damping(len(moved.stayed)))
+
+    def _first_step(self, state: _State, free: BoolArray, damping: float) -> _Moved | None:
         """The least damped step that lowers the energy; None when there is none."""
-        surface = self.surface
+        surface, nodes, weights = self.surface, state.nodes, state.weights
         while damping <= self.config.most_damping and free.any():
-            move, farthest = self._trusted(nodes, damped_step(system, free, damping))
-            if not np.isfinite(farthest):
+            move = damped_step(state.system, free, damping)
+            if not np.isfinite(move).all():
                 return None
+            move, farthest = self._trusted(nodes, move)
             moved, stayed = sideways(surface, nodes, move)
             reached = elastic_energy(moved, weights)
             # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
             # both energies with the slope here is lower at twice the step after such a fall.
-            if reached < energy and energy - reached > -TWICE * float(system.slope @ move):
+            fallen = state.energy - reached
+            if fallen > 0.0 and fallen > -TWICE * float(state.system.slope @ move):
                 farther, also_stayed = sideways(surface, nodes, 2.0 * move)
                 reached_there = elastic_energy(farther, weights)
                 if reached_there < reached:
                     return _Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
-            if reached < energy:
+            if fallen > 0.0:
                 return _Moved(moved, reached, stayed, damping, farthest)
             damping *= DAMPING_FACTOR
         return None
@@ -446,12 +442,12 @@ class _Relaxation:
         self, moved: _Moved, free: BoolArray, weights: Balance, damping: float, least: float
     ) -> _Moved | None:
         """A step, or half of it, that lowers the energy; None when it promises less than that."""
-        surface, nodes = self.surface, moved.nodes
-        system = elastic_system(surface, nodes, weights)
+        surface, nodes, free = self.surface, moved.nodes, free & ~moved.stayed
         if not free.any():
             return None
+        system = elastic_system(surface, nodes, weights)
         move = damped_step(system, free, damping)
-        if not predicted_fall(system, move) > least:
+        if not np.isfinite(move).all() or predicted_fall(system, move) <= least:
             return None
         move, farthest = self._trusted(nodes, move)
         for share in (1.0, 0.5):
