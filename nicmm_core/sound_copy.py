@@ -23,14 +23,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from . import tolerances
-from .array_types import BoolArray, FloatArray, IntArray
+from .array_types import FloatArray, IntArray
 from .by_parts import components, distinct_rows, grouped
-from .mesh import Mesh, edge_lengths, unique_edges
+from .flat_faces import flat_faces, with_areas
+from .mesh import Mesh
 from .mesh_copy import MeshCopy
 from .progress import checkpoint
-
-ATTEMPTS = 4
-"""Of moving vertices, until every face has an area."""
 
 ROUNDS = 8
 """Of cutting one edge further where a cut does not come apart."""
@@ -40,12 +38,6 @@ SOUND_COPIES = 4
 
 STARTS = 8
 """Faces of the first point from which ways to the others are looked for."""
-
-BLOCK = 50_000
-"""Faces that are looked at together."""
-
-SEED = 0
-"""Of the ways in which vertices are moved; the same mesh has the same copy."""
 
 
 def sound_copy(mesh: Mesh, number: int) -> MeshCopy | None:
@@ -418,7 +410,7 @@ def _with_areas(
     vertices = mesh.vertices[vertex]
     checkpoint()
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
-    flat = _flat(vertices, faces, short)
+    flat = flat_faces(vertices, faces, short)
     checkpoint()
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MeshCopy(mesh, mesh, face, vertex)
@@ -431,54 +423,6 @@ def _with_areas(
     if flat.any() or doubled.any():
         # Far from the origin a small move would be lost to rounding.
         origin = vertices[faces[0, 0]]
-        vertices = vertices - origin
-        start, still = vertices, flat
-        checkpoint()
-        reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
-        generator = np.random.default_rng(SEED)
-        for _ in range(ATTEMPTS):
-            checkpoint()
-            moving = doubled.copy()
-            moving[faces[still]] = True
-            moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
-            checkpoint()
-            vertices = np.where(moving[:, None], start + moves, vertices)
-            still = _flat(vertices, faces, short)
-            if not still.any():
-                break
+        vertices = with_areas(vertices - origin, faces, short, flat, doubled)
     checkpoint()
     return MeshCopy(mesh, Mesh(vertices, faces), face, place, origin)
-
-
-def _flat(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
-    """Which faces have no area, shape (f,): a corner on another, or on the opposite edge.
-
-    Needles have an area, however thin: their shortest edge stands across the longest.
-    """
-    flat = np.zeros(len(faces), dtype=bool)
-    for first in range(0, len(faces), BLOCK):
-        checkpoint()
-        block = slice(first, first + BLOCK)
-        corner = vertices[faces[block]]
-        sides = np.roll(corner, -1, axis=1) - corner
-        lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
-        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        flat[block] = lengths[:, 0] <= short
-        flat[block] |= twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
-    return flat
-
-
-def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
-    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
-
-    Shorter ones join vertices to one place. Zero where no edge is longer.
-    """
-    edges, _ = unique_edges(faces)
-    lengths = edge_lengths(vertices, edges)
-    checkpoint()
-    n_places, place = components(len(vertices), *edges[lengths <= short].T)
-    shortest = np.full(n_places, np.inf)
-    for end in edges[lengths > short].T:
-        checkpoint()
-        np.minimum.at(shortest, place[end], lengths[lengths > short])
-    return np.where(np.isfinite(shortest), shortest, 0.0)[place]

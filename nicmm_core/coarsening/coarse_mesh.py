@@ -18,8 +18,10 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from .. import tolerances
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
+from ..flat_faces import flat_faces, with_areas
 from ..mesh import Mesh, edge_lengths
 from ..progress import checkpoint
 from ..surface_points import SurfacePoints, nearest_points
@@ -150,7 +152,18 @@ def build_coarse_mesh(
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
         raise MeshError("the cells of the coarse mesh meet in no face")
-    return CoarseMesh(Mesh(mesh.vertices[seed], corners[np.sort(first)]), seed, cell)
+    return CoarseMesh(_mesh_with_areas(mesh.vertices[seed], corners[np.sort(first)]), seed, cell)
+
+
+def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """A mesh whose faces have areas: on a grid three seeds may lie on one straight line."""
+    mesh = Mesh(vertices, faces)
+    short = tolerances.AT_ONE_PLACE * mesh.diagonal
+    flat = flat_faces(vertices, faces, short)
+    if not flat.any():
+        return mesh
+    origin = vertices[faces[0, 0]]
+    return Mesh(origin + with_areas(vertices - origin, faces, short, flat), faces)
 
 
 def _edge_graph(mesh: Mesh) -> sparse.csr_array:
