@@ -1,0 +1,106 @@
+"""Faces without area: which they are, and moves of their corners that give them one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import tolerances
+from .array_types import BoolArray, FloatArray, IntArray
+from .by_parts import components
+from .mesh import edge_lengths, unique_edges
+from .progress import checkpoint
+
+ATTEMPTS = 4
+"""Of moving vertices, until every face has an area."""
+
+BLOCK = 50_000
+"""Faces that are looked at together."""
+
+SEED = 0
+"""Of the ways in which vertices are moved; the same mesh is moved in the same way."""
+
+
+def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
+    """Which faces have no area: a corner on another, or on the opposite edge.
+
+    Needles have an area, however thin: their shortest edge stands across the longest.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float array
+    faces : (f, 3) int array
+    short : float
+        Length up to which an edge counts as none.
+
+    Returns
+    -------
+    (f,) bool array
+    """
+    flat = np.zeros(len(faces), dtype=bool)
+    for first in range(0, len(faces), BLOCK):
+        checkpoint()
+        block = slice(first, first + BLOCK)
+        corner = vertices[faces[block]]
+        sides = np.roll(corner, -1, axis=1) - corner
+        lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        flat[block] = lengths[:, 0] <= short
+        flat[block] |= twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
+    return flat
+
+
+def with_areas(
+    vertices: FloatArray,
+    faces: IntArray,
+    short: float,
+    flat: BoolArray,
+    moving: BoolArray | None = None,
+) -> FloatArray:
+    """Vertices with which every face has an area where that is possible, shape (v, 3).
+
+    Corners of flat faces are moved by a thousandth of their shortest edge that has a length, each
+    its own way.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float array
+        Near the origin: far from it a small move would be lost to rounding.
+    faces : (f, 3) int array
+    short : float
+        Length up to which an edge counts as none.
+    flat : (f,) bool array
+        As `flat_faces` gives them.
+    moving : (v,) bool array, optional
+        Vertices that are moved in any case.
+    """
+    start, still = vertices, flat
+    checkpoint()
+    reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
+    generator = np.random.default_rng(SEED)
+    for _ in range(ATTEMPTS):
+        checkpoint()
+        moves_now = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
+        moves_now[faces[still]] = True
+        moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
+        checkpoint()
+        vertices = np.where(moves_now[:, None], start + moves, vertices)
+        still = flat_faces(vertices, faces, short)
+        if not still.any():
+            break
+    return vertices
+
+
+def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
+    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
+
+    Shorter ones join vertices to one place. Zero where no edge is longer.
+    """
+    edges, _ = unique_edges(faces)
+    lengths = edge_lengths(vertices, edges)
+    checkpoint()
+    n_places, place = components(len(vertices), *edges[lengths <= short].T)
+    shortest = np.full(n_places, np.inf)
+    for end in edges[lengths > short].T:
+        checkpoint()
+        np.minimum.at(shortest, place[end], lengths[lengths > short])
+    return np.where(np.isfinite(shortest), shortest, 0.0)[place]
