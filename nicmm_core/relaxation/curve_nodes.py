@@ -8,11 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from .. import tolerances
-from ..array_types import FloatArray, IntArray
+from ..array_types import BoolArray, FloatArray, IntArray
 from ..level_set.features import vertex_normals
 from ..mesh import Mesh, unoriented_vertices
 from ..progress import checkpoint
 from ..surface_points import SurfacePoints
+
+BLOCK = 50_000
+"""Faces that are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -39,21 +42,55 @@ class CurveSurface:
 def unsigned_normals(mesh: Mesh) -> FloatArray:
     """Unit normals at the vertices, up to their signs, shape (V, 3).
 
-    Weighted by corner angle. Where faces of opposite orientation meet, as somewhere on any Möbius
-    strip, they would cancel; there it is the direction that the faces' normals share best,
-    whatever their signs.
+    Weighted by corner angle. A vertex that has been pushed over an edge has faces that are folded
+    back, whose angles count as much as others'; at their corners normals are weighted by area,
+    which no move of a vertex within its neighbours' plane changes. Where faces of opposite
+    orientation meet, as somewhere on any Möbius strip, normals would cancel; there it is the
+    direction that the faces' normals share best, whatever their signs.
     """
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = unoriented_vertices(mesh.faces)
     checkpoint()
-    incidence = mesh.vertex_faces[mixed]
-    owner = np.repeat(np.arange(len(mixed)), np.diff(incidence.indptr))
-    face_normals = mesh.face_normals[incidence.indices]
-    weighted = mesh.face_areas[incidence.indices, None] * face_normals
+    folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
+    owner, face_normals, areas = _faces_around(mesh, folded)
+    area_vector = np.zeros((len(folded), 3))
+    np.add.at(area_vector, owner, areas[:, None] * face_normals)
+    there = area_vector.any(axis=1)
+    normals[folded[there]] = _unit(area_vector[there])
+    owner, face_normals, areas = _faces_around(mesh, mixed)
+    weighted = areas[:, None] * face_normals
     spread = np.zeros((len(mixed), 3, 3))
     np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
     normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
     return normals
+
+
+def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
+    """Vertices of faces that look away from the normal of one of their corners, ascending."""
+    folded = np.zeros(len(mesh.vertices), dtype=bool)
+    for first in range(0, len(mesh.faces), BLOCK):
+        checkpoint()
+        faces = mesh.faces[first : first + BLOCK]
+        face_normals = mesh.face_normals[first : first + BLOCK]
+        facing = np.einsum("fcd,fd->fc", normals[faces], face_normals)
+        folded[faces[(facing < 0.0).any(axis=1)]] = True
+    return np.flatnonzero(folded)
+
+
+def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Of each face round some vertices: which of these it is at, its normal and its area."""
+    incidence = mesh.vertex_faces[vertices]
+    owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
+    return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
+
+
+def folded_back(surface: CurveSurface, faces: IntArray) -> BoolArray:
+    """Which of some faces, (p,), look away from the normals of their corners.
+
+    Where faces of opposite orientation meet, some may that are not folded.
+    """
+    normals = surface.vertex_normals[surface.mesh.faces[faces]].sum(axis=1)
+    return (normals * surface.mesh.face_normals[faces]).sum(axis=1) < 0.0
 
 
 @dataclass(frozen=True)

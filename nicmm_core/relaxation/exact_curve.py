@@ -23,9 +23,13 @@ from ..progress import checkpoint
 from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .face_walks import join, moved, strictly_inside
+from .node_spacing import arc_lengths, node_arcs
 
 DETOUR = 1.5
 """Longest way between two nodes, relative to their distance in space; a longer one is lost."""
+
+FOLDS = 4.0
+"""What it may be longer besides, in mean edge lengths: it runs forth and back over folded faces."""
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, at which an old point gives way to a new node."""
@@ -35,9 +39,6 @@ SHORT = 0.05
 
 A tube drawn along the curve would show it as a notch.
 """
-
-FEWEST_OF_A_LEG = 6
-"""Nodes of a leg at least, with the control point at its start."""
 
 
 @dataclass(frozen=True)
@@ -157,10 +158,7 @@ def rounded(surface: CurveSurface, coarse: ExactCurve, fine: ExactCurve) -> Exac
 
 def _arc_lengths(mesh: Mesh, curve: ExactCurve) -> tuple[FloatArray, float]:
     """Arc length at the nodes, (n,), and of the whole curve."""
-    positions = curve.polyline.positions(mesh)
-    if curve.closed:
-        positions = np.concatenate([positions, positions[:1]])
-    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
+    arc = arc_lengths(curve.polyline.positions(mesh), curve.closed)
     return arc[curve.node_place], float(arc[-1])
 
 
@@ -293,21 +291,11 @@ def _with_nodes(
 ) -> ExactCurve:
     """Insert nodes at equal distances on each leg and drop what was no more than a node."""
     mesh, n = surface.mesh, len(polyline)
-    positions = polyline.positions(mesh)
-    lengths = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
-    n_segments = n if closed else n - 1
-    arc = np.concatenate([[0.0], np.cumsum(lengths[:n_segments])])
-    bounds = arc[np.append(control_place, n) if closed else control_place]
-    legs = np.diff(bounds)
-    counts = np.maximum(np.round(count * legs / legs.sum()), FEWEST_OF_A_LEG).astype(np.int64)
-    leg = np.repeat(np.arange(len(legs)), counts)
-    control_nodes = np.cumsum(counts) - counts
-    share = (np.arange(len(leg)) - control_nodes[leg]) / counts[leg]
-    at = bounds[leg] + share * legs[leg]
-    if not closed:
-        at, control_nodes = np.append(at, bounds[-1]), np.append(control_nodes, len(at))
+    at, control_nodes = node_arcs(surface, polyline, control_place, count, closed)
+    arc = arc_lengths(polyline.positions(mesh), closed)
+    n_segments = len(arc) - 1
     segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
-    along = (at - arc[segment]) / np.maximum(lengths[segment], tolerances.TINY)
+    along = (at - arc[segment]) / np.maximum(np.diff(arc)[segment], tolerances.TINY)
     along = np.clip(along, 0.0, 1.0)[:, None]
     faces = polyline.faces[segment]
     end = in_faces(mesh, polyline[(segment + 1) % n], faces).barycentric
@@ -412,7 +400,7 @@ def _drawn_stretches(
     # A mesh need not be oriented: both normals count as pointing to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
-    ways = join(mesh, places[start], places[end], plane, DETOUR)
+    ways = join(mesh, places[start], places[end], plane, DETOUR, FOLDS * mesh.mean_edge_length)
     first, crossings = places[start], ways.crossings
     if not backwards:
         owner = np.concatenate([nodes, nodes[ways.pair]])

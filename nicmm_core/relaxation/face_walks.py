@@ -44,7 +44,12 @@ class Joins:
 
 
 def join(
-    mesh: Mesh, start: SurfacePoints, end: SurfacePoints, normals: FloatArray, detour: float
+    mesh: Mesh,
+    start: SurfacePoints,
+    end: SurfacePoints,
+    normals: FloatArray,
+    detour: float,
+    besides: float = 0.0,
 ) -> Joins:
     """Ways from points inside faces to other points nearby.
 
@@ -59,10 +64,12 @@ def join(
         Directions that the planes contain.
     detour : float
         Longest way, relative to the straight distance in space.
+    besides : float
+        Length that it may have in addition.
     """
     origin, goal = start.positions(mesh), end.positions(mesh)
     forward = goal - origin
-    longest = detour * np.linalg.norm(forward, axis=1)
+    longest = detour * np.linalg.norm(forward, axis=1) + besides
     reached = _holds(mesh, end, start.faces)
     walkers = _Walkers(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
     travelled = np.zeros(len(origin))
