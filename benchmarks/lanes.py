@@ -15,7 +15,7 @@ from nicmm_core.array_types import FloatArray, IntArray
 from nicmm_core.curve import SurfaceCurve, resample
 from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.mesh import Mesh
-from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.exact_curve import shifted
 from nicmm_core.surface_points import SurfacePoints
 
@@ -135,7 +135,7 @@ def lane_beside(mesh: Mesh, curve: SurfaceCurve) -> Lane | None:
     longest = int(counts.argmax())
     span = (bounds[longest] + (np.array(STRETCH) * counts[longest])).astype(int)
     stretch = np.arange(*span) % len(even)
-    surface = CurveSurface(mesh, unsigned_normals(mesh))
+    surface = curve_surface(mesh)
     here = SurfacePoints(curve.faces[segment[stretch]], curve.barycentric[segment[stretch]])
     nodes = nodes_at(surface, here, closed=False)
     along = np.gradient(even, axis=0)[stretch]

@@ -34,7 +34,7 @@ DRAGS = 5
 POINTS = 4
 
 STAGES: dict[str, list[tuple[ModuleType, str]]] = {
-    "normals": [(surface_designer, "unsigned_normals")],
+    "normals": [(surface_designer, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],

@@ -28,7 +28,7 @@ from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
 from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
-from .relaxation.curve_nodes import CurveSurface, unsigned_normals
+from .relaxation.curve_nodes import CurveSurface, curve_surface
 from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.exact_curve import ExactCurve, exact_curve
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
@@ -321,21 +321,22 @@ class SurfaceDesigner:
     def _curve_surface(self, request: Request) -> CurveSurface:
         """The surface that curves move on."""
         if not request.has_maps:
-            return CurveSurface(self.mesh, self._normals)
+            return self._surface
         unit = self._unit(request)
         importance = feature_map(self.mesh, request.obstacles, request.alignment, unit)
-        return CurveSurface(self.mesh, self._normals, importance, FEATURE_TENSION / unit**2)
+        weight = FEATURE_TENSION / unit**2
+        return replace(self._surface, feature_map=importance, feature_weight=weight)
 
     def _unit(self, request: Request) -> float:
         return component_unit(self.mesh, int(request.points.faces[0]))
 
     @cached_property
-    def _normals(self) -> FloatArray:
-        return unsigned_normals(self.mesh)
+    def _surface(self) -> CurveSurface:
+        return curve_surface(self.mesh)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
-        return CoarseStarts(self.mesh, self._normals)
+        return CoarseStarts(self._surface)
 
 
 class _FieldWatch:

@@ -12,7 +12,7 @@ from ..errors import NicmmError
 from ..mesh import Mesh
 from ..network.single_pass import predicted
 from ..progress import part
-from ..relaxation.curve_nodes import CurveSurface, unsigned_normals
+from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request
 from ..surface_points import SurfacePoints, locate_control_points
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
@@ -65,12 +65,12 @@ class CoarseStarts:
 
     Parameters
     ----------
-    mesh : Mesh
-    vertex_normals : (V, 3) float array
+    surface : CurveSurface
+        Of that mesh.
     """
 
-    def __init__(self, mesh: Mesh, vertex_normals: FloatArray) -> None:
-        self._mesh, self._vertex_normals = mesh, vertex_normals
+    def __init__(self, surface: CurveSurface) -> None:
+        self._mesh, self._fine = surface.mesh, surface
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._sizes: dict[int, int] = {}
 
@@ -110,16 +110,14 @@ class CoarseStarts:
             return None
         curve = zeros.curves[0]
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
-        surface = CurveSurface(self._mesh, self._vertex_normals)
-        result = lifted(surface, coarse, level.surface, curve, request.points[visited])
+        result = lifted(self._fine, coarse, level.surface, curve, request.points[visited])
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:
         key = component, count
         if key not in self._made:
-            coarse = build_coarse_mesh(self._mesh, self._vertex_normals, component, count)
-            surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-            self._made[key] = _CoarseSurface(coarse, surface)
+            coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
+            self._made[key] = _CoarseSurface(coarse, curve_surface(coarse.mesh))
         return self._made[key]
 
 

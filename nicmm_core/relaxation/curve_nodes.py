@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,12 +32,22 @@ class CurveSurface:
         φ_fea.
     feature_weight : float
         λ_fea / λ_smooth, in 1/length², where there is a feature map.
+    folded : (F,) bool array or None
+        Faces that are folded back over others: they look away from the normals of their corners.
+        None where there are none.
     """
 
     mesh: Mesh
     vertex_normals: FloatArray
     feature_map: FloatArray | None = None
     feature_weight: float = 0.0
+    folded: BoolArray | None = None
+
+
+def curve_surface(mesh: Mesh) -> CurveSurface:
+    """The surface of a mesh, without a map."""
+    normals = unsigned_normals(mesh)
+    return CurveSurface(mesh, normals, folded=_folded_faces(mesh, normals))
 
 
 def unsigned_normals(mesh: Mesh) -> FloatArray:
@@ -68,13 +79,32 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
 def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
     """Vertices of faces that look away from the normal of one of their corners, ascending."""
     folded = np.zeros(len(mesh.vertices), dtype=bool)
+    for block, facing in _facing(mesh, normals):
+        folded[mesh.faces[block][(facing < 0.0).any(axis=1)]] = True
+    return np.flatnonzero(folded)
+
+
+def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
+    """Faces that look away from the normals of their corners, None where none does.
+
+    None is said to where faces of opposite orientation meet: signs of normals mean nothing there.
+    """
+    folded = np.zeros(len(mesh.faces), dtype=bool)
+    for block, facing in _facing(mesh, normals):
+        folded[block] = facing.sum(axis=1) < 0.0
+    if folded.any():
+        mixed = np.zeros(len(mesh.vertices), dtype=bool)
+        mixed[unoriented_vertices(mesh.faces)] = True
+        folded &= ~mixed[mesh.faces].any(axis=1)
+    return folded if folded.any() else None
+
+
+def _facing(mesh: Mesh, normals: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+    """Cosines between the normals of faces and of their corners, (b, 3), block after block."""
     for first in range(0, len(mesh.faces), BLOCK):
         checkpoint()
-        faces = mesh.faces[first : first + BLOCK]
-        face_normals = mesh.face_normals[first : first + BLOCK]
-        facing = np.einsum("fcd,fd->fc", normals[faces], face_normals)
-        folded[faces[(facing < 0.0).any(axis=1)]] = True
-    return np.flatnonzero(folded)
+        block = slice(first, first + BLOCK)
+        yield block, np.einsum("fcd,fd->fc", normals[mesh.faces[block]], mesh.face_normals[block])
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -82,15 +112,6 @@ def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray,
     incidence = mesh.vertex_faces[vertices]
     owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
     return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
-
-
-def folded_back(surface: CurveSurface, faces: IntArray) -> BoolArray:
-    """Which of some faces, (p,), look away from the normals of their corners.
-
-    Where faces of opposite orientation meet, some may that are not folded.
-    """
-    normals = surface.vertex_normals[surface.mesh.faces[faces]].sum(axis=1)
-    return (normals * surface.mesh.face_normals[faces]).sum(axis=1) < 0.0
 
 
 @dataclass(frozen=True)

@@ -195,7 +195,9 @@ def shifted(
         Which came to a boundary and stayed beside it.
     """
     going = np.flatnonzero(length)
-    targets, stuck = moved(surface.mesh, nodes.places[going], direction[going], length[going])
+    targets, stuck = moved(
+        surface.mesh, nodes.places[going], direction[going], length[going], surface.folded
+    )
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
     faces[going], barycentric[going] = targets.faces, targets.barycentric
     blocked = np.zeros(len(length), dtype=bool)

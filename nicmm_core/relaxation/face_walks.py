@@ -109,9 +109,16 @@ def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -
 
 
 def moved(
-    mesh: Mesh, start: SurfacePoints, direction: FloatArray, length: FloatArray
+    mesh: Mesh,
+    start: SurfacePoints,
+    direction: FloatArray,
+    length: FloatArray,
+    folded: BoolArray | None = None,
 ) -> tuple[SurfacePoints, BoolArray]:
     """Points moved along the surface.
+
+    Over faces that are folded back a way runs back, so what it has still to go gets longer there,
+    and it ends behind the fold; unless the point itself is in a fold.
 
     Parameters
     ----------
@@ -122,6 +129,8 @@ def moved(
         Unit vectors about tangent to the faces.
     length : (m,) float array
         Not negative.
+    folded : (F,) bool array, optional
+        Which faces of the mesh are.
 
     Returns
     -------
@@ -135,6 +144,7 @@ def moved(
     blocked = length > 0.0
     walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(blocked))
     blocked[walkers.index] = False
+    outside = np.ones(len(length), dtype=bool) if folded is None else ~folded[start.faces]
     left = length.copy()
     faces, barycentric = start.faces.copy(), start.barycentric.copy()
     for _ in range(MOST_FACES):
@@ -144,13 +154,16 @@ def moved(
         step = walkers.step_lengths()
         index = walkers.index
         beyond = walkers.beyond()
-        stops = (left[index] <= step) | (beyond < 0)
+        back = np.zeros(len(index), dtype=bool)
+        if folded is not None:
+            back = folded[walkers.faces] & outside[index]
+        stops = (~back & (left[index] <= step)) | (beyond < 0)
         ends = index[stops]
         share = np.clip(left[ends] / np.maximum(step[stops], tolerances.TINY), 0.0, 1.0)[:, None]
         leaving = walkers.exit_barycentric()[stops]
         barycentric[ends] += share * (leaving - barycentric[ends])
         blocked[ends] = left[ends] > step[stops]
-        left[index] -= step
+        left[index] -= np.where(back, -step, step)
         walkers.enter_next_faces(~stops)
         faces[walkers.index] = walkers.faces
         barycentric[walkers.index] = _on_edges(mesh, *walkers.entry())

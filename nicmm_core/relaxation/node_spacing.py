@@ -14,7 +14,7 @@ from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
 from ..progress import checkpoint
 from ..surface_points import SurfacePoints
-from .curve_nodes import CurveSurface, folded_back
+from .curve_nodes import CurveSurface
 
 FEWEST_OF_A_LEG = 6
 """Nodes of a leg at least, with the control point at its start."""
@@ -88,9 +88,9 @@ def _runs_back(
     """
     mesh = surface.mesh
     back = np.zeros(len(arc), dtype=bool)
-    folded = np.flatnonzero(folded_back(surface, polyline.faces[: len(arc) - 1]))
-    if not len(folded):
+    if surface.folded is None:
         return back
+    folded = np.flatnonzero(surface.folded[polyline.faces[: len(arc) - 1]])
     positions = polyline.positions(mesh)
     if closed:
         positions = np.concatenate([positions, positions[:1]])
