@@ -77,7 +77,7 @@ def _lifted_nodes(
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
     # The coarse mesh's normals do not follow every dent that a way has to pass.
     smooth = replace(nodes, normals=exact.nodes.normals)
-    polyline, node_place, lost = straight_ways(fine, exact, smooth)
+    polyline, node_place, lost = straight_ways(surface, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()

@@ -28,9 +28,6 @@ from .node_spacing import arc_lengths, node_arcs
 DETOUR = 1.5
 """Longest way between two nodes, relative to their distance in space; a longer one is lost."""
 
-FOLDS = 4.0
-"""What it may be longer besides, in mean edge lengths: it runs forth and back over folded faces."""
-
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, at which an old point gives way to a new node."""
 
@@ -222,14 +219,14 @@ def drawn(
         kept = still & np.roll(still, -1)
         if not curve.closed:
             kept[-1] = False
-    polyline, node_place, lost = _drawn(surface.mesh, curve, nodes, kept)
+    polyline, node_place, lost = _drawn(surface, curve, nodes, kept)
     if lost.any():
         return None
     return ExactCurve(nodes, curve.control_nodes, polyline, node_place)
 
 
 def straight_ways(
-    mesh: Mesh, curve: ExactCurve, nodes: Nodes
+    surface: CurveSurface, curve: ExactCurve, nodes: Nodes
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline of straight ways between nodes at new places.
 
@@ -241,7 +238,7 @@ def straight_ways(
     (n,) bool array
         Nodes after which no way to the next one was found; there is nothing between them.
     """
-    return _drawn(mesh, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
+    return _drawn(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
 
 
 def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[ExactCurve, BoolArray]:
@@ -272,7 +269,7 @@ def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[Exa
                 np.where(stays[:, None], old.barycentric, new.barycentric),
             )
             nodes = nodes_at(surface, places, curve.closed)
-        polyline, node_place, bad = _drawn(surface.mesh, curve, nodes, kept)
+        polyline, node_place, bad = _drawn(surface, curve, nodes, kept)
         if not bad.any():
             pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
@@ -329,13 +326,13 @@ def _with_nodes(
 
 
 def _drawn(
-    mesh: Mesh, curve: ExactCurve, nodes: Nodes, kept: BoolArray
+    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, kept: BoolArray
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline through nodes at new places.
 
     Parameters
     ----------
-    mesh : Mesh
+    surface : CurveSurface
     curve : ExactCurve
     nodes : Nodes
         n nodes at new places.
@@ -363,7 +360,7 @@ def _drawn(
     for backwards in (False, True):
         here = node[redraw & (controls[node] == backwards)]
         ends = (here, following[here])
-        part, reached = _drawn_stretches(mesh, nodes.normals, places, here, ends, backwards)
+        part, reached = _drawn_stretches(surface, nodes.normals, places, here, ends, backwards)
         lost[here[~reached]] = True
         parts.append(part)
     if not curve.closed:
@@ -390,7 +387,7 @@ def _kept_stretches(curve: ExactCurve, nodes: IntArray) -> Stretches:
 
 
 def _drawn_stretches(
-    mesh: Mesh,
+    surface: CurveSurface,
     normals: FloatArray,
     places: SurfacePoints,
     nodes: IntArray,
@@ -398,11 +395,12 @@ def _drawn_stretches(
     backwards: bool,
 ) -> tuple[Stretches, BoolArray]:
     """Straight ways from nodes to the ones after them, drawn from there if backwards."""
+    mesh = surface.mesh
     start, end = reversed(ends) if backwards else ends
     # A mesh need not be oriented: both normals count as pointing to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
-    ways = join(mesh, places[start], places[end], plane, DETOUR, FOLDS * mesh.mean_edge_length)
+    ways = join(mesh, places[start], places[end], plane, DETOUR, surface.folded)
     first, crossings = places[start], ways.crossings
     if not backwards:
         owner = np.concatenate([nodes, nodes[ways.pair]])

@@ -23,6 +23,9 @@ from ..surface_points import SurfacePoints
 MOST_FACES = 4096
 """Faces that a way may pass; a section that goes round the surface is no short way."""
 
+FOLDS = 4.0
+"""What a way over folded faces may be longer before it arrives, in mean edge lengths."""
+
 
 @dataclass(frozen=True)
 class Joins:
@@ -49,9 +52,12 @@ def join(
     end: SurfacePoints,
     normals: FloatArray,
     detour: float,
-    besides: float = 0.0,
+    folded: BoolArray | None = None,
 ) -> Joins:
     """Ways from points inside faces to other points nearby.
+
+    A way over faces that are folded back runs forth, back and forth again; what it runs back is
+    taken off its length.
 
     Parameters
     ----------
@@ -64,27 +70,31 @@ def join(
         Directions that the planes contain.
     detour : float
         Longest way, relative to the straight distance in space.
-    besides : float
-        Length that it may have in addition.
+    folded : (F,) bool array, optional
+        Which faces of the mesh are.
     """
     origin, goal = start.positions(mesh), end.positions(mesh)
     forward = goal - origin
-    longest = detour * np.linalg.norm(forward, axis=1) + besides
+    longest = detour * np.linalg.norm(forward, axis=1)
+    margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
     reached = _holds(mesh, end, start.faces)
     walkers = _Walkers(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
-    travelled = np.zeros(len(origin))
+    travelled, covered = np.zeros(len(origin)), np.zeros(len(origin))
     pairs, crossings = [], []
     for _ in range(MOST_FACES):
         if not len(walkers.index):
             break
         checkpoint()
         step = walkers.step_lengths()
-        walkers.enter_next_faces(step <= longest[walkers.index] - travelled[walkers.index])
-        travelled[walkers.index] += walkers.last_step
+        back = np.zeros(len(step), dtype=bool) if folded is None else folded[walkers.faces]
+        covered[walkers.index] += np.where(back, -step, step)
+        travelled[walkers.index] += step
+        walkers.enter_next_faces(travelled[walkers.index] <= longest[walkers.index] + margin)
         pairs.append(walkers.index)
         crossings.append(walkers.entry())
         arrived = _holds(mesh, end[walkers.index], walkers.faces)
-        reached[walkers.index[arrived]] = True
+        here = walkers.index[arrived]
+        reached[here] = covered[here] <= longest[here]
         walkers.leave_edges(~arrived)
     if not pairs:
         return Joins(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
@@ -178,7 +188,7 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
 
 
 _OF_EACH_WALKER = (
-    *("index", "faces", "last_step", "_start", "_origin", "_across", "_position", "_side"),
+    *("index", "faces", "_start", "_origin", "_across", "_position", "_side"),
     *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
     *("_fraction", "_crossing"),
 )
@@ -204,7 +214,6 @@ class _Walkers:
         self.mesh = mesh
         self.index = index  # (w,) which of the caller's walkers
         self.faces = self._start = faces[index]
-        self.last_step = np.zeros(len(index))
         self._origin = origin[index]
         self._across = np.cross(normals[index], forward[index])
         self._position = self._crossing = self._origin
@@ -236,8 +245,7 @@ class _Walkers:
 
     def step_lengths(self) -> FloatArray:
         """Distance to the edge ahead, shape (w,)."""
-        self.last_step = np.linalg.norm(self._crossing - self._position, axis=1)
-        return self.last_step
+        return np.linalg.norm(self._crossing - self._position, axis=1)
 
     def beyond(self) -> IntArray:
         """The face beyond that edge, -1 where there is none or more than one, shape (w,)."""
