@@ -77,7 +77,10 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
 
 
 def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
-    """Vertices of faces that do not look where the normal of one of their corners does, ascending."""
+    """Vertices of faces that look away from the normal of one of their corners, ascending.
+
+    Or across it, as every face does from a normal that is none.
+    """
     folded = np.zeros(len(mesh.vertices), dtype=bool)
     for block, facing in _facing(mesh, normals):
         folded[mesh.faces[block][(facing <= 0.0).any(axis=1)]] = True

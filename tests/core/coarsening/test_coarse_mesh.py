@@ -6,10 +6,11 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
+from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.mesh import unique_edges
 from nicmm_core.relaxation.curve_nodes import unsigned_normals
 from nicmm_core.surface_points import SurfacePoints
-from tests.core.checks import euler_characteristic, joined
+from tests.core.checks import euler_characteristic, grid, joined
 
 
 def coarse_mesh(mesh, count, component=0):
@@ -37,6 +38,24 @@ def test_closed_surfaces_keep_their_topology(mesh, characteristic):
 def test_a_disc_stays_a_disc(flat_disc):
     coarse = coarse_mesh(shapes.disc(60), 500).mesh
     assert euler_characteristic(coarse.faces) == 1
+
+
+@pytest.mark.parametrize("origin", [0.0, 1e4])
+def test_on_a_square_grid_three_seeds_in_a_row_are_a_face_with_area(origin):
+    """Gradients on one without are not finite."""
+    square = grid(63)
+    square = nicmm.Mesh(square.vertices + origin, square.faces)
+    coarse = coarse_mesh(square, 2048)
+    corners = square.vertices[coarse.seed][coarse.mesh.faces]
+    sides = corners[:, 1:] - corners[:, :1]
+    without = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) < 1e-9
+    assert without.any()
+    moved = np.linalg.norm(coarse.mesh.vertices - square.vertices[coarse.seed], axis=1)
+    assert 0.0 < moved.max() < 1e-2 * coarse.mesh.mean_edge_length
+    fields = build_finite_elements(
+        coarse.mesh.vertices, coarse.mesh.faces, np.zeros(len(coarse.seed), dtype=bool)
+    )
+    assert np.isfinite(fields.gradient.data).all()
 
 
 def test_cells_cover_the_component_and_belong_to_their_seeds():

@@ -10,7 +10,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.level_set import sparse_solver
-from tests.core.checks import assert_valid_design
+from tests.core.checks import assert_valid_design, grid
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +42,15 @@ def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, clo
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
     assert max(unknowns) < 1.5 * coarse_start.CELLS
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns):
+    square = grid(63)
+    inner = np.flatnonzero((np.abs(square.vertices[:, :2] - 0.5) < 0.3).all(axis=1))
+    points = np.random.default_rng(seed).choice(inner, size=4, replace=False)
+    assert_valid_design(square, nicmm.design_curve(square, points, order="shortest"))
+    assert max(unknowns) < len(square.vertices)
 
 
 def test_memory_follows_the_vertices():
