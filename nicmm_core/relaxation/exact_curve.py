@@ -290,8 +290,8 @@ def _with_nodes(
 ) -> ExactCurve:
     """Insert nodes at equal distances on each leg and drop what was no more than a node."""
     mesh, n = surface.mesh, len(polyline)
-    at, control_nodes = node_arcs(surface, polyline, control_place, count, closed)
     arc = arc_lengths(polyline.positions(mesh), closed)
+    at, control_nodes = node_arcs(surface, polyline, arc, control_place, count, closed)
     n_segments = len(arc) - 1
     segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
     along = (at - arc[segment]) / np.maximum(np.diff(arc)[segment], tolerances.TINY)

@@ -35,6 +35,7 @@ def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
 def node_arcs(
     surface: CurveSurface,
     polyline: SurfacePoints,
+    arc: FloatArray,
     control_place: IntArray,
     count: int,
     closed: bool,
@@ -46,6 +47,8 @@ def node_arcs(
     surface : CurveSurface
     polyline : SurfacePoints
         Each point in the face of the segment after it.
+    arc : (s + 1,) float array
+        Its `arc_lengths`.
     control_place : (k,) int array
         Where in it the control points are, ascending.
     count : int
@@ -59,7 +62,6 @@ def node_arcs(
     (k,) int array
         Which of the nodes are the control points.
     """
-    arc = arc_lengths(polyline.positions(surface.mesh), closed)
     place = np.append(control_place, len(polyline)) if closed else control_place
     bounds = arc[place]
     legs = np.diff(bounds)
