@@ -169,7 +169,8 @@ def moved(
             back = folded[walkers.faces] & outside[index]
         stops = (~back & (left[index] <= step)) | (beyond < 0)
         ends = index[stops]
-        share = np.clip(left[ends] / np.maximum(step[stops], tolerances.TINY), 0.0, 1.0)[:, None]
+        to_go = np.minimum(left[ends], step[stops])
+        share = (to_go / np.maximum(step[stops], tolerances.TINY))[:, None]
         leaving = walkers.exit_barycentric()[stops]
         barycentric[ends] += share * (leaving - barycentric[ends])
         blocked[ends] = left[ends] > step[stops]

@@ -102,7 +102,7 @@ def test_crashes_and_hangs_are_results_of_the_fuzzer():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("number", [1746, 5864, 7294])
+@pytest.mark.parametrize("number", [1746, 5864, 7294, 8976])
 def test_what_a_whole_run_has_found(number):
-    """Positions without a nearest point; derivatives that overflowed; infinite coordinates."""
+    """Positions without a nearest point; derivatives that overflowed; infinite coordinates; steps of next to no length."""
     assert hostile_input.answer(number).faults == []
