@@ -1,5 +1,7 @@
 """What the fuzzer has found, one small test each; `python -m benchmarks fuzz` looks for more."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -101,8 +103,9 @@ def test_crashes_and_hangs_are_results_of_the_fuzzer():
     assert "died" in done[1].failure and "no answer" in done[3].failure
 
 
-@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("number", [1746, 5864, 7294, 8976])
 def test_what_a_whole_run_has_found(number):
-    """Positions without a nearest point; derivatives that overflowed; infinite coordinates; steps of next to no length."""
-    assert hostile_input.answer(number).faults == []
+    """No nearest point; derivatives that overflowed; infinite coordinates; steps of no length."""
+    with warnings.catch_warnings(record=True) as printed:
+        assert hostile_input.answer(number).faults == []
+    assert not printed
