@@ -14,7 +14,7 @@ ATTEMPTS = 4
 """Of moving vertices, until every face has an area."""
 
 BLOCK = 50_000
-"""Faces that are looked at together."""
+"""Faces, or vertices, that are looked at together."""
 
 SEED = 0
 """Of the ways in which vertices are moved; the same mesh is moved in the same way."""
@@ -77,13 +77,16 @@ def with_areas(
     checkpoint()
     reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
     generator = np.random.default_rng(SEED)
+    vertices = vertices.copy()
     for _ in range(ATTEMPTS):
         checkpoint()
-        moves_now = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
-        moves_now[faces[still]] = True
-        moves = generator.uniform(-1.0, 1.0, vertices.shape) * reach[:, None]
-        checkpoint()
-        vertices = np.where(moves_now[:, None], start + moves, vertices)
+        moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
+        moves[faces[still]] = True
+        for first in range(0, len(vertices), BLOCK):
+            checkpoint()
+            block = slice(first, first + BLOCK)
+            way = generator.uniform(-1.0, 1.0, start[block].shape) * reach[block, None]
+            vertices[block] = np.where(moves[block, None], start[block] + way, vertices[block])
         still = flat_faces(vertices, faces, short)
         if not still.any():
             break
