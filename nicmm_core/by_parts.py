@@ -20,6 +20,9 @@ from .progress import checkpoint
 PART = 500_000
 """Entries of a part: a few hundredths of a second of sorting."""
 
+FACES = 50_000
+"""Faces of a part, about whose corners and sides more is found out than an order."""
+
 SAMPLED = 64
 """Keys that are looked at for each part, to find where parts of about the same size begin."""
 
@@ -152,7 +155,8 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     return int(is_root.sum()), label
 
 
-def parts(length: int) -> Iterator[slice]:
-    """Slices of an array of some length, at most `PART` entries each."""
-    for start in range(0, length, PART):
-        yield slice(start, start + PART)
+def parts(length: int, size: int | None = None) -> Iterator[slice]:
+    """Slices of an array of some length, at most ``size`` entries each, `PART` if none is said."""
+    step = PART if size is None else size
+    for start in range(0, length, step):
+        yield slice(start, start + step)

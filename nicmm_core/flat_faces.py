@@ -6,15 +6,12 @@ import numpy as np
 
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .by_parts import components
+from .by_parts import FACES, components, parts
 from .mesh import edge_lengths, unique_edges
 from .progress import checkpoint
 
 ATTEMPTS = 4
 """Of moving vertices, until every face has an area."""
-
-BLOCK = 50_000
-"""Faces, or vertices, that are looked at together."""
 
 SEED = 0
 """Of the ways in which vertices are moved; the same mesh is moved in the same way."""
@@ -37,9 +34,8 @@ def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray
     (f,) bool array
     """
     flat = np.zeros(len(faces), dtype=bool)
-    for first in range(0, len(faces), BLOCK):
+    for block in parts(len(faces), FACES):
         checkpoint()
-        block = slice(first, first + BLOCK)
         corner = vertices[faces[block]]
         sides = np.roll(corner, -1, axis=1) - corner
         lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
@@ -82,9 +78,8 @@ def with_areas(
         checkpoint()
         moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
         moves[faces[still]] = True
-        for first in range(0, len(vertices), BLOCK):
+        for block in parts(len(vertices), FACES):
             checkpoint()
-            block = slice(first, first + BLOCK)
             way = generator.uniform(-1.0, 1.0, start[block].shape) * reach[block, None]
             vertices[block] = np.where(moves[block, None], start[block] + way, vertices[block])
         still = flat_faces(vertices, faces, short)

@@ -10,13 +10,11 @@ import numpy as np
 
 from .. import tolerances
 from ..array_types import BoolArray, FloatArray, IntArray
+from ..by_parts import FACES, parts
 from ..level_set.features import vertex_normals
 from ..mesh import Mesh, unoriented_vertices
 from ..progress import checkpoint
 from ..surface_points import SurfacePoints
-
-BLOCK = 50_000
-"""Faces that are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +102,8 @@ def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
 
 def _facing(mesh: Mesh, normals: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
     """Cosines between the normals of faces and of their corners, (b, 3), block after block."""
-    for first in range(0, len(mesh.faces), BLOCK):
+    for block in parts(len(mesh.faces), FACES):
         checkpoint()
-        block = slice(first, first + BLOCK)
         yield block, np.einsum("fcd,fd->fc", normals[mesh.faces[block]], mesh.face_normals[block])
 
 
