@@ -1,8 +1,8 @@
 """Every mesh that is there: a valid curve, or an error where no curve can be.
 
-Whether an error is due is decided here, from the arrays alone: points that no chain of faces with
-common edges joins, and points at one place. All else is "declined though possible", and a curve
-that `checker` faults, an untyped error, a crash or a hang is wrong.
+Whether an error is due is decided by `feasibility`, from the arrays alone: points that no chain of
+faces with common edges joins, and points at one place. All else is "declined though possible", and
+a curve that `checker` faults, an untyped error, a crash or a hang is wrong.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.array_types import IntArray
 from nicmm_core.files import read_mesh
+from nicmm_core.surface_points import locate_points
 
 from . import collections, report
 from .checker import judge
 from .defects import defective_meshes
+from .feasibility import edge_connected_parts, why_impossible
 from .isolation import Isolated, isolated
 from .scale import Scale
 
@@ -147,7 +147,8 @@ def outcome(item: Item) -> Outcome:
     points = _points(mesh, of_one_part, closed, generator)
     if points is None:
         return Outcome(DUE, "too few vertices")
-    due = not_possible(mesh, points)
+    located = locate_points(mesh, points, "points")
+    due = why_impossible(mesh, located)
     designer.forget()
     try:
         design = designer.design(points, closed=closed, order="shortest")
@@ -157,8 +158,6 @@ def outcome(item: Item) -> Outcome:
     # An error that is not the package's own is a finding, and must not end a long measurement.
     except Exception as error:
         return Outcome(WRONG, f"untyped {type(error).__name__}: {error}")
-    if design.status is nicmm.Status.NOT_ONE_CURVE:
-        return Outcome(DUE if due else DECLINED, f"{design.status.name}: {design.status}")
     faults = judge(mesh, design, points, closed, "shortest").faults
     if not np.isfinite(design.field).all():
         faults.append("the field is not finite")
@@ -185,45 +184,6 @@ def _points(
         return None
     count = min(int(generator.integers(fewest, fewest + 3)), len(vertices))
     return generator.choice(vertices, count, replace=False)
-
-
-def edge_connected_parts(mesh: nicmm.Mesh) -> IntArray:
-    """Which part each face belongs to, shape (F,).
-
-    Faces are joined that have a common edge, or open edges between the same two places.
-    """
-    faces = mesh.faces
-    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, edge, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-    edge = edge.reshape(-1)
-    _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
-    ends = np.sort(place.reshape(-1)[sides], axis=1)
-    is_open = (count[edge] == 1) & (ends[:, 0] != ends[:, 1])
-    _, joint = np.unique(ends[is_open], axis=0, return_inverse=True)
-    edge[is_open] = len(count) + joint.reshape(-1)
-    face = np.repeat(np.arange(len(faces)), 3)
-    shape = (len(faces), int(edge.max()) + 1)
-    incidence = sparse.csr_array((np.ones(len(face)), (face, edge)), shape=shape)
-    return csgraph.connected_components(incidence @ incidence.T, directed=False)[1]
-
-
-def not_possible(mesh: nicmm.Mesh, points: IntArray) -> str:
-    """Why no simple curve goes through these vertices; empty where one does.
-
-    On a connected surface there is one through any points: along a path through them and back
-    beside it. Parts that have only single vertices in common count as not connected.
-    """
-    positions: FloatArray = mesh.vertices[points]
-    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-    if (apart[np.triu_indices(len(points), 1)] <= 1e-9 * mesh.diagonal).any():
-        return "two points are at one place"
-    part = edge_connected_parts(mesh)
-    common = set(part.tolist())
-    for point in points:
-        common &= set(part[(mesh.faces == point).any(axis=1)].tolist())
-    if not common:
-        return "the points lie on different parts"
-    return ""
 
 
 def _verdict(one: Isolated[Item, Outcome]) -> str:

@@ -26,6 +26,7 @@ from nicmm_core.network.weights_file import SHIPPED, load_weights
 from nicmm_core.surface_points import locate_control_points
 
 from .checker import judge
+from .untyped import place_of
 
 SEED = 0
 
@@ -79,12 +80,8 @@ def answer(number: int) -> Answer:
                 result.faults.append(f"a message of {len(str(error))} characters")
         # Anything else is what is looked for.
         except Exception as error:
-            trace, place = error.__traceback__, ""
-            while trace is not None:
-                place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
-                trace = trace.tb_next
             result.outcome = "untyped"
-            result.faults.append(f"{type(error).__name__} at {place}: {error}"[:300])
+            result.faults.append(f"{type(error).__name__} at {place_of(error)}: {error}"[:300])
     return result
 
 
@@ -280,7 +277,8 @@ def _ask(designer: nicmm.Designer, result: Answer, points: Any, arguments: dict[
         result.faults.append(f"energy or seconds are not finite: {design.energy}")
     if design.field.shape != (len(mesh.vertices),) or not np.isfinite(design.field).all():
         result.faults.append("the field has another shape or is not finite")
-    if design.status is nicmm.Status.NOT_ONE_CURVE:
+    # Only the default method promises one curve.
+    if design.status is nicmm.Status.NOT_ONE_CURVE and arguments.get("method", "nicmm") != "nicmm":
         return
     closed = bool(arguments.get("closed", True))
     given = locate_control_points(mesh, points, closed)

@@ -144,7 +144,7 @@ def lane_beside(mesh: Mesh, curve: SurfaceCurve) -> Lane | None:
     every = cKDTree(even)
     for side in (1.0, -1.0):
         length = np.full(len(stretch), OFFSET * mesh.diagonal)
-        there, stuck = shifted(surface, nodes, side * across, length)
+        there, stuck, _ = shifted(surface, nodes, side * across, length)
         line = there.positions[~stuck]
         if len(line) > 1 and every.query(line)[0].mean() > LEAST_OFFSET * mesh.diagonal:
             return Lane(line, _painted(mesh, line, mesh.face_normals[there.places.faces[~stuck]]))

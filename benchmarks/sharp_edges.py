@@ -237,7 +237,7 @@ def _beside(mesh: Mesh, left: dict[tuple[int, int], int], line: IntArray) -> Sur
         across.append(np.cross(mesh.face_normals[face], along / np.linalg.norm(along)))
     start = SurfacePoints(np.array(faces), np.array(barycentric))
     length = np.full(2, OFFSET * mesh.diagonal)
-    points, stuck = moved(mesh, start, np.array(across), length)
+    points, stuck, _ = moved(mesh, start, np.array(across), length)
     return None if stuck.any() else points
 
 

@@ -1,7 +1,8 @@
 """The front door: a mesh and control points go in, a curve comes out. Read this file first.
 
-A request is checked, brought to a copy of the mesh without defects where it has some
-(`sound_copy`), and answered there (`surface_designer`):
+A request is checked, faces inside obstacles are taken away (`repair.free_surface`), what is left is
+made a manifold if it is none (`repaired_surface`), and the request is answered there
+(`surface_designer`):
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
 → prediction → one loop through the points → contour → relaxation of the curve.
@@ -16,6 +17,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,30 +31,38 @@ from .arguments import (
     checked_map,
     checked_smoothness,
 )
+from .array_types import FloatArray
 from .curve import SurfaceCurve
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, CurveError, UnreachableError
 from .mesh import Mesh
-from .mesh_copy import MeshCopy, faces_holding
 from .outputs.chain import checked_curve
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
+from .repair.free_surface import check_reachable, free_faces
+from .repair.mapped_mesh import MappedMesh
+from .repaired_surface import RepairedSurface, design_on_original
 from .request import Request
-from .sound_copy import SOUND_COPIES, led_copy, sound_copy
 from .surface_designer import SurfaceDesigner
 from .surface_points import SurfacePoints, check_connected, locate_control_points
 
 PARTS = (
-    "control_points, or via points, lie on parts of the mesh that meet in single vertices or edges "
-    "only, across which no curve is led; join the parts, or choose points on one of them"
+    "control_points, or via points, lie on parts of the mesh that meet in single vertices only, "
+    "which no curve crosses; join the parts along an edge, or choose points on one of them"
 )
 
 
 FOLLOWING = 3
 """Iterations of `Designer.follow` by default: a frame or two of a live drawing."""
 
-_OnCopy = tuple[MeshCopy, SurfaceDesigner]
-"""A copy of the mesh without its defects, and who designs on it."""
+
+@dataclass(frozen=True)
+class _Free:
+    """What obstacles leave of the surface."""
+
+    obstacles: FloatArray
+    clearance: float
+    surface: RepairedSurface
 
 
 class Designer:
@@ -76,17 +86,17 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._designers: list[_OnCopy | None] = []
-        self._led: _OnCopy | None = None  # for the points of the last request that needed it
+        self._whole = RepairedSurface(mesh, np.arange(len(mesh.faces)))
+        self._free: _Free | None = None  # of the last request with obstacles
         # A progress function may ask the same Designer for another curve.
         self._lock = threading.RLock()
 
     def forget(self) -> None:
         """Start the next design anew."""
         with self._lock:
-            for made in (*self._designers, self._led):
-                if made is not None:
-                    made[1].forget()
+            self._whole.forget()
+            if self._free is not None:
+                self._free.surface.forget()
 
     def design(
         self,
@@ -119,9 +129,9 @@ class Designer:
                 request = Request(
                     points=points, closed=closed, order=order, via_points=located, **maps
                 )
-                copy, designer, request = self._on_sound_copy(request)
-                with displaced(copy.origin):
-                    return copy.design(designer.design(request, method, started))
+                mapped, designer, there = self._on_manifold(request)
+                with displaced(mapped.origin):
+                    return design_on_original(mapped, designer.design(there, method, started))
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -181,9 +191,9 @@ class Designer:
         )
         with self._its_turn():
             self.forget()
-            copy, designer, request = self._on_sound_copy(request)
-            carried = copy.carried(curve)
-            return carried is not None and designer.resume(request, carried)
+            mapped, designer, there = self._on_manifold(request)
+            carried = mapped.carried(curve)
+            return carried is not None and designer.resume(there, carried)
 
     def follow(
         self,
@@ -231,9 +241,9 @@ class Designer:
         if not isinstance(iterations, int) or iterations < 1:
             raise ArgumentError(f"iterations is {iterations!r}; pass a positive whole number")
         with self._its_turn():
-            copy, designer, request = self._on_sound_copy(request)
-            found = designer.follow(request, iterations, started)
-            return None if found is None else copy.design(found)
+            mapped, designer, there = self._on_manifold(request)
+            found = designer.follow(there, iterations, started)
+            return None if found is None else design_on_original(mapped, found)
 
     def _maps(
         self,
@@ -251,30 +261,30 @@ class Designer:
             "smoothness": checked_smoothness(smoothness),
         }
 
-    def _on_sound_copy(self, request: Request) -> tuple[MeshCopy, SurfaceDesigner, Request]:
-        """The first copy on which the points are connected, and the request there."""
-        for number in range(SOUND_COPIES):
-            if number == len(self._designers):
-                made = sound_copy(self.mesh, number)
-                new = None if made is None else (made, SurfaceDesigner(made.mesh))
-                self._designers.append(new)
-            found = self._designers[number]
-            there = None if found is None else found[0].request(request)
-            if found is not None and there is not None:
-                return *found, there
-        there = None if self._led is None else self._led[0].request(request)
-        if self._led is not None and there is not None:
-            return *self._led, there
-        sets = [request.points, *request.via_points.values()]
-        made = led_copy(
-            self.mesh, [faces for points in sets for faces in faces_holding(self.mesh, points)]
-        )
-        there = None if made is None else made.request(request)
-        if made is not None and there is not None:
-            self._led = made, SurfaceDesigner(made.mesh)
-            return *self._led, there
+    def _on_manifold(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request]:
+        """The first manifold on which the points are connected, and the request there."""
+        surface = self._surface_off_obstacles(request)
+        found = surface.find(request)
+        if found is not None:
+            return found
         check_connected(self.mesh, request.points)
+        if surface is not self._whole and self._whole.find(request) is not None:
+            check_reachable(surface.most_connected, request.named_points)
         raise UnreachableError(PARTS)
+
+    def _surface_off_obstacles(self, request: Request) -> RepairedSurface:
+        """What obstacles leave of the surface, kept for the next request with the same ones."""
+        obstacles, clearance = request.obstacles, request.clearance
+        if obstacles is None:
+            return self._whole
+        last = self._free
+        same = last is not None and last.clearance == clearance
+        if last is None or not (same and np.array_equal(last.obstacles, obstacles)):
+            free = free_faces(self._whole.first, obstacles, clearance)
+            every = len(free) == len(self.mesh.faces)
+            surface = self._whole if every else RepairedSurface(self.mesh, free)
+            last = self._free = _Free(obstacles, clearance, surface)
+        return last.surface
 
 
 def design_curve(

@@ -43,6 +43,12 @@ class Request:
         """Whether there is something to avoid or to follow."""
         return self.obstacles is not None or self.alignment is not None
 
+    @property
+    def named_points(self) -> dict[str, SurfacePoints]:
+        """All points, by the argument that they come from."""
+        via = {f"via_points[{key}]": points for key, points in self.via_points.items()}
+        return {"control_points": self.points, **via}
+
 
 def same_course(one: Request, other: Request) -> bool:
     """Whether requests differ at most in where the control points are, and in smoothness."""

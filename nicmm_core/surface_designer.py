@@ -15,7 +15,6 @@ from .array_types import FloatArray, IntArray
 from .coarsening.coarse_start import CoarseStarts
 from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status
-from .free_surface import check_reachable, free_surface
 from .level_set import variational
 from .level_set.guidance import component_unit, feature_map
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
@@ -23,9 +22,9 @@ from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
 from .mesh import Mesh
-from .mesh_copy import MeshCopy
 from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
+from .path.initial_loop import path_curve
 from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface
@@ -57,16 +56,6 @@ class _Start:
 
 
 @dataclass(frozen=True)
-class _Free:
-    """What obstacles leave of the surface, and who designs there; no copy if it is all of it."""
-
-    obstacles: FloatArray
-    clearance: float
-    copy: MeshCopy | None
-    designer: SurfaceDesigner
-
-
-@dataclass(frozen=True)
 class _Remembered:
     """The last relaxed curve."""
 
@@ -89,13 +78,10 @@ class SurfaceDesigner:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self._last: _Remembered | None = None
-        self._free: _Free | None = None
 
     def forget(self) -> None:
         """Start the next design anew."""
         self._last = None
-        if self._free is not None and self._free.copy is not None:
-            self._free.designer.forget()
 
     def design(self, request: Request, method: str, started: float) -> Design:
         """Design a curve.
@@ -110,14 +96,8 @@ class SurfaceDesigner:
         Raises
         ------
         UnreachableError
-            If no simple curve passes the points in this order, or obstacles leave no way.
+            If no simple curve passes the points in this order.
         """
-        free = self._without_obstacles(request)
-        if free is not None and free.copy is not None:
-            check_reachable(free.copy, request)
-            there = free.copy.request(replace(request, clearance=0.0))
-            assert there is not None  # as it has just been checked
-            return free.copy.design(free.designer.design(there, method, started))
         if method == "nicmm":
             return self._designed(request, started)
         with part(0.0, 0.3):
@@ -144,19 +124,7 @@ class SurfaceDesigner:
             At most so many.
         started : float
             When this began, by `time.perf_counter`.
-
-        Raises
-        ------
-        UnreachableError
-            If obstacles leave no way.
         """
-        free = self._without_obstacles(request)
-        if free is not None and free.copy is not None:
-            check_reachable(free.copy, request)
-            there = free.copy.request(replace(request, clearance=0.0))
-            assert there is not None  # as it has just been checked
-            found = free.designer.follow(there, iterations, started)
-            return None if found is None else free.copy.design(found)
         last = self._last
         if last is not None and last.design is not None and same_request(request, last.request):
             return replace(last.design, seconds=time.perf_counter() - started)
@@ -178,30 +146,11 @@ class SurfaceDesigner:
             Through all its points, in their order.
         """
         self.forget()
-        free = self._without_obstacles(request)
-        if free is not None and free.copy is not None:
-            there = free.copy.request(replace(request, clearance=0.0))
-            carried = free.copy.carried(curve)
-            return (
-                there is not None and carried is not None and free.designer.resume(there, carried)
-            )
         surface, unit = self._curve_surface(request), self._unit(request)
         start = _Start(curve, np.arange(len(request.points)), surface, unit)
         exact = exact_curve(surface, curve, WARM.levels[-1])
         self._last = _Remembered(request, start, exact, None)
         return True
-
-    def _without_obstacles(self, request: Request) -> _Free | None:
-        """The surface that obstacles leave, the one of the last request if they are the same."""
-        if request.obstacles is None:
-            return None
-        last = self._free
-        same = last is not None and last.clearance == request.clearance
-        if last is None or not (same and np.array_equal(last.obstacles, request.obstacles)):
-            copy = free_surface(self.mesh, request.obstacles, request.clearance)
-            designer = self if copy is None else SurfaceDesigner(copy.mesh)
-            last = self._free = _Free(request.obstacles, request.clearance, copy, designer)
-        return last
 
     def _designed(self, request: Request, started: float) -> Design:
         """A relaxed curve that starts from the last one, a coarse mesh or the network."""
@@ -216,10 +165,12 @@ class SurfaceDesigner:
             if start is None:
                 found = predicted(self.mesh, request)
                 problem, zeros = found.problem, found.zeros
-                if not zeros.is_simple_curve(self.mesh, request.closed):
-                    return self._level_set_design(problem, found.solution, zeros, started)
+                one = zeros.is_simple_curve(self.mesh, request.closed)
                 start = _Start(
-                    curve=zeros.curves[0],
+                    # A level set may touch itself where the mesh is too coarse; the path does not.
+                    curve=zeros.curves[0]
+                    if one
+                    else path_curve(self.mesh, problem.working, problem.loop),
                     visited=problem.loop.order,
                     surface=self._curve_surface(request),
                     unit=problem.unit,

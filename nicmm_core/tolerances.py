@@ -36,5 +36,9 @@ AT_ONE_PLACE = 1e-12
 MOVED = 1e-3
 """How far vertices of faces without area are moved, in lengths of their shortest edge."""
 
+ROUNDED = 1e-12
+"""Barycentric coordinates below this are zero up to rounding, where a point is seen in a part of
+its face."""
+
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor; what is divided by it is zero too."""

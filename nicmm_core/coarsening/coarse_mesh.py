@@ -21,9 +21,9 @@ from scipy.spatial import cKDTree
 from .. import tolerances
 from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
-from ..flat_faces import flat_faces, with_areas
 from ..mesh import Mesh, edge_lengths
 from ..progress import checkpoint
+from ..repair.degenerate_faces import flat_faces, with_areas
 from ..surface_points import SurfacePoints, nearest_points
 
 CANDIDATES = 8

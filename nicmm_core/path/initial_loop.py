@@ -8,11 +8,14 @@ vertices are too few it runs through the midpoints of edges, which are then spli
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import igl
 import numpy as np
 from scipy.sparse import csgraph
 
 from ..array_types import FloatArray, IntArray
+from ..curve import SurfaceCurve, curve_on_mesh
 from ..errors import ArgumentError, UnreachableError
 from ..mesh import Mesh
 from ..surface_points import SurfacePoints
@@ -21,7 +24,7 @@ from .legs import CrossingError
 from .simple_path import lay_path
 from .via_points import ViaPoints, Waypoints, names_of, with_via_points
 from .virtual_splits import SplitMesh, WorkingMesh
-from .visiting_order import shortest_order
+from .visiting_order import order_along_boundaries, shortest_order
 
 ORDERS = ("given", "shortest")
 
@@ -107,20 +110,26 @@ def build_initial_loop(
     """
     if order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
-    visit = np.arange(len(points))
-    if order == "shortest":
-        visit = _shortest_order(mesh, points, closed)
+    tours = _Tours(mesh, points, closed)
+    visit = tours.given if order == "given" else tours.shortest
     way = Waypoints(_chosen(points, visit), np.ones(len(points), dtype=bool), names_of(visit))
     if via_points is not None:
         way = with_via_points(mesh, points, via_points, order, closed)
     try:
-        path = lay_path(mesh, way.points, importance, closed)
+        try:
+            path = lay_path(mesh, way.points, importance, closed)
+        except CrossingError:
+            if order == "given":
+                raise
+            visit = tours.along_boundaries
+            path = lay_path(mesh, _chosen(points, visit), importance, closed)
+            way = Waypoints(_chosen(points, visit), way.is_control, names_of(visit))
     except UnreachableError as error:
         what = str(error)
         if isinstance(error, CrossingError):
             here, there = way.names[error.leg], way.names[(error.leg + 1) % len(way.names)]
             what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
-        advice = _advice(mesh, points, visit, importance, closed, not way.is_control.all())
+        advice = _advice(mesh, points, tours, visit, importance, not way.is_control.all())
         raise UnreachableError(f"{what}; {advice}") from error
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
@@ -133,44 +142,97 @@ def build_initial_loop(
     return working, InitialLoop(vertices, controls, visit, edge_length, zigzag, closed)
 
 
-def _shortest_order(mesh: Mesh, points: SurfacePoints, closed: bool) -> IntArray:
-    """The shortest order by distances along edges."""
-    split = SplitMesh(mesh)
-    controls = split.insert_points(points)
-    working, renumbered = split.assemble(int(mesh.face_component[points.faces[0]]))
-    sources = renumbered[controls]
-    distance = csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources)[:, sources]
-    return shortest_order(distance, closed)
+class _Tours:
+    """Orders in which a curve may visit control points, each found when it is first asked for."""
+
+    def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
+        self._mesh, self._points, self.closed = mesh, points, closed
+
+    @property
+    def given(self) -> IntArray:
+        """The caller's order, (k,)."""
+        return np.arange(len(self._points))
+
+    @cached_property
+    def shortest(self) -> IntArray:
+        """The shortest order by distances along edges, (k,)."""
+        return shortest_order(self._on_mesh[2], self.closed)
+
+    @cached_property
+    def along_boundaries(self) -> IntArray:
+        """A short order in which a curve can visit all points, (k,)."""
+        working, vertices, distance = self._on_mesh
+        place = np.full(len(working.vertices), -1)
+        place[vertices] = np.arange(len(vertices))
+        loops = [place[loop] for loop in boundary_loops(working.faces)]
+        return order_along_boundaries(distance, [loop[loop >= 0] for loop in loops], self.closed)
+
+    @cached_property
+    def _on_mesh(self) -> tuple[WorkingMesh, IntArray, FloatArray]:
+        """A mesh that has all points as vertices, these, and distances along its edges."""
+        split = SplitMesh(self._mesh)
+        controls = split.insert_points(self._points)
+        component = int(self._mesh.face_component[self._points.faces[0]])
+        working, renumbered = split.assemble(component)
+        vertices = renumbered[controls]
+        distance = csgraph.dijkstra(working.edge_graph(), directed=False, indices=vertices)
+        return working, vertices, distance[:, vertices]
+
+
+def boundary_loops(faces: IntArray) -> list[IntArray]:
+    """Loops of vertices along the boundary of a manifold, the surface on the same side of each.
+
+    On a surface that cannot be oriented each loop has a direction of its own.
+    """
+    oriented = igl.bfs_orient(faces)[0]
+    sides = oriented[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, edge, count = np.unique(
+        np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    around: dict[int, list[int]] = {}
+    for start, end in sides[count[edge.ravel()] == 1].tolist():
+        around.setdefault(start, []).insert(0, end)
+        around.setdefault(end, []).append(start)
+    loops = []
+    while around:
+        here, (onward, *_) = next(iter(around.items()))
+        loop = [here]
+        del around[here]
+        while onward in around:
+            here, beside = onward, around.pop(onward)
+            onward = next(vertex for vertex in beside if vertex != loop[-1])
+            loop.append(here)
+        loops.append(np.array(loop, dtype=np.int64))
+    return loops
 
 
 def _advice(
     mesh: Mesh,
     points: SurfacePoints,
+    tours: _Tours,
     visited: IntArray,
     importance: FloatArray | None,
-    closed: bool,
     via: bool,
 ) -> str:
     """What to change, tried before it is said.
 
     Parameters
     ----------
-    mesh, points, importance, closed
+    mesh, points, importance
         As in `build_initial_loop`.
+    tours : _Tours
     visited : (k,) int array
         The order that does not work.
     via : bool
         Whether it may work without the via points.
     """
-    shortest = _shortest_order(mesh, points, closed)
-    given = np.arange(len(points))
     tried = [] if via else [visited.tolist()]
-    for order in (given, shortest):
+    for order in (tours.given, tours.shortest, tours.along_boundaries):
         if order.tolist() in tried:
             continue
         tried.append(order.tolist())
         try:
-            lay_path(mesh, _chosen(points, order), importance, closed)
+            lay_path(mesh, _chosen(points, order), importance, tours.closed)
         except UnreachableError:
             continue
         without = "without via points " if via else ""
@@ -178,6 +240,35 @@ def _advice(
     return (
         "no order was found that works, the shortest included; use fewer points, or move points "
         "off the boundary"
+    )
+
+
+def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCurve:
+    """The initial path itself as a curve: simple, and exactly through the control points.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh that the working mesh is a part of.
+    working : WorkingMesh
+    loop : InitialLoop
+    """
+    path = loop.vertices
+    following = np.roll(path, -1)
+    if not loop.closed:
+        following[-1] = path[-2]  # the last point lies on the segment before it
+    sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    size = len(working.vertices)
+    keys = np.sort(sides, axis=1) @ [size, 1]
+    order = np.argsort(keys, kind="stable")
+    wanted = np.sort(np.stack([path, following], axis=1), axis=1) @ [size, 1]
+    face = working.parent_face[order[np.searchsorted(keys[order], wanted)] // 3]
+    corners = mesh.faces[face]
+    barycentric = np.asarray(working.interpolation[path[:, None], corners].todense())
+    place = np.full(size, -1)
+    place[path] = np.arange(len(path))
+    return curve_on_mesh(
+        mesh, loop.closed, face, barycentric.reshape(-1, 3), place[loop.control_vertices]
     )
 
 

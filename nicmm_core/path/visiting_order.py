@@ -1,4 +1,8 @@
-"""The order in which a loop visits its control points: the shortest cyclic or open tour."""
+"""The order in which a loop visits its control points: a short cyclic or open tour.
+
+The shortest one may be impossible where points lie on boundaries. `order_along_boundaries` gives
+one that is not.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +42,50 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
     if len(distance) <= EXACT_UP_TO:
         return _held_karp(distance)
     return _improved(distance, _nearest_neighbour(distance))
+
+
+def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: bool) -> IntArray:
+    """A short order in which a simple curve can visit points, some of which lie on boundaries.
+
+    A thin strip about a tree that joins all points has a simple curve as its boundary. Where the
+    tree comes to a boundary of the surface, it can run along it, and visits the points there one
+    after the other in the direction of the boundary.
+
+    Parameters
+    ----------
+    distance : (k, k) float array
+        Symmetric distances along the surface.
+    loops : list of (b,) int array
+        Points on each loop of the boundary in its direction: the surface on the same side of all
+        loops, where it can be oriented.
+    closed : bool
+        Whether the tour returns to its start.
+
+    Returns
+    -------
+    (k,) int array
+    """
+    inner = np.setdiff1d(np.arange(len(distance)), np.concatenate([*loops, np.zeros(0, np.int64)]))
+    chains = [loop for loop in loops if len(loop)] + [np.array([point]) for point in inner]
+    tour = chains[0]
+    for chain in chains[1:]:
+        checkpoint()
+        tour = _with_chain(distance, tour, chain)
+    if not closed:
+        legs = distance[tour, np.roll(tour, -1)]
+        tour = np.roll(tour, -int(legs.argmax()) - 1)
+    return tour
+
+
+def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArray:
+    """A tour with a cyclic chain of points put, whole, where it costs least."""
+    last = np.roll(chain, 1)  # of the chain that starts at each of its points
+    following = np.roll(tour, -1)
+    cost = distance[np.ix_(tour, chain)] + distance[np.ix_(following, last)]
+    cost -= distance[tour, following][:, None]
+    cost -= distance[last, chain]
+    place, start = np.unravel_index(cost.argmin(), cost.shape)
+    return np.concatenate([tour[: place + 1], np.roll(chain, -int(start)), tour[place + 1 :]])
 
 
 def _held_karp(distance: FloatArray) -> IntArray:

@@ -159,7 +159,7 @@ def _arc_lengths(mesh: Mesh, curve: ExactCurve) -> tuple[FloatArray, float]:
     return arc[curve.node_place], float(arc[-1])
 
 
-def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
+def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray, int]:
     """Nodes moved across the curve by lengths along `Nodes.sideways`, (n,).
 
     Returns
@@ -167,13 +167,15 @@ def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nod
     Nodes
     (n,) bool array
         Which came to a boundary and stayed beside it.
+    int
+        How many faces the node that passed most of them has passed.
     """
     return shifted(surface, nodes, nodes.sideways * np.sign(step)[:, None], np.abs(step))
 
 
 def shifted(
     surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
-) -> tuple[Nodes, BoolArray]:
+) -> tuple[Nodes, BoolArray, int]:
     """Nodes moved on the surface, with nothing drawn between them.
 
     Parameters
@@ -190,16 +192,18 @@ def shifted(
     Nodes
     (n,) bool array
         Which came to a boundary and stayed beside it.
+    int
+        How many faces the node that passed most of them has passed.
     """
     going = np.flatnonzero(length)
-    targets, stuck = moved(
+    targets, stuck, passed = moved(
         surface.mesh, nodes.places[going], direction[going], length[going], surface.folded
     )
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
     faces[going], barycentric[going] = targets.faces, targets.barycentric
     blocked = np.zeros(len(length), dtype=bool)
     blocked[going] = stuck
-    return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked
+    return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked, passed
 
 
 def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:

@@ -124,7 +124,7 @@ def moved(
     direction: FloatArray,
     length: FloatArray,
     folded: BoolArray | None = None,
-) -> tuple[SurfacePoints, BoolArray]:
+) -> tuple[SurfacePoints, BoolArray, int]:
     """Points moved along the surface.
 
     Over faces that are folded back a way runs back, so what it has still to go gets longer there,
@@ -148,6 +148,8 @@ def moved(
         Strictly inside their faces.
     (m,) bool array
         Which came to a boundary, or an edge of three faces, and stayed beside it.
+    int
+        How many faces the point that passed most of them has passed: the cost of the call.
     """
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
@@ -157,9 +159,9 @@ def moved(
     outside = np.ones(len(length), dtype=bool) if folded is None else ~folded[start.faces]
     left = length.copy()
     faces, barycentric = start.faces.copy(), start.barycentric.copy()
-    for _ in range(MOST_FACES):
-        if not len(walkers.index):
-            break
+    passed = 0
+    while passed < MOST_FACES and len(walkers.index):
+        passed += 1
         checkpoint()
         step = walkers.step_lengths()
         index = walkers.index
@@ -179,7 +181,7 @@ def moved(
         faces[walkers.index] = walkers.faces
         barycentric[walkers.index] = _on_edges(mesh, *walkers.entry())
         walkers.leave_edges(np.ones(len(walkers.index), dtype=bool))
-    return SurfacePoints(faces, strictly_inside(barycentric)), blocked
+    return SurfacePoints(faces, strictly_inside(barycentric)), blocked, passed
 
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:

@@ -78,6 +78,10 @@ class RelaxationConfig:
         Ratio of the longest to the shortest step of a leg at which nodes are spaced anew.
     iterations : int
         The cap, over all levels of one attempt.
+    work : float
+        The same for moves of all nodes, taken or only tried; a move over many faces counts as
+        several. Where a surface is so defective that few steps lower the energy, an iteration
+        takes many of them.
     drawn_at_rest : bool
         Whether to try first without drawing the curve after every iteration.
     drawn_iterations : int
@@ -96,6 +100,7 @@ class RelaxationConfig:
     least_decrease_before: float = 0.1
     stretch: float = 1.6
     iterations: int = 100
+    work: float = 1000.0
     drawn_at_rest: bool = False
     drawn_iterations: int = 100
     taut: float = 1.0
@@ -126,6 +131,9 @@ WORTHWHILE = 0.05
 
 SURELY = 0.1
 """Share of the least decrease below which a step is not tried: damping makes forecasts small."""
+
+FACES_OF_A_MOVE = 16.0
+"""Faces that nodes pass one after the other in the time that the rest of a move takes."""
 
 STRAIGHT = 2e-3
 """Share of bending in the energy below which a curve is straight enough not to go on for it."""
@@ -289,7 +297,7 @@ class _Relaxation:
         watch: Watch | None,
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
-        self.iterations, self.stopped = 0, "converged"
+        self.iterations, self.work, self.stopped = 0, 0.0, "converged"
         self.drawn: ExactCurve | None = None  # the last state, if it is stopped at once
 
     def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
@@ -297,7 +305,7 @@ class _Relaxation:
         config = self.config
         cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
         last_iteration = self.iterations + cap
-        self.stopped = "converged"
+        self.work, self.stopped = 0.0, "converged"
         passes = [(level, 1.0) for level in config.levels]
         if config.taut > 1.0:
             passes.insert(0, (config.levels[0], config.taut))
@@ -336,7 +344,7 @@ class _Relaxation:
             state = _State(curve, nodes, held, weights, before, system)
             done = None
             if self._may_fall(state) > SURELY * least * scale:
-                if self.iterations == last_iteration:
+                if self.iterations == last_iteration or self.work >= config.work:
                     self.stopped = "cap"
                     break
                 self.iterations += 1
@@ -417,19 +425,19 @@ class _Relaxation:
 
     def _first_step(self, state: _State, free: BoolArray, damping: float) -> _Moved | None:
         """The least damped step that lowers the energy; None when there is none."""
-        surface, nodes, weights = self.surface, state.nodes, state.weights
+        nodes, weights = state.nodes, state.weights
         while damping <= self.config.most_damping and free.any():
             move = damped_step(state.system, free, damping)
             if not np.isfinite(move).all():
                 return None
             move, farthest = self._trusted(nodes, move)
-            moved, stayed = sideways(surface, nodes, move)
+            moved, stayed = self._sideways(nodes, move)
             reached = elastic_energy(moved, weights)
             # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
             # both energies with the slope here is lower at twice the step after such a fall.
             fallen = state.energy - reached
             if fallen > 0.0 and fallen > -TWICE * float(state.system.slope @ move):
-                farther, also_stayed = sideways(surface, nodes, 2.0 * move)
+                farther, also_stayed = self._sideways(nodes, 2.0 * move)
                 reached_there = elastic_energy(farther, weights)
                 if reached_there < reached:
                     return _Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
@@ -451,13 +459,19 @@ class _Relaxation:
             return None
         move, farthest = self._trusted(nodes, move)
         for share in (1.0, 0.5):
-            reached, stayed = sideways(surface, nodes, share * move)
+            reached, stayed = self._sideways(nodes, share * move)
             energy = elastic_energy(reached, weights)
             if energy < moved.energy:
                 stayed = moved.stayed | stayed
                 farthest = moved.farthest + share * farthest
                 return _Moved(reached, energy, stayed, moved.damping, farthest)
         return None
+
+    def _sideways(self, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
+        """Nodes moved across the curve, and which came to a boundary."""
+        moved, stayed, passed = sideways(self.surface, nodes, step)
+        self.work += 1.0 + passed / FACES_OF_A_MOVE
+        return moved, stayed
 
     def _trusted(self, nodes: Nodes, move: FloatArray) -> tuple[FloatArray, float]:
         """A move no longer than the linearised energy is trusted, and its length in mean steps."""

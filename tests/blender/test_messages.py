@@ -14,7 +14,7 @@ SHORTEST, WORDS = 12, 6
 # Of the core, what a request from Blender can be answered with.
 CORE = (
     "design.py",
-    "free_surface.py",
+    "repair/free_surface.py",
     "outputs/cut.py",
     "outputs/region.py",
     "path/legs.py",

@@ -20,7 +20,7 @@ STAGES = {
         LARGE,
         [7, 2000, 5000, 9000],
         {"closed": False},
-        "mesh sound_copy coarse_mesh coarse_start leg_search leg_graph virtual_splits "
+        "mesh nonmanifold coarse_mesh coarse_start leg_search leg_graph virtual_splits "
         "band_refinement sign_bundle sparse_solver smoothing topology forward_pass contour "
         "lifting relaxing face_walks exact_curve",
     ),
@@ -28,7 +28,7 @@ STAGES = {
         MESHES["fins"],
         [3, 100, 400, 500],
         {"order": "shortest", "clearance": 0.05},
-        "sound_copy mesh_copy redistancing visiting_order",
+        "nonmanifold mapped_mesh redistancing visiting_order",
     ),
     "variational": (
         shapes.sphere(3),

@@ -129,12 +129,12 @@ def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
     nodes = exact_curve(surface, curve, 60).nodes
     step = np.full(len(nodes.positions), 0.1 * factor)
     step[::7] = 0.0
-    moved, blocked = sideways(surface, nodes, step)
+    moved, blocked, _ = sideways(surface, nodes, step)
     assert not blocked.any()
     before, after = (np.linalg.norm(n.positions, axis=1) for n in (nodes, moved))
     np.testing.assert_allclose(before - after, step, atol=5e-3 * factor)
     np.testing.assert_array_equal(moved.positions[::7], nodes.positions[::7])
-    outwards, blocked = sideways(surface, nodes, -7.0 * step)
+    outwards, blocked, _ = sideways(surface, nodes, -7.0 * step)
     np.testing.assert_array_equal(blocked, step > 0.0)
     assert np.linalg.norm(outwards.positions, axis=1).max() < factor
 
@@ -148,7 +148,7 @@ def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed)
     exact = exact_curve(surface, section(mesh, closed), 80)
     step = 0.02 * np.sin(np.arange(len(exact.nodes.positions)))
     step[exact.control_nodes] = 0.0
-    nodes, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = sideways(surface, exact.nodes, step)
     new = drawn(surface, exact, nodes)
     result = new.surface_curve(mesh)
     assert_lies_on_surface(mesh, result)
@@ -195,7 +195,7 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
     for size in (0.02, 0.1, 0.3):
         step = generator.normal(scale=size, size=n)
         step[exact.control_nodes] = 0.0
-        nodes, _ = sideways(surface, exact.nodes, step)
+        nodes, _, _ = sideways(surface, exact.nodes, step)
         new, stays = redrawn(surface, exact, nodes)
         assert is_simple(surface, new)
         result = new.surface_curve(flat_disc)
@@ -211,7 +211,7 @@ def test_moves_that_cross_nothing_are_all_made(flat_disc):
     exact = exact_curve(surface, ring_on(flat_disc), 60)
     step = np.full(len(exact.nodes.positions), 0.02)
     step[exact.control_nodes] = 0.0
-    nodes, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = sideways(surface, exact.nodes, step)
     new, stays = redrawn(surface, exact, nodes)
     assert not stays.any()
     np.testing.assert_array_equal(new.nodes.positions, nodes.positions)
@@ -225,7 +225,7 @@ def test_only_the_nodes_that_would_cross_stay(flat_disc):
     step = np.full(len(here), 0.02)
     step[here[:, 0] > 0.5] = 1.19  # over to the other side
     step[exact.control_nodes] = 0.0
-    nodes, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = sideways(surface, exact.nodes, step)
     assert not is_simple(surface, drawn(surface, exact, nodes))
     simple, stays = redrawn(surface, exact, nodes)
     assert is_simple(surface, simple)

@@ -130,7 +130,7 @@ def test_ways_on_a_random_body_stay_on_it_and_in_their_plane(body, seed):
     mesh = flipped(body, seed)
     start = random_surface_points(mesh, 12, seed)
     direction = generator.normal(size=(12, 3))
-    end, _ = moved(mesh, start, tangent(mesh, start, direction), generator.uniform(0, 0.3, 12))
+    end, _, _ = moved(mesh, start, tangent(mesh, start, direction), generator.uniform(0, 0.3, 12))
     normals = plane_between(mesh, start, end)
     found = ways(mesh, start, end, normals)
     # Bodies are thin: a few planes leave the limb that the move went round.
@@ -201,7 +201,7 @@ def test_a_way_off_the_surface_or_too_long_is_lost():
 def test_ways_do_not_depend_on_numbers_orientation_or_pose(body):
     start = random_surface_points(body, 20, seed=8)
     direction = tangent(body, start, np.random.default_rng(8).normal(size=(20, 3)))
-    end, _ = moved(body, start, direction, np.full(20, 0.2))
+    end, _, _ = moved(body, start, direction, np.full(20, 0.2))
     normals = plane_between(body, start, end)
     lengths = [None if way is None else way.length for way in ways(body, start, end, normals)]
     turn = Rotation.from_rotvec([0.3, -1.0, 2.0])
@@ -222,7 +222,7 @@ def test_on_a_flat_disc_points_move_by_a_translation(flat_disc, factor):
     direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     target = start.positions(mesh) + 0.3 * factor * direction
     stays = np.linalg.norm(target, axis=1) < 0.97 * factor
-    end, blocked = moved(mesh, start, direction, np.full(60, 0.3 * factor))
+    end, blocked, _ = moved(mesh, start, direction, np.full(60, 0.3 * factor))
     assert stays.sum() > 20 and not blocked[stays].any()
     # Off an edge by no more than what keeps a point strictly inside.
     np.testing.assert_allclose(
@@ -236,7 +236,7 @@ def test_points_stop_beside_the_boundary(flat_disc):
     before = start.positions(flat_disc)
     angle = np.random.default_rng(10).uniform(0, 2 * np.pi, 40)
     direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    end, blocked = moved(flat_disc, start, direction, np.full(40, 3.0))
+    end, blocked, _ = moved(flat_disc, start, direction, np.full(40, 3.0))
     assert blocked.all()
     place = end.positions(flat_disc)
     radius = np.linalg.norm(place, axis=1)
@@ -252,7 +252,7 @@ def test_points_stop_beside_an_edge_of_three_faces():
     vertices = [[0, -1, 0], [0, 1, 0], [-1, 0, 0], [1, 0, 0], [0, 0, 1]]
     fin = nicmm.Mesh(vertices, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     start = SurfacePoints(np.array([0]), np.full((1, 3), 1.0 / 3.0))
-    end, blocked = moved(fin, start, np.array([[1.0, 0.0, 0.0]]), np.array([1.0]))
+    end, blocked, _ = moved(fin, start, np.array([[1.0, 0.0, 0.0]]), np.array([1.0]))
     assert blocked.all()
     assert end.faces.tolist() == [0]
     np.testing.assert_allclose(end.positions(fin), 0.0, atol=1e-5)
@@ -263,7 +263,7 @@ def test_a_move_has_the_length_asked_for_and_a_way_back(body):
     start = random_surface_points(body, 30, seed=11)
     direction = tangent(body, start, np.random.default_rng(11).normal(size=(30, 3)))
     for length in (0.01, 0.1):
-        end, blocked = moved(body, start, direction, np.full(30, length))
+        end, blocked, _ = moved(body, start, direction, np.full(30, length))
         assert not blocked.any()
         found = ways(body, start, end, body.face_normals[start.faces])
         reached = [way.length for way in found if way is not None]
@@ -278,13 +278,13 @@ def test_a_move_round_the_equator_comes_back(ball):
     normal = ball.face_normals[start.faces]
     plane = np.cross(np.cross(normal, [0.0, 0.0, 1.0]), normal)
     direction = np.cross(plane / np.linalg.norm(plane), normal)
-    end, _ = moved(ball, start, direction, np.array([2.0 * np.pi]))
+    end, _, _ = moved(ball, start, direction, np.array([2.0 * np.pi]))
     assert np.linalg.norm(end.positions(ball) - place) < 2.0 * ball.mean_edge_length
 
 
 def test_no_move_leaves_a_point_where_it_is(ball):
     start = random_surface_points(ball, 7, seed=12)
-    end, blocked = moved(ball, start, tangent(ball, start, np.ones((7, 3))), np.zeros(7))
+    end, blocked, _ = moved(ball, start, tangent(ball, start, np.ones((7, 3))), np.zeros(7))
     np.testing.assert_array_equal(end.faces, start.faces)
     np.testing.assert_allclose(end.barycentric, start.barycentric, atol=1e-15)
     assert not blocked.any()

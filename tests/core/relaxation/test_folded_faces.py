@@ -120,7 +120,7 @@ def test_a_move_that_comes_to_a_fold_ends_behind_it(surface, distance):
     before = start.positions(mesh)
     direction = np.tile([1.0, 0.0, 0.0], (9, 1))
     length = np.full(9, distance * STEP)
-    ends, blocked = moved(mesh, start, direction, length, surface.folded)
+    ends, blocked, _ = moved(mesh, start, direction, length, surface.folded)
     assert not blocked.any()
     np.testing.assert_allclose(
         ends.positions(mesh) - before, direction * length[:, None], atol=1e-5
@@ -132,8 +132,8 @@ def test_a_move_to_and_fro_over_a_fold_comes_back(square, surface):
     nodes = exact_curve(surface, straight_across(square, surface.mesh), 64).nodes
     step = np.full(len(nodes.positions), 0.7 * STEP)
     step[[0, -1]] = 0.0
-    there, _ = sideways(surface, nodes, step)
-    back, _ = sideways(surface, there, -step)
+    there, _, _ = sideways(surface, nodes, step)
+    back, _, _ = sideways(surface, there, -step)
     np.testing.assert_allclose(back.positions[2:-2], nodes.positions[2:-2], atol=1e-3 * STEP)
 
 

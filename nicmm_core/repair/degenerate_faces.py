@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import tolerances
-from .array_types import BoolArray, FloatArray, IntArray
-from .by_parts import FACES, components, parts
-from .mesh import edge_lengths, unique_edges
-from .progress import checkpoint
+from .. import tolerances
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..by_parts import FACES, components, parts
+from ..mesh import edge_lengths, unique_edges
+from ..progress import checkpoint
 
 ATTEMPTS = 4
 """Of moving vertices, until every face has an area."""

@@ -9,7 +9,8 @@ from benchmarks.checker import judge
 from benchmarks.defects import defective_meshes
 from nicmm_core import shapes, surface_designer, tolerances
 from nicmm_core.mesh import unique_edges
-from nicmm_core.sound_copy import SOUND_COPIES, sound_copy, welded_vertices
+from nicmm_core.path.leg_graph import pinched_vertices
+from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
 from nicmm_core.surface_points import locate_points
 from tests.core.checks import grid, joined
 
@@ -20,13 +21,14 @@ JOINED = {"duplicate faces": [0], "soup": [0, 2], "seam": [0, 2]}
 """Copies that there are where it is not the first, and the second if edges have more faces."""
 
 
-def copies_of(mesh):
-    made = (sound_copy(mesh, number) for number in range(SOUND_COPIES))
-    return [copy for copy in made if copy is not None]
+def repairs_of(mesh):
+    """All repairs, None where one joins no more than those before."""
+    every = np.arange(len(mesh.faces))
+    return [repaired(mesh, number, every) for number in range(REPAIRS)]
 
 
-def first_copy(mesh):
-    return sound_copy(mesh, 0)
+def first_repair(mesh):
+    return repairs_of(mesh)[0]
 
 
 @pytest.mark.parametrize("request_number", [0, 3])
@@ -36,67 +38,73 @@ def test_a_good_curve_unless_an_error_is_due(name, request_number):
     assert outcome.verdict in (corpus.GOOD, corpus.DUE), outcome.words
 
 
-class TestWhatIsDue:
-    """The judge of errors is independent of the core, so it is tried by itself."""
-
-    def test_components(self):
-        mesh = MESHES["components"]
-        assert "different parts" in corpus.not_possible(mesh, np.array([0, len(mesh.vertices) - 1]))
-        assert corpus.not_possible(mesh, np.array([0, 1, 2])) == ""
-
-    def test_triangles_that_share_no_vertices_are_joined_by_their_places(self):
-        assert len(np.unique(corpus.edge_connected_parts(MESHES["soup"]))) == 1
-        assert len(np.unique(corpus.edge_connected_parts(MESHES["touching boxes"]))) == 2
-
-    def test_one_common_vertex_joins_nothing(self):
-        mesh = MESHES["hour glass"]
-        shared = np.flatnonzero(np.bincount(mesh.faces.ravel()) > 6)[-1]
-        ends = np.array([0, len(mesh.vertices) - 1])
-        assert corpus.not_possible(mesh, ends)
-        assert corpus.not_possible(mesh, np.array([0, shared])) == ""
-        assert corpus.not_possible(mesh, np.array([shared, len(mesh.vertices) - 1])) == ""
-
-    def test_sheets_are_joined_by_their_common_edge(self):
-        mesh = MESHES["three sheets along an edge"]
-        assert corpus.not_possible(mesh, np.arange(0, len(mesh.vertices), 20)) == ""
-
-    def test_two_points_at_one_place(self):
-        mesh = MESHES["seam"]
-        twin = np.array([5, 5 + len(mesh.vertices) // 2])
-        assert "one place" in corpus.not_possible(mesh, twin)
-
-
 @pytest.mark.parametrize(
     "mesh",
     [shapes.sphere(2), shapes.disc(4), shapes.moebius_strip(), MESHES["needles"], MESHES["hole"]],
     ids=["sphere", "disc", "Möbius strip", "needles", "hole"],
 )
 def test_meshes_without_defects_are_their_own_copy(mesh):
-    (copy,) = copies_of(mesh)
-    assert copy.mesh is mesh and not copy.differs
+    first, *others = repairs_of(mesh)
+    assert first.mesh is mesh and not first.differs
+    assert others == [None, None, None]
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_copies_keep_faces_and_have_no_defects(name):
+def test_repairs_are_manifolds_of_the_same_faces(name):
     mesh = MESHES[name]
-    copies = [sound_copy(mesh, number) for number in range(SOUND_COPIES)]
-    there = [number for number, copy in enumerate(copies) if copy is not None]
+    repairs = repairs_of(mesh)
+    there = [number for number, mapped in enumerate(repairs) if mapped is not None]
     assert there == JOINED.get(name, [0, 1] if mesh.branches else [0])
-    for copy in copies_of(mesh):
-        corners = copy.mesh.faces.ravel()
-        there = mesh.vertices[mesh.faces[copy.face].ravel()]
-        np.testing.assert_array_equal(mesh.vertices[copy.place[corners]], there)
-        assert (unique_edges(copy.mesh.faces)[1] <= 2).all()
-        assert (copy.mesh.face_areas > 0.0).all()
-        moved = copy.mesh.vertices[corners] + copy.origin - there
+    for mapped in (repairs[number] for number in there):
+        assert_manifold(mapped.mesh)
+        assert (mapped.mesh.face_areas > 0.0).all()
+        of_faces = mesh.vertices[mesh.faces[mapped.face]]
+        if mapped.corners is not None:
+            np.testing.assert_allclose(mapped.corners.sum(axis=2), 1.0, atol=1e-15)
+            of_faces = mapped.corners @ of_faces
+        places = np.zeros((mapped.place.max() + 1, 3))
+        places[mapped.place[mapped.mesh.faces]] = of_faces
+        np.testing.assert_allclose(places[mapped.place[mapped.mesh.faces]], of_faces, atol=1e-12)
+        moved = mapped.mesh.vertices[mapped.mesh.faces] + mapped.origin - of_faces
         start, end = mesh.vertices[mesh.edges].transpose(1, 0, 2)
         assert np.abs(moved).max() <= 1e-3 * np.linalg.norm(end - start, axis=1).max() + 1e-9
 
 
+@pytest.mark.parametrize("name", MESHES)
+def test_parts_of_a_face_cover_it_once(name):
+    mesh = MESHES[name]
+    for mapped in filter(None, repairs_of(mesh)):
+        if mapped.corners is not None:
+            area = np.bincount(mapped.face, weights=np.linalg.det(mapped.corners))
+            np.testing.assert_allclose(area[np.unique(mapped.face)], 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 8, 9, 40])
+def test_all_faces_at_one_edge_are_connected(count):
+    """In so few pieces that the faces' number grows with count log count."""
+    angle = 2 * np.pi * np.arange(count) / count
+    around = np.stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle], axis=1)
+    mesh = nicmm.Mesh(
+        np.concatenate([[[0, 0, 0], [0, 0, 1]], around]), [[0, 1, 2 + i] for i in range(count)]
+    )
+    straight, connected, *_ = repairs_of(mesh)
+    assert len(np.unique(straight.mesh.face_component)) == -(-count // 2)
+    assert len(np.unique(connected.mesh.face_component)) == 1
+    assert len(connected.mesh.faces) <= count * (2 * np.log2(count) + 4)
+    for mapped in (straight, connected):
+        assert_manifold(mapped.mesh)
+
+
+def assert_manifold(mesh):
+    """At most two faces an edge, one fan of faces a vertex."""
+    assert (unique_edges(mesh.faces)[1] <= 2).all()
+    assert not pinched_vertices(mesh).any()
+
+
 def test_copies_of_one_vertex_are_at_different_places():
     """Otherwise a straight way from a control point at one would pass exactly through another."""
-    copy = first_copy(MESHES["touching at vertices"])
-    doubled = np.unique(copy.place, return_counts=True)[1].max()
+    copy = first_repair(MESHES["touching at vertices"])
+    doubled = np.bincount(copy.place).max()
     assert doubled > 1
     assert len(np.unique(copy.mesh.vertices, axis=0)) == len(copy.mesh.vertices)
 
@@ -105,7 +113,7 @@ def test_only_vertices_of_faces_without_area_move():
     vertices = grid(4).vertices.copy()
     faces = grid(4).faces
     vertices[faces[5, 0]] = vertices[faces[5, 1]]
-    copy = first_copy(nicmm.Mesh(vertices, faces))
+    copy = first_repair(nicmm.Mesh(vertices, faces))
     offset = copy.mesh.vertices - vertices
     offset -= np.median(offset, axis=0)
     flat = triangle_heights(vertices[faces]) <= tolerances.WITHOUT_AREA
@@ -181,12 +189,8 @@ def test_position_in_a_face_without_area(along):
 def test_parts_that_meet_in_one_vertex_are_refused():
     mesh = MESHES["hour glass"]
     points = [0, 1, len(mesh.vertices) - 1]
-    try:
-        design = nicmm.design_curve(mesh, points)
-    except nicmm.UnreachableError as error:
-        assert "points" in str(error)
-    else:
-        assert design.status is nicmm.Status.NOT_ONE_CURVE
+    with pytest.raises(nicmm.UnreachableError, match="meet in single vertices only"):
+        nicmm.design_curve(mesh, points)
 
 
 def test_components_without_any_area_are_refused():
@@ -243,7 +247,7 @@ class TestOpenEdgesAtOnePlace:
         upper = np.unique(mesh.faces[mesh.faces[:, 0] >= len(mesh.vertices) // 2])
         designer = nicmm.Designer(mesh)
         designer.design(upper[[0, 50, 100]])
-        assert len(designer._designers) == 1
+        assert len(designer._whole._made) == 1
 
     def test_closed_surfaces_that_touch_stay_apart(self):
         """Two boxes with a side in common, and every vertex there twice."""
@@ -282,8 +286,8 @@ class TestOpenEdgesAtOnePlace:
             nicmm.cut_mesh(soup, curve)
 
 
-class TestJoinedFromPointToPoint:
-    """Where neither going straight on nor linking all parts joins the points."""
+class TestEdgesOfManyFaces:
+    """Where going straight on does not join the points."""
 
     @pytest.mark.parametrize("seed", range(4))
     def test_octants_about_one_vertex(self, seed):
@@ -297,7 +301,7 @@ class TestJoinedFromPointToPoint:
         design = nicmm.design_curve(mesh, chosen, order="shortest", closed=False)
         assert not judge(mesh, design, chosen, closed=False, order="shortest").faults
 
-    def test_another_request_gets_another_joining(self):
+    def test_any_of_four_faces_at_one_edge(self):
         mesh = nicmm.Mesh(
             [[0, 0, -0.5], [0, 0, 0.5], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]],
             [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 5]],
@@ -306,5 +310,6 @@ class TestJoinedFromPointToPoint:
         for ends in ([2, 4], [3, 5], [4, 2], [2, 3], [4, 3]):
             design = designer.design(ends, closed=False)
             assert not judge(mesh, design, ends, closed=False).faults
-        with pytest.raises(nicmm.UnreachableError, match="single vertices or edges"):
-            designer.design([2, 3, 4])
+        for points in ([2, 3, 4], [5, 3, 4, 2]):
+            design = designer.design(points, order="shortest")
+            assert not judge(mesh, design, points, order="shortest").faults

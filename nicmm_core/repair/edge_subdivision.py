@@ -1,0 +1,119 @@
+"""Faces whose sides are cut into segments, so that each segment can be joined to another face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..progress import checkpoint
+
+
+@dataclass(frozen=True)
+class SubdividedFaces:
+    """Some triangles with their sides cut into segments, each segment joined to the centroid.
+
+    Attributes
+    ----------
+    faces : (m, 3) int array
+        The faces that are whole first. Vertices beyond the given ones are points of edges, then
+        centroids.
+    parent : (m,) int array
+        The face that each is a part of.
+    corners : (m, 3, 3) float array
+        Barycentric coordinates of its corners in the parent.
+    edge_points : (p, 3) float array
+        New vertices on edges: both ends and the share of the second one.
+    first_child : (3 f,) int array
+        The child at the first segment of each side, -1 for sides of whole faces. Its side there
+        is opposite corner 2, as that of the following segments, whose numbers follow.
+    """
+
+    faces: IntArray
+    parent: IntArray
+    corners: FloatArray
+    edge_points: FloatArray
+    first_child: IntArray
+
+
+def subdivided(
+    faces: IntArray,
+    low: IntArray,
+    high: IntArray,
+    edge_of_side: IntArray,
+    segments: IntArray,
+    n_vertices: int,
+) -> SubdividedFaces:
+    """Cut edges into segments of equal length, the same for all faces that share an edge.
+
+    Parameters
+    ----------
+    faces : (f, 3) int array
+    low, high : (3 f,) int array
+        The corner (3 face + place) at either end of each side; sides of one edge agree.
+    edge_of_side : (3 f,) int array
+        The edge that each side belongs to, -1 for sides that stay whole.
+    segments : (e,) int array
+        Number of segments of each edge, at least 2.
+    n_vertices : int
+        Vertices before.
+    """
+    cut = (edge_of_side >= 0).reshape(-1, 3).any(axis=1)
+    whole, split = np.flatnonzero(~cut), np.flatnonzero(cut)
+    side = (3 * split[:, None] + np.arange(3)).ravel()
+    edge = edge_of_side[side]
+    count = np.where(edge >= 0, segments[edge], 1)
+    checkpoint()
+    first = np.cumsum(count) - count
+    row = np.repeat(np.arange(len(side)), count)
+    step = np.arange(len(row)) - first[row]
+    inner = np.cumsum(segments - 1) - (segments - 1)  # new vertices of edges before this one
+    n_points = int((segments - 1).sum())
+
+    def end(number: IntArray) -> tuple[IntArray, FloatArray]:
+        """Vertex and barycentrics of the points after so many segments, on each row's side."""
+        share = number / count[row]
+        here, there = low[side[row]], high[side[row]]
+        at_edge = n_vertices + inner[edge[row]] + number - 1
+        vertex = np.where(number == 0, faces.ravel()[here], at_edge)
+        vertex = np.where(number == count[row], faces.ravel()[there], vertex)
+        weights = (1.0 - share)[:, None] * np.eye(3)[here % 3]
+        return vertex, weights + share[:, None] * np.eye(3)[there % 3]
+
+    (start, start_weights), (stop, stop_weights) = end(step), end(step + 1)
+    middle = n_vertices + n_points + row // 3
+    middle_weights = np.full((len(row), 3), 1.0 / 3.0)
+    # Side j runs from corner j + 1 to corner j + 2 in the orientation of the face.
+    along = (low[side] % 3 == (side % 3 + 1) % 3)[row]
+    swap = ~along
+    one, other = np.where(swap, stop, start), np.where(swap, start, stop)
+    one_weights = np.where(swap[:, None], stop_weights, start_weights)
+    other_weights = np.where(swap[:, None], start_weights, stop_weights)
+    checkpoint()
+    first_child = np.full(faces.size, -1)
+    first_child[side] = len(whole) + first
+    corners = np.stack([one_weights, other_weights, middle_weights], axis=1)
+    return SubdividedFaces(
+        faces=np.concatenate([faces[whole], np.stack([one, other, middle], axis=1)]),
+        parent=np.concatenate([whole, split[row // 3]]),
+        corners=np.concatenate([np.broadcast_to(np.eye(3), (len(whole), 3, 3)), corners]),
+        edge_points=_edge_points(faces, low, high, edge_of_side, segments),
+        first_child=first_child,
+    )
+
+
+def _edge_points(
+    faces: IntArray, low: IntArray, high: IntArray, edge_of_side: IntArray, segments: IntArray
+) -> FloatArray:
+    """Ends and share of the second one, (p, 3), of the new vertices on edges."""
+    side = np.full(len(segments), -1)
+    sides = np.flatnonzero(edge_of_side >= 0)[::-1]
+    side[edge_of_side[sides]] = sides  # the first side of each edge
+    edge = np.repeat(np.arange(len(segments)), segments - 1)
+    number = np.arange(len(edge)) - np.repeat(
+        np.cumsum(segments - 1) - (segments - 1), segments - 1
+    )
+    corner = faces.ravel()
+    ends = corner[low[side[edge]]], corner[high[side[edge]]]
+    return np.stack([*ends, (number + 1) / segments[edge]], axis=1)

@@ -1,0 +1,94 @@
+"""Which faces obstacles of weight 1 leave: there no curve has any length inside them.
+
+Faces whose three corners have weight 1 are taken away, and with a clearance all faces near them.
+The rest is a surface with boundaries, which every stage handles: paths keep off them, coarse cells
+end there, and nodes that come to one stay. So avoiding obstacles needs no terms and no weights of
+its own, and a curve that cannot avoid them is found out before anything is solved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..array_types import BoolArray, FloatArray, IntArray
+from ..errors import UnreachableError
+from ..level_set.redistancing import build_distance_surface, spread
+from ..surface_points import SurfacePoints
+from .mapped_mesh import MappedMesh
+from .nonmanifold import welded_vertices
+
+HARD = 1.0
+"""Weight from which an obstacle is not to be entered; below, it costs in proportion."""
+
+
+def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> IntArray:
+    """Faces that are not inside obstacles nor closer to them than the clearance, ascending.
+
+    Parameters
+    ----------
+    mapped : MappedMesh
+        The whole original; distances are measured on the mesh.
+    obstacles : (V,) float array
+    clearance : float
+        Distance along the surface, in mesh units, that curves keep from obstacles of weight 1.
+
+    Raises
+    ------
+    UnreachableError
+        If no face is free.
+    """
+    faces = mapped.original.faces
+    # A vertex that is there several times, as along a seam, may be marked only once.
+    place = welded_vertices(mapped.original)
+    hard_places = np.zeros(len(place), dtype=bool)
+    hard_places[place[obstacles >= HARD]] = True
+    hard = hard_places[place]
+    blocked = hard[faces].all(axis=1)
+    if clearance > 0.0 and hard.any():
+        blocked |= (_distances(mapped, hard, clearance)[faces] < clearance).any(axis=1)
+    free = np.flatnonzero(~blocked)
+    if not len(free):
+        raise UnreachableError(
+            "obstacles leave nothing of the surface; paint less with weight 1, or use a smaller "
+            "clearance"
+        )
+    return free
+
+
+def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArray:
+    """Distance of each vertex of the original from obstacles, (V,), up to the farthest."""
+    mesh = mapped.mesh
+    here = mapped.weights(hard.astype(np.float64))
+    assert here is not None  # as there are weights
+    distance = np.where(here >= HARD, 0.0, np.inf)
+    surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
+    spread(surface, distance, farthest)
+    return mapped.field(distance)
+
+
+def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
+    """Raise UnreachableError where obstacles enclose points, or lie between them.
+
+    Parameters
+    ----------
+    free : MappedMesh
+        Of the faces that obstacles leave.
+    named : dict of str to SurfacePoints
+        Points by the argument that they come from.
+    """
+    component: dict[str, set[int]] = {}
+    for name, points in named.items():
+        for index, point in enumerate(free.holding(points)):
+            if not len(point):
+                raise UnreachableError(
+                    f"{name}[{index}] lies inside an obstacle of weight 1, or closer to one than "
+                    "the clearance; move it, or paint less"
+                )
+            component[f"{name}[{index}]"] = set(free.mesh.face_component[point.faces].tolist())
+    first, common = next(iter(component.items()))
+    for name, own in component.items():
+        if not own & common:
+            raise UnreachableError(
+                f"obstacles of weight 1 separate {name} from {first}; leave a way between them, or "
+                "lower the weights there"
+            )

@@ -1,0 +1,222 @@
+"""A mesh that curves are computed on in place of another, and the map between the two.
+
+Each of its faces is a face of the original or a part of one. So points and curves on it are points
+and curves on the original, which stays as it is. `nonmanifold` makes such meshes.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from functools import cached_property
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import FloatArray, IntArray
+from ..by_parts import grouped
+from ..curve import SurfaceCurve, curve_on_mesh
+from ..mesh import Mesh
+from ..progress import checkpoint
+from ..surface_points import SurfacePoints
+from .strand_separation import separated
+
+Holding = list[SurfacePoints]
+"""For each of some points, what it is in every face of the mapped mesh that holds it."""
+
+
+@dataclass(frozen=True)
+class MappedMesh:
+    """A mesh and the original that each part of it comes from.
+
+    Attributes
+    ----------
+    original : Mesh
+    mesh : Mesh
+        The same object where nothing differs.
+    face : (f,) int array
+        The original face that each of its faces lies in.
+    corners : (f, 3, 3) float array or None
+        Barycentric coordinates of the corners in that face; None where all faces are whole, their
+        corners in the same order.
+    place : (v,) int array
+        The same number for vertices that are one point of the original.
+    original_place : (V,) int array
+        The same for the original's vertices.
+    origin : (3,) float array
+        Where the mesh's origin is in the space of the original.
+    """
+
+    original: Mesh
+    mesh: Mesh
+    face: IntArray
+    corners: FloatArray | None
+    place: IntArray
+    original_place: IntArray
+    origin: FloatArray = dataclass_field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def differs(self) -> bool:
+        """Whether there are two meshes."""
+        return self.mesh is not self.original
+
+    def holding(self, points: SurfacePoints) -> Holding:
+        """Where points of the original are; those in faces of their own faces come first."""
+        found = []
+        around = _faces_holding(self.original, points)
+        for face, barycentric, faces in zip(points.faces, points.barycentric, around, strict=True):
+            weights = dict(zip(self.original.faces[face].tolist(), barycentric, strict=True))
+            found.append(self._parts_with(faces, weights))
+        return found
+
+    def _parts_with(self, faces: IntArray, weights: dict[int, float]) -> SurfacePoints:
+        """A point, by its weights at vertices, in the parts of some faces that hold it."""
+        parts = [self._parts_of(face) for face in faces.tolist()]
+        parent = np.repeat(faces, [len(part) for part in parts])
+        part = np.concatenate(parts)
+        corners = self.original.faces[parent].tolist()
+        local = np.array([[weights.get(corner, 0.0) for corner in row] for row in corners])
+        local = local.reshape(-1, 3)
+        if self.corners is not None and len(part):
+            matrix = self.corners[part].transpose(0, 2, 1)
+            local = np.linalg.solve(matrix, local[..., None])[..., 0]
+            inside = local.min(axis=1) >= -tolerances.ROUNDED
+            part, local = part[inside], local[inside]
+            local = np.where(local < tolerances.ROUNDED, 0.0, local)
+            local /= local.sum(axis=1, keepdims=True)
+        return SurfacePoints(part, local)
+
+    def common_component(self, holding: Holding) -> int | None:
+        """The largest component of the mesh that has all points; None where there is none."""
+        component = self.mesh.face_component
+        common: set[int] | None = None
+        for point in holding:
+            here = set(component[point.faces].tolist())
+            common = here if common is None else common & here
+        areas = np.bincount(component, weights=self.mesh.face_areas)
+        return max(common or (), key=lambda label: float(areas[label]), default=None)
+
+    def points(self, holding: Holding, component: int) -> SurfacePoints:
+        """Points in faces of one component."""
+        faces, barycentric = [], []
+        for point in holding:
+            first = int((self.mesh.face_component[point.faces] == component).argmax())
+            faces.append(point.faces[first])
+            barycentric.append(point.barycentric[first])
+        shape = (len(faces), 3)
+        return SurfacePoints(
+            np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
+        )
+
+    def weights(self, weights: FloatArray | None) -> FloatArray | None:
+        """Weights at the vertices; the greatest of vertices that are one here."""
+        if weights is None or not self.differs:
+            return weights
+        checkpoint()
+        at_place = np.zeros(self.original_place.max() + 1)
+        np.maximum.at(at_place, self.original_place, weights)
+        at_corners = at_place[self.original_place[self.original.faces[self.face]]]
+        if self.corners is not None:
+            at_corners = np.einsum("fcd,fd->fc", self.corners, at_corners)
+        result = np.zeros(len(self.mesh.vertices))
+        np.maximum.at(result, self.mesh.faces, at_corners)
+        return result
+
+    def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
+        """A simple curve on the mesh as one on the original, simple there too.
+
+        Strands may pass different copies of one vertex, or of one point of an edge. There they
+        are separated.
+        """
+        if not self.differs:
+            return curve
+        polyline = SurfacePoints(curve.faces, curve.barycentric)
+        index = curve.control_index
+        if self._has_copies:
+            passed = index[index >= 0]
+            polyline, number = separated(self.mesh, self.place, polyline, curve.closed, passed)
+            index = np.where(index >= 0, number[index], -1)
+        barycentric = polyline.barycentric
+        if self.corners is not None:
+            barycentric = np.einsum("nc,ncd->nd", barycentric, self.corners[polyline.faces])
+            barycentric /= barycentric.sum(axis=1, keepdims=True)
+        return curve_on_mesh(
+            self.original, curve.closed, self.face[polyline.faces], barycentric, index
+        )
+
+    def carried(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+        """A curve on the original as one on the mesh; None where that does not hold all of it."""
+        if not self.differs:
+            return curve
+        if self.corners is None:
+            whole = np.full(len(self.original.faces), -1)
+            whole[self.face] = np.arange(len(self.face))
+            faces, barycentric = whole[curve.faces], curve.barycentric
+        else:
+            faces, barycentric = self._parts_of_segments(curve)
+        if (faces < 0).any():
+            return None
+        return curve_on_mesh(self.mesh, curve.closed, faces, barycentric, curve.control_index)
+
+    def _parts_of_segments(self, curve: SurfaceCurve) -> tuple[IntArray, FloatArray]:
+        """The part that holds each point and the next one, or -1, and the point's coordinates."""
+        n = len(curve.faces)
+        faces, barycentric = np.full(n, -1), np.zeros((n, 3))
+        points = SurfacePoints(curve.faces, curve.barycentric)
+        holding = self.holding(points)
+        for place, here in enumerate(holding):
+            # The last point of an open curve lies on the segment before it.
+            beside = place + 1 if place + 1 < n else (0 if curve.closed else place - 1)
+            both = np.isin(here.faces, holding[beside].faces)
+            if both.any():
+                faces[place] = here.faces[both][0]
+                barycentric[place] = here.barycentric[both][0]
+        return faces, barycentric
+
+    def field(self, values: FloatArray) -> FloatArray:
+        """Level-set values at the vertices of the original: those of the copy nearest to the curve.
+
+        Vertices that the mesh lacks are outside.
+        """
+        used = np.flatnonzero(self.mesh.referenced)
+        order = used[np.argsort(-np.abs(values[used]), kind="stable")]
+        at_place = np.full(max(self.place.max(), self.original_place.max()) + 1, np.inf)
+        at_place[self.place[order]] = values[order]
+        result = at_place[self.original_place]
+        result[np.isinf(result)] = values.max()
+        return result
+
+    @cached_property
+    def _has_copies(self) -> bool:
+        """Whether several vertices are one point of the original."""
+        return bool((np.bincount(self.place) > 1).any())
+
+    def _parts_of(self, face: int) -> IntArray:
+        """The faces of the mesh that a face of the original is, or is made of."""
+        order, begin = self._by_original
+        return order[begin[face] : begin[face + 1]]
+
+    @cached_property
+    def _by_original(self) -> tuple[IntArray, IntArray]:
+        """Faces of the mesh in the order of their originals, and where each original begins."""
+        order, first, count = grouped(self.face)
+        size = np.zeros(len(self.original.faces) + 1, dtype=np.int64)
+        size[self.face[order[first]] + 1] = count
+        return order, np.cumsum(size)
+
+
+def _faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
+    """The faces that each point lies in, its own first."""
+    around = mesh.vertex_faces
+    found = []
+    checkpoint()
+    for face, barycentric in zip(points.faces, points.barycentric, strict=True):
+        at_corners = [
+            around.indices[around.indptr[corner] : around.indptr[corner + 1]]
+            for corner in mesh.faces[face][barycentric > 0.0]
+        ]
+        shared = functools.reduce(np.intersect1d, at_corners).tolist()
+        own_first = [int(face), *(other for other in shared if other != face)]
+        found.append(np.array(own_first, dtype=np.int64))
+    return found

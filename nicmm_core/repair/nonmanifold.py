@@ -1,0 +1,319 @@
+"""The manifold that curves are computed on where a mesh is none; the mesh itself stays as it is.
+
+- Of faces with the same three corners only the first is there.
+- Where more than two faces share an edge they are joined two by two, and what is left over is cut
+  off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
+  there are doubled.
+- Where that leaves points apart, such an edge is cut into pieces, on which different pairs of its
+  faces are joined: every face is connected with every other then.
+- Where that leaves points apart too, open edges whose ends are at the same places are one edge:
+  the triangles of a soup, or the two sides of a seam. Their vertices are one.
+- Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
+  that has a length, each its own way, so that every face has an area.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from .. import tolerances
+from ..array_types import FloatArray, IntArray
+from ..by_parts import components, distinct_rows, grouped
+from ..mesh import Mesh
+from ..progress import checkpoint
+from .degenerate_faces import flat_faces, with_areas
+from .edge_subdivision import SubdividedFaces, subdivided
+from .mapped_mesh import MappedMesh
+
+REPAIRS = 4
+"""Ways in which faces are joined, one after the other."""
+
+SEGMENTS = 2
+"""Of a piece of an edge. The point between them belongs to one pair of faces only, so that no edge
+of the result has the same ends as another."""
+
+MOST_COMPARED = 32
+"""Faces at an edge up to which the straightest pair is looked for among all pairs."""
+
+
+def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
+    """A manifold of faces of a mesh, for points that the ones before separate.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    number : int
+        Below `REPAIRS`. 0: where more than two faces share an edge the surface goes straight on.
+        1: all faces that share an edge are connected. 2 and 3: the same, and open edges at the
+        same place are one edge.
+    usable : (u,) int array
+        Faces that may be used, ascending.
+
+    Returns
+    -------
+    MappedMesh or None
+        None where it joins no more than those before.
+    """
+    connected = number % 2 == 1
+    welded = np.arange(len(mesh.vertices))
+    if number >= 2:
+        welded = welded_vertices(mesh)
+        if (welded == np.arange(len(welded))).all():
+            return None
+    is_welded = number >= 2
+    checkpoint()
+    kept = usable
+    if mesh.branches or is_welded:
+        kept = kept[_without_twins(welded[mesh.faces[kept]])]
+    sides = _Sides(mesh.faces[kept], welded)
+    if not sides.branching:
+        if connected:
+            return None
+        corners, vertex = sides.cut(sides.plain_pairs, len(mesh.vertices))
+        vertices, place = mesh.vertices[vertex], welded[vertex]
+        return _with_areas(mesh, welded, corners, vertices, kept, None, place)
+    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.branching]
+    parts = sides.subdivided([SEGMENTS * len(pieces) for pieces in joins], len(mesh.vertices))
+    start, end = mesh.vertices[parts.edge_points[:, :2].astype(np.int64)].transpose(1, 0, 2)
+    share = parts.edge_points[:, 2:]
+    centroids = mesh.vertices[mesh.faces[kept]].mean(axis=1)[np.unique(parts.parent[_split(parts)])]
+    vertices = np.concatenate([mesh.vertices, (1.0 - share) * start + share * end, centroids])
+    place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
+    pieces = _Sides(parts.faces, place)
+    pairs = np.concatenate([pieces.plain_pairs, _piece_pairs(sides.branching, joins, parts)])
+    corners, vertex = pieces.cut(pairs, len(vertices))
+    face = kept[parts.parent]
+    vertices, place = vertices[vertex], place[vertex]
+    return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
+
+
+def welded_vertices(mesh: Mesh) -> IntArray:
+    """For vertices of open edges the first one at the same place, others as they are, shape (V,).
+
+    Only places whose coordinates are the same to the last digit are one. Edges that two faces have
+    are closed already, so closed surfaces that touch each other stay apart.
+    """
+    edges, count = mesh.unpaired_edges
+    checkpoint()
+    on_rim = np.zeros(len(mesh.vertices), dtype=bool)
+    on_rim[edges[count == 1]] = True
+    rim = np.flatnonzero(on_rim)
+    welded = np.arange(len(mesh.vertices))
+    checkpoint()
+    first, place = distinct_rows(mesh.vertices[rim])
+    welded[rim] = rim[first[place]]
+    return welded
+
+
+def _without_twins(faces: IntArray) -> IntArray:
+    """Indices of the faces without those whose corners an earlier one has, ascending."""
+    return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
+
+
+def _split(parts: SubdividedFaces) -> IntArray:
+    """The children of faces that are not whole, ascending."""
+    return np.flatnonzero((parts.corners[:, 2] < 1.0).all(axis=1))
+
+
+Joins = list[IntArray]
+"""For each piece of an edge the pairs of its sides that are joined there, (p, 2) each."""
+
+
+def _piece_pairs(branching: list[IntArray], joins: list[Joins], parts: SubdividedFaces) -> IntArray:
+    """Pairs of sides of the subdivided faces that are joined where more than two meet, (p, 2)."""
+    pairs = []
+    for at_edge, pieces in zip(branching, joins, strict=True):
+        checkpoint()
+        child = parts.first_child[at_edge]
+        for number, chosen in enumerate(pieces):
+            for segment in range(SEGMENTS * number, SEGMENTS * (number + 1)):
+                pairs.append(3 * (child[chosen] + segment) + 2)
+    return np.concatenate(pairs)
+
+
+class _Sides:
+    """The sides of faces, three each, and which of them are one edge.
+
+    Side 3 f + j lies opposite corner j of face f.
+
+    Parameters
+    ----------
+    faces : (f, 3) int array
+    welded : (V,) int array
+        Which vertex each counts as where faces are joined.
+    """
+
+    def __init__(self, faces: IntArray, welded: IntArray) -> None:
+        self._faces = faces
+        checkpoint()
+        # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
+        # welded to one, the vertices themselves decide.
+        corner = 3 * np.arange(len(faces))[:, None]
+        first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
+        checkpoint()
+        vertices = faces.ravel()
+        one = welded[vertices[first]]
+        checkpoint()
+        other = welded[vertices[second]]
+        checkpoint()
+        swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
+        checkpoint()
+        self._low = np.where(swapped, second, first)
+        self._high = np.where(swapped, first, second)
+        checkpoint()
+        size = int(vertices.max()) + 1
+        keys = np.minimum(one, other) * size + np.maximum(one, other)
+        checkpoint()
+        nowhere = np.flatnonzero(one == other)  # such a side joins nothing
+        keys[nowhere] = size * size + nowhere
+        del one, other, swapped, first, second
+        self._order, self._first, self._count = grouped(keys)
+
+    @cached_property
+    def plain_pairs(self) -> IntArray:
+        """Sides of edges that two faces have, shape (p, 2)."""
+        first = self._first[self._count == 2]
+        checkpoint()
+        return np.stack([self._order[first], self._order[first + 1]], axis=1)
+
+    @cached_property
+    def branching(self) -> list[IntArray]:
+        """Sides of each edge that more faces have."""
+        several = self._count > 2
+        return [
+            self._order[first : first + count]
+            for first, count in zip(self._first[several], self._count[several], strict=True)
+        ]
+
+    def joins(self, at_edge: IntArray, vertices: FloatArray, connected: bool) -> Joins:
+        """How the sides of one edge are joined, by their places among them.
+
+        On the first piece of the edge those are joined that go on most straightly. If all are to
+        be connected, the groups that this leaves are joined on further pieces, like the corners of
+        a cube along its axes: q faces need about log₂ q pieces.
+        """
+        checkpoint()
+        straight = self._straightest(at_edge, vertices)
+        pieces = [straight]
+        if not connected:
+            return pieces
+        single = np.setdiff1d(np.arange(len(at_edge)), straight)
+        groups = [*straight.tolist(), *([place] for place in single.tolist())]
+        for bit in range((len(groups) - 1).bit_length()):
+            pairs = []
+            for here, group in enumerate(groups):
+                there = here ^ (1 << bit)
+                if there >= len(groups):
+                    pairs += [group] if len(group) == 2 else []
+                elif here < there:
+                    pairs += [list(pair) for pair in zip(group, groups[there], strict=False)]
+            pieces.append(np.array(pairs))
+        return pieces
+
+    def subdivided(self, segments: list[int], n_vertices: int) -> SubdividedFaces:
+        """The faces with the edges that more than two of them share cut into segments."""
+        edge_of_side = np.full(self._faces.size, -1)
+        for number, at_edge in enumerate(self.branching):
+            edge_of_side[at_edge] = number
+        counts = np.array(segments, dtype=np.int64)
+        return subdivided(self._faces, self._low, self._high, edge_of_side, counts, n_vertices)
+
+    def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
+        """Pairs of the sides of one edge, by place, the straightest first; at most one is left."""
+        corner = self._faces.ravel()
+        start, end = vertices[corner[self._low[sides]]], vertices[corner[self._high[sides]]]
+        edge = end - start
+        outward = vertices[corner[sides]] - start
+        squared = np.maximum((edge * edge).sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        outward -= (outward * edge).sum(axis=1, keepdims=True) / squared * edge
+        length = np.linalg.norm(outward, axis=1, keepdims=True)
+        outward /= np.maximum(length, np.finfo(float).tiny)
+        if len(sides) > MOST_COMPARED:
+            return _opposite(outward)
+        straight = outward @ outward.T
+        np.fill_diagonal(straight, np.inf)
+        pairs = []
+        for _ in range(len(sides) // 2):
+            one, other = np.unravel_index(straight.argmin(), straight.shape)
+            pairs.append([one, other])
+            straight[[one, other]] = straight[:, [one, other]] = np.inf
+        return np.array(pairs)
+
+    def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
+        """Faces whose corners are one vertex only where pairs of sides join them.
+
+        Returns
+        -------
+        (f, 3) int array
+            Corners.
+        (v,) int array
+            The vertex that each vertex was.
+        """
+        corner = self._faces.ravel()
+        one, other = pairs.T
+        checkpoint()
+        rows = np.concatenate([self._low[one], self._high[one]])
+        checkpoint()
+        columns = np.concatenate([self._low[other], self._high[other]])
+        n_labels, label = components(len(corner), rows, columns)
+        source = np.zeros(n_labels, dtype=np.int64)
+        source[label] = corner
+        # One of the copies keeps the number of the vertex.
+        order, begin, _ = grouped(source)
+        first = order[begin]
+        number = np.full(n_labels, -1)
+        number[first] = source[first]
+        new = np.flatnonzero(number < 0)
+        checkpoint()
+        number[new] = n_vertices + np.arange(len(new))
+        checkpoint()
+        vertex = np.concatenate([np.arange(n_vertices), source[new]])
+        return number[label].reshape(-1, 3), vertex
+
+
+def _opposite(outward: FloatArray) -> IntArray:
+    """Pairs of directions about a line, (q, 3): opposite ones in the order of their angles."""
+    axes = np.linalg.svd(outward, full_matrices=False)[2][:2]
+    order = np.argsort(np.arctan2(outward @ axes[1], outward @ axes[0]), kind="stable")
+    half = len(order) // 2
+    return np.stack([order[:half], order[half : 2 * half]], axis=1)
+
+
+def _with_areas(
+    mesh: Mesh,
+    original_place: IntArray,
+    faces: IntArray,
+    vertices: FloatArray,
+    face: IntArray,
+    corners: FloatArray | None,
+    place: IntArray,
+) -> MappedMesh:
+    """The map to a mesh with these faces, in which every face has an area where that is possible.
+
+    Vertices that stand for one vertex of the mesh are moved apart.
+    """
+    # A side whose ends have been welded to one has no length, and its face no area.
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    if not whole.all():
+        faces, face = faces[whole], face[whole]
+        corners = None if corners is None else corners[whole]
+    checkpoint()
+    short = tolerances.AT_ONE_PLACE * mesh.diagonal
+    flat = flat_faces(vertices, faces, short)
+    checkpoint()
+    if not flat.any() and np.array_equal(faces, mesh.faces):
+        return MappedMesh(mesh, mesh, face, None, place, original_place)
+    origin = np.zeros(3)
+    # Straight ways from one copy of a vertex would pass exactly through the others.
+    doubled = np.ones(len(vertices), dtype=bool)
+    order, first, _ = grouped(place)
+    doubled[order[first]] = False
+    checkpoint()
+    if flat.any() or doubled.any():
+        # Far from the origin a small move would be lost to rounding.
+        origin = vertices[faces[0, 0]]
+        vertices = with_areas(vertices - origin, faces, short, flat, doubled)
+    checkpoint()
+    return MappedMesh(mesh, Mesh(vertices, faces), face, corners, place, original_place, origin)

@@ -1,0 +1,183 @@
+"""Strands of a curve that touch only on the original of a mapped mesh, moved apart.
+
+A curve that is simple on the mapped mesh passes each of its vertices once. Two of them may be one
+vertex of the original. One strand then goes round its copy, across the edges that meet there.
+Likewise strands that cross two copies of an edge at the same point: one of the points is moved
+along the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..array_types import FloatArray, IntArray
+from ..crossings import crossing_segments
+from ..mesh import Mesh
+from ..surface_points import SurfacePoints
+
+REACH = 0.05
+"""Greatest distance from a vertex at which a strand passes beside it, in lengths of edges."""
+
+SHARE = 0.5
+"""The same relative to the distance of the nearest other point of the curve."""
+
+SMALLER = 0.1
+"""Of that distance from one attempt to the next, as long as the strand touches another."""
+
+ATTEMPTS = 8
+
+SAME_POINT = 1e-9
+"""Difference of weights up to which points of copies of one edge are one point."""
+
+Moved = Callable[[float], tuple[SurfacePoints, IntArray]]
+"""A polyline with one strand moved by a share of the room, and the number of each old point."""
+
+
+def separated(
+    mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool, fixed: IntArray
+) -> tuple[SurfacePoints, IntArray]:
+    """Move strands apart that meet at copies of a vertex or of a point of an edge.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mapped mesh.
+    place : (v,) int array
+        The same number for vertices that are one point of the original.
+    polyline : SurfacePoints
+        Simple on the mesh; each point in the face of the segment after it.
+    closed : bool
+    fixed : (k,) int array
+        Points that stay.
+
+    Returns
+    -------
+    SurfacePoints
+    (n,) int array
+        Where each old point is now; -1 for those that are replaced.
+    """
+    number = np.arange(len(polyline))
+    stays = np.zeros(len(polyline), dtype=bool)
+    stays[fixed] = True
+    for point in _touching(mesh, place, polyline, stays):
+        here = int(number[point])
+        corners = int((polyline.barycentric[here] > 0.0).sum())
+        move = _round_vertex if corners == 1 else _along_edge
+        polyline, step = _moved(mesh, polyline, here, closed, move)
+        number = np.where(number >= 0, step[number], -1)
+    return polyline, number
+
+
+def _touching(
+    mesh: Mesh, place: IntArray, polyline: SurfacePoints, stays: IntArray
+) -> Iterator[int]:
+    """Points, none that stays, without which no two points of the polyline are one."""
+    here = polyline.barycentric > 0.0
+    places = np.where(here, place[mesh.faces[polyline.faces]], -1)
+    order = np.argsort(places, axis=1, kind="stable")
+    rows = np.arange(len(places))[:, None]
+    places = places[rows, order]
+    weights = np.where(here, polyline.barycentric, 0.0)[rows, order]
+    on_mesh = here.sum(axis=1) < 3
+    first: dict[tuple[int, ...], list[int]] = {}
+    # Points that stay come first, so that others give way to them.
+    for point in np.lexsort((np.arange(len(stays)), ~stays)).tolist():
+        if not on_mesh[point]:
+            continue
+        key = tuple(places[point].tolist())
+        others = first.setdefault(key, [])
+        same = [o for o in others if np.abs(weights[o] - weights[point]).max() <= SAME_POINT]
+        if same and not stays[point]:
+            yield point
+        else:
+            others.append(point)
+
+
+def _moved(
+    mesh: Mesh,
+    polyline: SurfacePoints,
+    point: int,
+    closed: bool,
+    move: Callable[[Mesh, SurfacePoints, int, float], tuple[SurfacePoints, IntArray]],
+) -> tuple[SurfacePoints, IntArray]:
+    """The polyline with one point moved, as far as leaves it simple; as it was if nothing does."""
+    share = 1.0
+    for _ in range(ATTEMPTS):
+        changed, number = move(mesh, polyline, point, share)
+        if not len(crossing_segments(mesh.faces, changed, closed)):
+            return changed, number
+        share *= SMALLER
+    return polyline, np.arange(len(polyline))
+
+
+def _round_vertex(
+    mesh: Mesh, polyline: SurfacePoints, point: int, share: float
+) -> tuple[SurfacePoints, IntArray]:
+    """Replace a point at a vertex by points on the edges round it, from one side to the other."""
+    n = len(polyline)
+    faces = polyline.faces
+    vertex = int(mesh.faces[faces[point]][polyline.barycentric[point].argmax()])
+    fan = _faces_between(mesh, vertex, int(faces[point - 1]), int(faces[point]))
+    near = _weight_at(mesh, polyline, vertex)
+    near[point] = 0.0
+    reach = share * min(REACH, SHARE * (1.0 - float(near.max())))
+    new_faces, new_barycentric = [], []
+    for before, after in zip(fan[:-1], fan[1:], strict=True):
+        corners = mesh.faces[after]
+        common = np.isin(corners, mesh.faces[before])
+        weights = np.where(corners == vertex, 1.0 - reach, np.where(common, reach, 0.0))
+        new_faces.append(after)
+        new_barycentric.append(weights)
+    added = len(new_faces)
+    number = np.arange(n) + (added - 1) * (np.arange(n) > point)
+    number[point] = -1
+    return SurfacePoints(
+        np.concatenate([faces[:point], np.array(new_faces, dtype=np.int64), faces[point + 1 :]]),
+        np.concatenate(
+            [
+                polyline.barycentric[:point],
+                np.array(new_barycentric).reshape(-1, 3),
+                polyline.barycentric[point + 1 :],
+            ]
+        ),
+    ), number
+
+
+def _along_edge(
+    mesh: Mesh, polyline: SurfacePoints, point: int, share: float
+) -> tuple[SurfacePoints, IntArray]:
+    """Move a point along its edge, towards the nearer end."""
+    barycentric = polyline.barycentric.copy()
+    here = barycentric[point]
+    small, large = np.where(here > 0.0, here, np.inf).argmin(), here.argmax()
+    if small == large:  # both are one half
+        small, large = np.flatnonzero(here > 0.0)
+    step = share * SHARE * REACH * here[small]
+    barycentric[point, small] -= step
+    barycentric[point, large] += step
+    return SurfacePoints(polyline.faces, barycentric), np.arange(len(polyline))
+
+
+def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
+    """The shortest chain of faces about a vertex from one to another, each beside the next."""
+    previous = {start: start}
+    queue = [start]
+    for face in queue:
+        if face == end:
+            break
+        for corner, beyond in zip(mesh.faces[face], mesh.face_neighbours[face], strict=True):
+            # The side opposite the vertex leads away from it.
+            if corner != vertex and beyond >= 0 and int(beyond) not in previous:
+                previous[int(beyond)] = face
+                queue.append(int(beyond))
+    chain = [end]
+    while chain[-1] != start:
+        chain.append(previous[chain[-1]])
+    return chain[::-1]
+
+
+def _weight_at(mesh: Mesh, points: SurfacePoints, vertex: int) -> FloatArray:
+    """The weight of each point at a vertex, (n,)."""
+    return (points.barycentric * (mesh.faces[points.faces] == vertex)).sum(axis=1)

@@ -1,0 +1,105 @@
+"""The manifolds of a surface, who designs on each of them, and requests and designs there.
+
+A mesh without defects is its own manifold. Otherwise `repair.nonmanifold` has several ways to make
+one, and the first is taken on which the points of a request are connected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from .array_types import FloatArray, IntArray
+from .design_result import Design
+from .mesh import Mesh
+from .repair.mapped_mesh import MappedMesh
+from .repair.nonmanifold import REPAIRS, repaired
+from .request import Request
+from .surface_designer import SurfaceDesigner
+
+
+class RepairedSurface:
+    """Some faces of a mesh as manifolds, each made when it is first needed and kept.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    usable : (u,) int array
+        The faces that curves may enter, ascending.
+    """
+
+    def __init__(self, mesh: Mesh, usable: IntArray) -> None:
+        self._mesh, self._usable = mesh, usable
+        self._made: list[tuple[MappedMesh, SurfaceDesigner] | None] = []
+
+    @property
+    def first(self) -> MappedMesh:
+        """The manifold on which the surface goes straight on wherever it branches."""
+        first = self._repair(0)
+        assert first is not None  # the others are None where they join no more than it does
+        return first[0]
+
+    @property
+    def most_connected(self) -> MappedMesh:
+        """The manifold on which most of the surface is connected."""
+        made = [self._repair(number) for number in range(REPAIRS)]
+        return [one[0] for one in made if one is not None][-1]
+
+    def find(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request] | None:
+        """A manifold on which the points are connected, who designs there, and the request there.
+
+        None where they are connected on none.
+        """
+        for number in range(REPAIRS):
+            found = self._repair(number)
+            there = None if found is None else request_on(found[0], request)
+            if found is not None and there is not None:
+                return *found, there
+        return None
+
+    def forget(self) -> None:
+        """Start the next design anew."""
+        for made in self._made:
+            if made is not None:
+                made[1].forget()
+
+    def _repair(self, number: int) -> tuple[MappedMesh, SurfaceDesigner] | None:
+        while len(self._made) <= number:
+            mapped = repaired(self._mesh, len(self._made), self._usable)
+            self._made.append(None if mapped is None else (mapped, SurfaceDesigner(mapped.mesh)))
+        return self._made[number]
+
+
+def request_on(mapped: MappedMesh, request: Request) -> Request | None:
+    """A request on a mapped mesh; None where its points are not connected there."""
+    if not mapped.differs:
+        components = mapped.mesh.face_component[request.points.faces]
+        return request if (components == components[0]).all() else None
+    sets = [request.points, *request.via_points.values()]
+    holding = [mapped.holding(points) for points in sets]
+    component = mapped.common_component([point for of_set in holding for point in of_set])
+    if component is None:
+        return None
+    points, *via_points = (mapped.points(of_set, component) for of_set in holding)
+    return replace(
+        request,
+        points=points,
+        via_points=dict(zip(request.via_points, via_points, strict=True)),
+        obstacles=mapped.weights(request.obstacles),
+        alignment=mapped.weights(request.alignment),
+    )
+
+
+def design_on_original(mapped: MappedMesh, design: Design) -> Design:
+    """A design on a mapped mesh as one on the original."""
+    if not mapped.differs:
+        return design
+    return replace(
+        design,
+        curves=[mapped.curve(curve) for curve in design.curves],
+        find_field=partial(_field_on_original, mapped, design),
+    )
+
+
+def _field_on_original(mapped: MappedMesh, design: Design) -> FloatArray:
+    return mapped.field(design.field)
