@@ -16,6 +16,7 @@ MEASUREMENTS = (
     "guarantee",
     "corpus",
     "fuzz",
+    "messes",
     "cuts",
     "pretraining",
     "transfer",

@@ -1,7 +1,7 @@
 """Non-manifold messes: surfaces whose vertices have been welded, and worse, and curves on them.
 
 A mess is a number. `answer` draws it and says what was wrong with what came: either a good curve,
-by `checker`, or an error that `feasibility` finds due.
+by `checker`, or an error that `feasibility` finds due. `run` asks for many.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import re
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,8 +22,11 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.array_types import FloatArray, IntArray
 
+from . import report
 from .checker import judge
 from .feasibility import edge_connected_parts, every_order_possible, why_impossible
+from .isolation import isolated_beside
+from .scale import Scale
 from .untyped import place_of
 
 SEED = 17
@@ -39,8 +43,18 @@ GOOD, DUE, CAPPED = "good curve", "error where due", "work limit"
 ORDER = "another order named"
 WRONG = "wrong"
 
-CAP_WORDS = "gives up after"
-"""In every message of a request that has reached a cap on work."""
+PATIENCE = 60.0
+"""Seconds by the wall clock after which a mess hangs."""
+
+WORKERS = 2
+
+TOLD = 500
+"""Messes after which a run says how far it is."""
+
+LISTED = 40
+
+CAP_WORDS = "winds round itself too often"
+"""In the message of a path that has reached the cap on its splits, the one cap that declines."""
 
 
 @dataclass
@@ -60,6 +74,43 @@ class Mess:
     mesh: nicmm.Mesh
     points: nicmm.SurfacePoints
     arguments: dict[str, Any]
+
+
+def run(scale: Scale) -> None:
+    """Ask for curves on many messes, and list what is wrong."""
+    count = scale.choose(10_000, 500, 6)
+    outcomes: Counter[str] = Counter()
+    findings: list[str] = []
+    seconds = []
+    for done in isolated_beside(answer, range(count), PATIENCE, WORKERS):
+        outcomes[done.result.outcome if done.result else WRONG] += 1
+        seconds.append(done.seconds)
+        faults = done.result.faults if done.result else [done.failure]
+        if done.output.strip():
+            faults = [*faults, f"printed {done.output.strip()[-300:]!r}"]
+        if faults:
+            kind = done.result.kind if done.result else "?"
+            findings.append(f"{done.item} ({kind}): {'; '.join(faults)}")
+            print(f"  {findings[-1]}", flush=True)
+        if done.item and done.item % TOLD == 0:
+            print(f"  {done.item} messes, {len(findings)} findings", flush=True)
+    rows = [(outcome, n, f"{100 * n / count:.2f} %") for outcome, n in sorted(outcomes.items())]
+    slowest = np.sort(seconds)[::-1]
+    body = (
+        f"Seed {SEED}, {count} meshes of up to {_most_faces()} faces, closed and open, on which up "
+        f"to {MOST_WELDED} pairs of vertices were welded, faces added, doubled, turned and "
+        f"dropped, in chains of these; closed and open curves, 2–{MOST_POINTS} points, both "
+        "orders, a quarter with obstacles (`messes.py`). A good curve is one simple curve through "
+        "all points by `checker.py`; whether an error is due is decided from the arrays alone "
+        "(`feasibility.py`). Where more than three points lie on boundaries or non-manifold "
+        "places an order may be impossible; then the error has to name another one, and that one "
+        "has to give a good curve.\n\n"
+        f"**{len(findings)} findings.** CPU seconds a mess: median {np.median(seconds):.1f}, 99 % "
+        f"{np.percentile(seconds, 99):.1f}, slowest {slowest[0]:.1f}.\n\n"
+        + "".join(f"- {finding}\n" for finding in findings[:LISTED])
+        + report.table(("outcome", "messes", "share"), rows)
+    )
+    report.write_section("messes", "Non-manifold messes", body, scale)
 
 
 def answer(number: int) -> Answer:
@@ -121,6 +172,11 @@ def _of_order(asked: Mess, message: str) -> tuple[str, list[str]]:
         faults = "; ".join(found.faults) or found.outcome
         return WRONG, [f"the order that the message names does not work: {faults}"[:400]]
     return ORDER, []
+
+
+def _most_faces() -> int:
+    """Of the surfaces that messes are made from."""
+    return max(len(mesh.faces) for _, mesh in _bases())
 
 
 def mess(number: int) -> Mess:

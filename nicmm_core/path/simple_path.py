@@ -34,7 +34,7 @@ MOST_TRIES = 6
 MOST_TRIES_WHILE_CROSSING = 14
 """Paths that are laid at most as long as legs of each would cross."""
 
-MOST_SPLITS_TO_TRY = 80_000
+MOST_SPLITS_TO_TRY = 40_000
 """Virtual splits, of all paths that are laid, after which no other is tried."""
 
 SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0

@@ -100,7 +100,7 @@ class RelaxationConfig:
     least_decrease_before: float = 0.1
     stretch: float = 1.6
     iterations: int = 100
-    work: float = 1000.0
+    work: float = 800.0
     drawn_at_rest: bool = False
     drawn_iterations: int = 100
     taut: float = 1.0
@@ -344,11 +344,14 @@ class _Relaxation:
             state = _State(curve, nodes, held, weights, before, system)
             done = None
             if self._may_fall(state) > SURELY * least * scale:
-                if self.iterations == last_iteration or self.work >= config.work:
+                if self.iterations == last_iteration or self._worked_out():
                     self.stopped = "cap"
                     break
                 self.iterations += 1
                 done = self._iteration(state, damping, simple)
+                if done is None and self._worked_out():
+                    self.stopped = "cap"
+                    break
             if done is not None:
                 curve, nodes, damping, held = done.curve, done.nodes, done.damping, held | done.held
                 self.drawn = curve
@@ -426,7 +429,7 @@ class _Relaxation:
     def _first_step(self, state: _State, free: BoolArray, damping: float) -> _Moved | None:
         """The least damped step that lowers the energy; None when there is none."""
         nodes, weights = state.nodes, state.weights
-        while damping <= self.config.most_damping and free.any():
+        while damping <= self.config.most_damping and free.any() and not self._worked_out():
             move = damped_step(state.system, free, damping)
             if not np.isfinite(move).all():
                 return None
@@ -451,7 +454,7 @@ class _Relaxation:
     ) -> _Moved | None:
         """A step, or half of it, that lowers the energy; None when it promises less than that."""
         surface, nodes, free = self.surface, moved.nodes, free & ~moved.stayed
-        if not free.any():
+        if not free.any() or self._worked_out():
             return None
         system = elastic_system(surface, nodes, weights)
         move = damped_step(system, free, damping)
@@ -466,6 +469,10 @@ class _Relaxation:
                 farthest = moved.farthest + share * farthest
                 return _Moved(reached, energy, stayed, moved.damping, farthest)
         return None
+
+    def _worked_out(self) -> bool:
+        """Whether an attempt has taken all the work that it may."""
+        return self.work >= self.config.work
 
     def _sideways(self, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
         """Nodes moved across the curve, and which came to a boundary."""

@@ -2,8 +2,8 @@
 
 A curve that is simple on the mapped mesh passes each of its vertices once. Two of them may be one
 vertex of the original. One strand then goes round its copy, across the edges that meet there.
-Likewise strands that cross two copies of an edge at the same point: one of the points is moved
-along the edge.
+Likewise for copies of an edge: where strands cross them at the same point, one of the points is
+moved along the edge, and where a strand runs along one, it bends into the face beside.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
+from ..array_types import BoolArray, FloatArray, IntArray
 from ..crossings import crossing_segments
 from ..mesh import Mesh
 from ..surface_points import SurfacePoints
@@ -67,11 +67,39 @@ def separated(
         move = _round_vertex if corners == 1 else _along_edge
         polyline, step = _moved(mesh, polyline, here, closed, move)
         number = np.where(number >= 0, step[number], -1)
+    for point in _passed_segments(mesh, place, polyline, closed)[::-1]:
+        polyline, step = _moved(mesh, polyline, point, closed, _into_face)
+        number = np.where(number >= 0, step[number], -1)
     return polyline, number
 
 
+def _passed_segments(
+    mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool
+) -> list[int]:
+    """Segments along an edge that have points of other strands on copies of it, ascending."""
+    n = len(polyline)
+    here = polyline.barycentric > 0.0
+    corners = mesh.faces[polyline.faces]
+    on_edge: dict[tuple[int, ...], list[int]] = {}
+    for point in np.flatnonzero(here.sum(axis=1) == 2).tolist():
+        ends = tuple(sorted(place[corners[point][here[point]]].tolist()))
+        on_edge.setdefault(ends, []).append(point)
+    found = []
+    for point in range(n if closed else n - 1):
+        following = (point + 1) % n
+        both = {
+            *corners[point][here[point]].tolist(),
+            *corners[following][here[following]].tolist(),
+        }
+        if len(both) == 2:
+            ends = tuple(sorted(place[list(both)].tolist()))
+            if set(on_edge.get(ends, ())) - {point, following}:
+                found.append(point)
+    return found
+
+
 def _touching(
-    mesh: Mesh, place: IntArray, polyline: SurfacePoints, stays: IntArray
+    mesh: Mesh, place: IntArray, polyline: SurfacePoints, stays: BoolArray
 ) -> Iterator[int]:
     """Points, none that stays, without which no two points of the polyline are one."""
     here = polyline.barycentric > 0.0
@@ -158,6 +186,24 @@ def _along_edge(
     barycentric[point, small] -= step
     barycentric[point, large] += step
     return SurfacePoints(polyline.faces, barycentric), np.arange(len(polyline))
+
+
+def _into_face(
+    mesh: Mesh, polyline: SurfacePoints, point: int, share: float
+) -> tuple[SurfacePoints, IntArray]:
+    """Give a segment along an edge a point between its ends, inside the face that carries it."""
+    n, face = len(polyline), int(polyline.faces[point])
+    following = (point + 1) % n
+    corners = mesh.faces[polyline.faces[following]]
+    same = corners[:, None] == mesh.faces[face][None]
+    end = (polyline.barycentric[following][:, None] * same).sum(axis=0)
+    middle = 0.5 * (polyline.barycentric[point] + end)
+    reach = share * REACH
+    middle = (1.0 - reach) * middle + reach * (middle == 0.0)
+    return SurfacePoints(
+        np.insert(polyline.faces, point + 1, face),
+        np.insert(polyline.barycentric, point + 1, middle, axis=0),
+    ), np.arange(n) + (np.arange(n) > point)
 
 
 def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
