@@ -132,6 +132,12 @@ WORTHWHILE = 0.05
 SURELY = 0.1
 """Share of the least decrease below which a step is not tried: damping makes forecasts small."""
 
+MOST_STALLED = 4
+"""Iterations in a row without a new least energy that end a level.
+
+On folds and needles spacing the nodes anew may raise the energy by more than steps lower it.
+"""
+
 FACES_OF_A_MOVE = 16.0
 """Faces that nodes pass one after the other in the time that the rest of a move takes."""
 
@@ -335,7 +341,8 @@ class _Relaxation:
         curve = self.drawn = self._respaced(curve, level, simple)
         nodes = curve.nodes
         held = np.zeros(len(nodes.positions), dtype=bool)
-        releases = 0
+        releases = stalled = 0
+        least_energy = np.inf
         while True:
             weights = balance(self.surface, nodes, self.smoothness, simple, taut)
             before = elastic_energy(nodes, weights)
@@ -360,6 +367,11 @@ class _Relaxation:
                     self.stopped = "cancelled"
                     break
                 scale = max(bending_energy(nodes), STRAIGHT * before)
+                stalled = 0 if done.energy < least_energy else stalled + 1
+                least_energy = min(least_energy, done.energy)
+                if stalled == MOST_STALLED:
+                    self.stopped = "cap" if level == config.levels[-1] else "converged"
+                    break
             if done is None or before - done.energy <= least * scale:
                 if releases == RELEASES or not held.any():
                     break
