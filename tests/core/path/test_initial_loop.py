@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.path import legs
-from nicmm_core.path.initial_loop import build_initial_loop
+from nicmm_core.path.initial_loop import boundary_loops, build_initial_loop, path_curve
 from nicmm_core.path.visiting_order import shortest_order
 from nicmm_core.surface_points import locate_control_points
-from tests.core.checks import circle, nearest_vertices, random_surface_points
+from tests.core.checks import (
+    assert_valid_curve,
+    circle,
+    flipped,
+    nearest_vertices,
+    random_surface_points,
+)
 
 BALL = shapes.sphere(1)
 
@@ -298,3 +304,58 @@ def interior_vertices(mesh):
     sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
     return np.setdiff1d(mesh.faces, edges[count == 1])
+
+
+class TestBoundaries:
+    @pytest.mark.parametrize(
+        ("mesh", "lengths"),
+        [
+            (shapes.disc(4), [24]),
+            (shapes.annulus(5), [12, 30]),
+            (shapes.moebius_strip(12, 3), [24]),
+            (shapes.sphere(1), []),
+        ],
+        ids=["disc", "annulus", "Möbius strip", "sphere"],
+    )
+    @pytest.mark.parametrize("turned", [False, True])
+    def test_loops_follow_the_boundary(self, mesh, lengths, turned):
+        mesh = flipped(mesh, 1) if turned else mesh
+        loops = boundary_loops(mesh.faces)
+        assert sorted(map(len, loops)) == lengths
+        rim = {frozenset(edge) for edge in mesh.unpaired_edges[0].tolist()}
+        for loop in loops:
+            steps = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+            assert all(frozenset(step) in rim for step in steps)
+
+    def test_the_surface_is_on_the_same_side_of_all_loops(self):
+        mesh = flipped(shapes.annulus(5), 2)
+        turns = []
+        for loop in boundary_loops(mesh.faces):
+            flat = mesh.vertices[loop, :2]
+            following = np.roll(flat, -1, axis=0)
+            cross = flat[:, 0] * following[:, 1] - flat[:, 1] * following[:, 0]
+            turns.append((np.sign(cross.sum()), np.linalg.norm(flat[0])))
+        (inner, _), (outer, _) = sorted(turns, key=lambda turn: turn[1])
+        assert inner == -outer
+
+    @pytest.mark.parametrize("closed", [True, False])
+    @pytest.mark.parametrize("seed", range(6))
+    def test_many_points_on_boundaries_are_visited_in_an_order_that_works(self, seed, closed):
+        """The shortest one, from side to side of a narrow ring, is often impossible."""
+        mesh = shapes.annulus(5, hole=0.7)
+        rim = np.unique(mesh.unpaired_edges[0])
+        chosen = np.random.default_rng(seed).choice(rim, 9, replace=False)
+        points = locate_control_points(mesh, chosen, closed)
+        working, loop = build_initial_loop(mesh, points, "shortest", closed=closed)
+        assert_simple_loop(mesh, points, "shortest", working, loop, closed)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_path_itself_is_a_curve(surface, seed, closed):
+    inner = interior_vertices(surface)
+    chosen = np.random.default_rng(seed).choice(inner, size=5, replace=False)
+    points = locate_control_points(surface, chosen, closed)
+    working, loop = build_initial_loop(surface, points, "shortest", closed=closed)
+    curve = path_curve(surface, working, loop)
+    assert_valid_curve(surface, curve, surface.vertices[chosen][loop.order], closed)

@@ -5,7 +5,11 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from nicmm_core.path.visiting_order import EXACT_UP_TO, shortest_order
+from nicmm_core.path.visiting_order import (
+    EXACT_UP_TO,
+    order_along_boundaries,
+    shortest_order,
+)
 
 
 def distances(points):
@@ -83,3 +87,31 @@ def test_equal_distances_end():
     """2-opt on ties must not exchange for ever."""
     distance = 1.0 - np.eye(EXACT_UP_TO + 3)
     assert sorted(shortest_order(distance, closed=True).tolist()) == list(range(len(distance)))
+
+
+class TestAlongBoundaries:
+    """Points of one loop of the boundary follow one another in its direction."""
+
+    @pytest.mark.parametrize("closed", [True, False])
+    @pytest.mark.parametrize("seed", range(4))
+    def test_loops_stay_whole(self, seed, closed):
+        generator = np.random.default_rng(seed)
+        distance = distances(generator.random((11, 2)))
+        loops = [np.array([4, 1, 7]), np.array([2]), np.array([0, 9, 3, 5]), np.array([], int)]
+        tour = order_along_boundaries(distance, loops, closed)
+        assert sorted(tour.tolist()) == list(range(11))
+        for loop in loops:
+            # The direction of the loop from any of its points on.
+            met = [point for point in tour.tolist() if point in loop]
+            start = met.index(loop[0]) if len(loop) else 0
+            assert met[start:] + met[:start] == loop.tolist()
+
+    def test_an_open_tour_leaves_out_the_longest_leg(self):
+        distance = distances(np.array([[0.0, 0], [1, 0], [2, 0], [9, 0]]))
+        tour = order_along_boundaries(distance, [np.array([0, 1, 2, 3])], False)
+        assert tour.tolist() == [0, 1, 2, 3]
+
+    def test_inner_points_are_put_where_they_cost_least(self):
+        corners = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.1]])
+        tour = order_along_boundaries(distances(corners), [np.array([0, 1, 2, 3])], True)
+        assert tour.tolist() == [0, 4, 1, 2, 3]
