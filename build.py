@@ -283,7 +283,10 @@ def command_test(arguments: argparse.Namespace) -> int:
         "ruff check": ["ruff", "check"],
         "ruff format": ["ruff", "format", "--check"],
         "mypy": ["mypy"],
-        "pytest": ["pytest", "--durations=10", *arguments.pytest_arguments],
+        "pytest": [
+            *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
+            *arguments.pytest_arguments,
+        ],
     }
     failed = []
     for name, command in checks.items():

@@ -18,8 +18,8 @@ class Status(enum.Enum):
 
     CONVERGED = "converged: one curve through all control points"
     ITERATION_LIMIT = (
-        "stopped at the iteration limit before the energy came to rest; the curve is usable, a "
-        "finer mesh or other control points may make it fairer"
+        "stopped at the iteration limit before the energy converged; the curve is usable, a finer "
+        "mesh, one without defects, or other control points may make it fairer"
     )
     DIVERGED = (
         "the energy left the range of numbers and the best curve before is returned; look for "
@@ -34,8 +34,8 @@ class Status(enum.Enum):
         "far, and the same request gives the whole one"
     )
     NOT_ONE_CURVE = (
-        "the level set is not one simple curve through all control points; the mesh may branch "
-        "there (edges of three faces): repair it, or move the control points"
+        "the level set is not one simple curve through all control points; the mesh may be too "
+        "coarse there: subdivide it, or use the method 'nicmm', which always gives one"
     )
 
     def __str__(self) -> str:

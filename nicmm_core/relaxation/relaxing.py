@@ -123,8 +123,8 @@ DAMPING_FACTOR = 10.0
 RELEASES = 2
 """Times in a level that nodes which could not follow are tried again when the others rest."""
 
-HELD_TRIES = 3
-"""Iterations that are tried without the nodes that could not follow the one before."""
+HELD_TRIES = 1
+"""Times that an iteration is tried again without the nodes that could not follow."""
 
 WORTHWHILE = 0.05
 """Share of the fall so far that another step of the same iteration has to promise."""

@@ -7,9 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
+from benchmarks import messes
 from nicmm_core import shapes
 from nicmm_core.crossings import crossing_segments
 from nicmm_core.curve import geodesic_curvature, resample
+from nicmm_core.relaxation import relaxing
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import (
     FEATURE_TENSION,
@@ -432,3 +434,20 @@ def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
     np.testing.assert_allclose(
         result.curve.points[result.curve.control_index], points.positions(ball), atol=1e-15
     )
+
+
+@pytest.mark.parametrize("work", [1.0, 20.0])
+def test_work_is_bounded_by_moves(flat_disc, work):
+    result = relaxed(flat_disc, star(flat_disc), config=RelaxationConfig(work=work))
+    assert result.stopped == "cap"
+
+
+@pytest.mark.parametrize("number", [41, 197])
+def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
+    """Its nodes are spaced anew again and again, and steps over folds gain less than that costs."""
+    moves = []
+    sideways = relaxing.sideways
+    monkeypatch.setattr(relaxing, "sideways", lambda *given: moves.append(1) or sideways(*given))
+    mess = messes.mess(number)
+    nicmm.design_curve(mess.mesh, mess.points, **mess.arguments)
+    assert len(moves) <= DEFAULT.work
