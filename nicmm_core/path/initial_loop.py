@@ -7,6 +7,7 @@ vertices are too few it runs through the midpoints of edges, which are then spli
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -111,26 +112,23 @@ def build_initial_loop(
     if order not in ORDERS:
         raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
     tours = _Tours(mesh, points, closed)
-    visit = tours.given if order == "given" else tours.shortest
-    way = Waypoints(_chosen(points, visit), np.ones(len(points), dtype=bool), names_of(visit))
-    if via_points is not None:
-        way = with_via_points(mesh, points, via_points, order, closed)
-    try:
+    path, failure = None, None
+    for visit in tours.of(order):
+        way = Waypoints(_chosen(points, visit), np.ones(len(points), dtype=bool), names_of(visit))
+        if via_points is not None:
+            way = with_via_points(mesh, points, via_points, order, closed)
         try:
             path = lay_path(mesh, way.points, importance, closed)
-        except CrossingError:
-            if order == "given":
-                raise
-            visit = tours.along_boundaries
-            path = lay_path(mesh, _chosen(points, visit), importance, closed)
-            way = Waypoints(_chosen(points, visit), way.is_control, names_of(visit))
-    except UnreachableError as error:
-        what = str(error)
-        if isinstance(error, CrossingError):
-            here, there = way.names[error.leg], way.names[(error.leg + 1) % len(way.names)]
+            break
+        except UnreachableError as error:
+            failure = error
+    if path is None:
+        what = str(failure)
+        if isinstance(failure, CrossingError):
+            here, there = way.names[failure.leg], way.names[(failure.leg + 1) % len(way.names)]
             what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
         advice = _advice(mesh, points, tours, visit, importance, not way.is_control.all())
-        raise UnreachableError(f"{what}; {advice}") from error
+        raise UnreachableError(f"{what}; {advice}") from failure
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
     loop, zigzag = refine_along(split, component, path.vertices, closed, pieces)
@@ -147,6 +145,14 @@ class _Tours:
 
     def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
         self._mesh, self._points, self.closed = mesh, points, closed
+
+    def of(self, order: str) -> Iterator[IntArray]:
+        """The orders that answer a request, the best one first."""
+        if order == "given":
+            yield self.given
+        else:
+            yield self.shortest
+            yield self.along_boundaries
 
     @property
     def given(self) -> IntArray:

@@ -8,11 +8,11 @@ moved along the edge, and where a strand runs along one, it bends into the face 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
-from ..array_types import BoolArray, FloatArray, IntArray
+from ..array_types import FloatArray, IntArray
 from ..crossings import crossing_segments
 from ..mesh import Mesh
 from ..surface_points import SurfacePoints
@@ -27,6 +27,9 @@ SMALLER = 0.1
 """Of that distance from one attempt to the next, as long as the strand touches another."""
 
 ATTEMPTS = 8
+
+ROUNDS = 4
+"""Of moving points: two that go round copies of one vertex may meet on copies of an edge."""
 
 SAME_POINT = 1e-9
 """Difference of weights up to which points of copies of one edge are one point."""
@@ -59,14 +62,16 @@ def separated(
         Where each old point is now; -1 for those that are replaced.
     """
     number = np.arange(len(polyline))
-    stays = np.zeros(len(polyline), dtype=bool)
-    stays[fixed] = True
-    for point in _touching(mesh, place, polyline, stays):
-        here = int(number[point])
-        corners = int((polyline.barycentric[here] > 0.0).sum())
-        move = _round_vertex if corners == 1 else _along_edge
-        polyline, step = _moved(mesh, polyline, here, closed, move)
-        number = np.where(number >= 0, step[number], -1)
+    for _ in range(ROUNDS):
+        touching = _touching(mesh, place, polyline, number[fixed])
+        if not touching:
+            break
+        # From the last one on, so that those before keep their numbers.
+        for point in touching[::-1]:
+            corners = int((polyline.barycentric[point] > 0.0).sum())
+            move = _round_vertex if corners == 1 else _along_edge
+            polyline, step = _moved(mesh, polyline, point, closed, move)
+            number = np.where(number >= 0, step[number], -1)
     for point in _passed_segments(mesh, place, polyline, closed)[::-1]:
         polyline, step = _moved(mesh, polyline, point, closed, _into_face)
         number = np.where(number >= 0, step[number], -1)
@@ -98,10 +103,10 @@ def _passed_segments(
     return found
 
 
-def _touching(
-    mesh: Mesh, place: IntArray, polyline: SurfacePoints, stays: BoolArray
-) -> Iterator[int]:
-    """Points, none that stays, without which no two points of the polyline are one."""
+def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntArray) -> list[int]:
+    """Points, none of them fixed, without which no two of the polyline are one; ascending."""
+    stays = np.zeros(len(polyline), dtype=bool)
+    stays[fixed] = True
     here = polyline.barycentric > 0.0
     places = np.where(here, place[mesh.faces[polyline.faces]], -1)
     order = np.argsort(places, axis=1, kind="stable")
@@ -110,6 +115,7 @@ def _touching(
     weights = np.where(here, polyline.barycentric, 0.0)[rows, order]
     on_mesh = here.sum(axis=1) < 3
     first: dict[tuple[int, ...], list[int]] = {}
+    found = []
     # Points that stay come first, so that others give way to them.
     for point in np.lexsort((np.arange(len(stays)), ~stays)).tolist():
         if not on_mesh[point]:
@@ -118,9 +124,10 @@ def _touching(
         others = first.setdefault(key, [])
         same = [o for o in others if np.abs(weights[o] - weights[point]).max() <= SAME_POINT]
         if same and not stays[point]:
-            yield point
+            found.append(point)
         else:
             others.append(point)
+    return sorted(found)
 
 
 def _moved(

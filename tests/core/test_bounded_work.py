@@ -1,0 +1,73 @@
+"""Work is bounded by counts, so that the same request always ends the same way."""
+
+import numpy as np
+
+import nicmm_core as nicmm
+from benchmarks.checker import judge
+from nicmm_core import shapes
+from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
+from nicmm_core.relaxation import exact_curve, relaxing
+
+WORK = relaxing.RelaxationConfig().work
+
+
+def fan(count):
+    """A cone whose faces are needles that meet in one vertex, in a ring of plain faces."""
+    angle = 2 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    vertices = np.concatenate([[[0, 0, 0.3]], ring, 1.5 * ring])
+    inner, outer = 1 + np.arange(count), 1 + count + np.arange(count)
+    onward, beyond = np.roll(inner, -1), np.roll(outer, -1)
+    return nicmm.Mesh(
+        vertices,
+        np.concatenate(
+            [
+                np.stack([0 * inner, inner, onward], axis=1),
+                np.stack([inner, outer, onward], axis=1),
+                np.stack([onward, outer, beyond], axis=1),
+            ]
+        ),
+    )
+
+
+def test_a_fan_of_thousands_of_needles(monkeypatch):
+    """A node that moves beside its tip passes them all."""
+    passed = []
+    moved = exact_curve.moved
+
+    def counted(*given):
+        result = moved(*given)
+        passed.append(result[2])
+        return result
+
+    monkeypatch.setattr(exact_curve, "moved", counted)
+    count = 3000
+    mesh = fan(count)
+    faces = np.array([10, 900, 1700, 2500])
+    points = nicmm.SurfacePoints(faces, np.tile([0.8, 0.1, 0.1], (4, 1)))
+    design = nicmm.design_curve(mesh, points)
+    assert not judge(mesh, design, points).faults
+    # One move may begin before the limit, which half of the faces, and a little more, may follow.
+    assert sum(passed) <= relaxing.FACES_OF_A_MOVE * WORK + 2 * count
+
+
+def test_forty_points_back_and_forth(monkeypatch):
+    """Each leg winds round those before it."""
+    splits = []
+    add = virtual_splits.SplitMesh._add_vertex
+    monkeypatch.setattr(
+        virtual_splits.SplitMesh, "_add_vertex", lambda *given: splits.append(1) or add(*given)
+    )
+    mesh = shapes.torus(around=24, across=12)
+    chosen = np.random.default_rng(3).choice(len(mesh.vertices), 40, replace=False)
+    try:
+        design = nicmm.design_curve(mesh, chosen)
+    except nicmm.UnreachableError as error:
+        assert "winds round itself too often" in str(error)
+        # Three other orders may have been tried for the message.
+        orders = 4
+    else:
+        assert not judge(mesh, design, chosen).faults
+        orders = 1
+    of_paths = simple_path.MOST_SPLITS_TO_TRY + 2 * legs.MOST_PATH_SPLITS
+    assert len(splits) <= orders * of_paths + 2 * band_refinement.MOST_SPLITS
