@@ -1,7 +1,7 @@
 """The front door: a mesh and control points go in, a curve comes out. Read this file first.
 
 A request is checked, faces inside obstacles are taken away (`repair.free_surface`), what is left is
-made a manifold if it is none (`repaired_surface`), and the request is answered there
+made a manifold if it is not one (`repaired_surface`), and the request is answered there
 (`surface_designer`):
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
@@ -172,7 +172,7 @@ class Designer:
         Raises
         ------
         CurveError
-            If the curve is none on this mesh, or lacks control points.
+            If the curve does not lie on this mesh, or lacks control points.
         """
         faces, barycentric, _ = checked_curve(self.mesh, curve)
         index = np.asarray(curve.control_index)
@@ -206,11 +206,11 @@ class Designer:
         smoothness: float = 1.0,
         iterations: int = FOLLOWING,
     ) -> Design | None:
-        """Lead the last curve to control points nearby by a bounded amount of work.
+        """Move the last curve to control points nearby by a bounded amount of work.
 
         For live drawing: every call takes a few hundredths of a second on a mesh of any size, and
-        the status is `ITERATION_LIMIT` until the curve is at rest; call again with the same
-        arguments until it is. Arguments not listed here are those of `design_curve`; the order is
+        the status is `ITERATION_LIMIT` until the curve has converged; call again with the same
+        arguments until it has. Arguments not listed here are those of `design_curve`; the order is
         "given" and the method "nicmm".
 
         Parameters

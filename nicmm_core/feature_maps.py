@@ -123,7 +123,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     mesh : Mesh
     angle : float
         Between the normals of the two faces of an edge, in radians, from which it is sharp; 0 in
-        a plane. Which way faces are turned is of no account.
+        a plane. The orientation of faces is ignored.
 
     Returns
     -------

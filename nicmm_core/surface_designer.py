@@ -41,7 +41,7 @@ SOON_DONE = 10
 """The cap of a relaxation, in numbers of iterations that most need."""
 
 CROWDED = 3
-"""Frames for which strands that were in each other's way are taken to be so still."""
+"""Frames for which strands that collided are assumed to collide still."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class _Remembered:
     request: Request
     start: _Start
     exact: ExactCurve  # the design's curve with its nodes
-    design: Design | None  # None where the curve is not at rest yet
+    design: Design | None  # None where the curve has not converged yet
     crowded: int = 0  # frames in which it is better drawn after every step
 
 
@@ -115,7 +115,7 @@ class SurfaceDesigner:
         return self._level_set_design(problem, solution, zeros, started)
 
     def follow(self, request: Request, iterations: int, started: float) -> Design | None:
-        """Lead the last curve on by few iterations; None where it cannot be led there.
+        """Relax the last curve by few iterations; None where it cannot be moved there.
 
         Parameters
         ----------

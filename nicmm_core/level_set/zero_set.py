@@ -78,7 +78,7 @@ def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
 
     Lengths count as they do for the path, less in a lane and more in an obstacle. A level set that
     has found a better way is no longer than the path that it was made from. One that is longer has
-    lost its way: near sharp edges, where maps are most of all, it may swing round an end of an open
+    gone astray: near sharp edges, where maps are most of all, it may swing round an end of an open
     curve or round a corner of the surface, and so may φ₀.
 
     Parameters

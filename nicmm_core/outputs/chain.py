@@ -58,7 +58,7 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray
     Raises
     ------
     CurveError
-        If the curve is none on this mesh.
+        If the curve does not lie on this mesh.
     """
     faces, barycentric = np.asarray(curve.faces), np.asarray(curve.barycentric, dtype=np.float64)
     if faces.ndim != 1 or barycentric.shape != (len(faces), 3):

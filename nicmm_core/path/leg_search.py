@@ -107,7 +107,7 @@ class LegSearch:
     importance : (V,) float array or None
         φ_fea at the input vertices.
     clearance : float
-        Distance within which a leg shuns the others.
+        Distance within which a leg avoids the others.
     """
 
     def __init__(

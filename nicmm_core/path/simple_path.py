@@ -1,8 +1,8 @@
 """A simple path through points in their order: several are laid, and the shortest is taken.
 
 Every leg goes round those laid before it, so which ones come first decides how often the path winds
-round itself. With many points in an order that jumps to and fro that is a matter of many times the
-length, and no rule finds the best.
+round itself. With many points in an order that jumps back and forth this changes the length many
+times over, and no rule finds the best.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .legs import CrossingError, Legs
 from .virtual_splits import SplitMesh
 
 STRAND_CLEARANCE = 0.1
-"""Distance, in square roots of the component's area, within which a path shuns earlier ones."""
+"""Distance, in square roots of the component's area, within which a path avoids earlier ones."""
 
 ROOMY = 25
 """Number of points above which that distance shrinks with the distance between the points."""

@@ -1,4 +1,4 @@
-"""The curve itself comes to rest on the input mesh.
+"""The curve itself is relaxed on the input mesh.
 
-`relaxing` is the way in; `warm_start` goes on from a curve that has been there.
+`relaxing` is the entry point; `warm_start` goes on from a curve that was relaxed before.
 """

@@ -25,7 +25,7 @@ class CurveSurface:
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-        Unit vectors. Their signs are of no account: every face reads them to its own side.
+        Unit vectors. Their signs are ignored: every face reads them to its own side.
     feature_map : (V,) float array or None
         φ_fea.
     feature_weight : float
@@ -77,7 +77,7 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
 def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
     """Vertices of faces that look away from the normal of one of their corners, ascending.
 
-    Or across it, as every face does from a normal that is none.
+    Or across it, as every face does where the normal is zero.
     """
     folded = np.zeros(len(mesh.vertices), dtype=bool)
     for block, facing in _facing(mesh, normals):

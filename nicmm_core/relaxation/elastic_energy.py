@@ -6,8 +6,8 @@ There |∇φ| = 1, the level-set term vanishes and the integrals over the surfac
 
 The length keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a
 circle in the plane neither grows nor shrinks, so that the balance has no length of its own. φ_fea
-is 1 where no map has a say, and there the curve is what it would be without any. τ_fea goes with
-the size of the surface, and is a few times τ on curves so short that this is more. An obstacle,
+is 1 outside all maps, and there the curve is what it would be without any. τ_fea scales with the
+size of the surface, and is a few times τ on curves so short that this is more. An obstacle,
 where φ_fea is more, adds to the tension. Along a lane it is less; there only where the curve runs
 counts and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of
 length. Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).

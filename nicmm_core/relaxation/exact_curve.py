@@ -422,7 +422,7 @@ def _drawn_stretches(
     last_face[passes] = crossings.faces[ends_at[passes] - 1]
     reverse = np.arange(len(crossings))[::-1]
     crossings = in_faces(mesh, crossings, came_from)[reverse]
-    # A way that got lost did not end beside its node, whose coordinates are then of no account.
+    # A trace that got lost did not end beside its node, whose coordinates are then ignored.
     node_points = in_faces(mesh, places[end], last_face)
     owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
     order = np.argsort(owner, kind="stable")

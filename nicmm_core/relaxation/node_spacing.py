@@ -86,7 +86,7 @@ def _runs_back(
 ) -> BoolArray:
     """Segments over folded faces against the way that the curve is heading, shape (s + 1,).
 
-    With one at the end that is none, so that it can be cut where the arc lengths are.
+    With a dummy at the end, so that it can be cut where the arc lengths are.
     """
     mesh = surface.mesh
     back = np.zeros(len(arc), dtype=bool)

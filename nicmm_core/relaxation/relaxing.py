@@ -1,17 +1,17 @@
-"""Bring a curve on the surface to rest: Levenberg–Marquardt steps on its own energy.
+"""Relax a curve on the surface by Levenberg–Marquardt steps on its own energy.
 
-A level set is as fine as its mesh, and two strands of it a few edges apart hold each other. What it
-settles is where the curve runs. From there nodes move on the surface until the energy of Eq. 6
-and 7, taken along the curve, rests (`elastic_energy`).
+A level set is as fine as its mesh, and two strands of it a few edges apart block each other. It
+decides where the curve runs. From there nodes move on the surface until the energy of Eq. 6 and 7,
+taken along the curve, converges (`elastic_energy`).
 
-Few nodes move far in a step, many draw finely; so the number of nodes rises by levels. An iteration
-is a few steps of the nodes, after which the curve is drawn, and strands push each other: a node
-whose stretch could not be drawn, or would cross another, stays for that iteration. So every state
-in between is a simple curve.
+Few nodes move far in a step, many resolve detail; so the number of nodes rises by levels. An
+iteration is a few steps of the nodes, after which the curve is traced, and strands push each other:
+a node whose segment could not be traced, or would cross another, stays for that iteration. So every
+state in between is a simple curve.
 
-A curve that is near its rest already, as one whose control point was dragged, may do without that:
-its nodes move freely, and it is drawn once they rest. If it then crosses itself, it is done again
-from the start with a simple curve throughout.
+A curve that has nearly converged, as one whose control point was dragged, may do without that: its
+nodes move freely, and it is traced once they have converged. If it then crosses itself, it is
+relaxed again from the start, simple throughout.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ class RelaxationConfig:
 GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, taut=30.0)
 """Where a map attracts: a lane has to be found while nodes are few, since many hardly move.
 
-Few nodes take long steps along the surface, and they do so until they rest. Such steps would blow a
-fold of the start up to a bow from lane to lane, at rest there but far from the lowest energy; under
-30 times the tension, which a lane still withstands, folds are pulled straight.
+Few nodes take long steps along the surface until they converge. Such steps would inflate a fold of
+the start to a bow from lane to lane, a local minimum far from the lowest energy; under 30 times the
+tension, which a lane still withstands, folds are pulled straight.
 """
 
 DAMPING_NODES = 128
@@ -121,7 +121,7 @@ DAMPING_FACTOR = 10.0
 """By which damping rises when a step does not lower the energy, and falls when one does."""
 
 RELEASES = 2
-"""Times in a level that nodes which could not follow are tried again when the others rest."""
+"""Times in a level that nodes which could not follow are tried again after convergence."""
 
 HELD_TRIES = 1
 """Times that an iteration is tried again without the nodes that could not follow."""
@@ -160,7 +160,7 @@ class Relaxed:
     curve : SurfaceCurve
         Simple.
     exact : ExactCurve
-        The same with the nodes that it came to rest with.
+        The same with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
     feature : float
@@ -190,7 +190,7 @@ def relax(
     config: RelaxationConfig,
     watch: Watch | None = None,
 ) -> Relaxed:
-    """Let a curve come to rest.
+    """Relax a curve.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ class _Relaxation:
         self.drawn: ExactCurve | None = None  # the last state, if it is stopped at once
 
     def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
-        """Bring a curve to rest level by level; None where it could not be drawn there."""
+        """Relax a curve level by level; None where it could not be traced."""
         config = self.config
         cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
         last_iteration = self.iterations + cap
@@ -375,7 +375,7 @@ class _Relaxation:
             if done is None or before - done.energy <= least * scale:
                 if releases == RELEASES or not held.any():
                     break
-                # At rest with nodes that once could not follow: perhaps they can now.
+                # Converged with nodes that once could not follow: perhaps they can now.
                 releases, damping = releases + 1, least_damping
                 held = np.zeros(len(held), dtype=bool)
             moved = done is not None and done.farthest > SMALL_MOVE

@@ -18,9 +18,9 @@ from .relaxing import RelaxationConfig
 WARM = RelaxationConfig(
     levels=(512,), steps=1, longest_move=4.0, least_decrease=1e-3, drawn_at_rest=True
 )
-"""Relaxation from there: the curve is fine already and near its rest.
+"""Relaxation from there: the curve has enough nodes and has nearly converged.
 
-Nothing is drawn on the way, so that an iteration is one step.
+Nothing is traced on the way, so that an iteration is one step.
 """
 
 LONGEST_MOVE = 0.1

@@ -1,4 +1,4 @@
-"""The manifold that curves are computed on where a mesh is none; the mesh itself stays as it is.
+"""The manifold that curves are computed on where a mesh is not one; the mesh is not changed.
 
 - Of faces with the same three corners only the first is there.
 - Where more than two faces share an edge they are joined two by two, and what is left over is cut

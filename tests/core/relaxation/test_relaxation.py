@@ -1,4 +1,4 @@
-"""Curves come to rest: at known shapes, simple, through their points, and never worse."""
+"""Curves converge: to known shapes, simple, through their points, and never worse."""
 
 from dataclasses import replace
 
