@@ -16,6 +16,8 @@ from . import mesh_data
 from .mesh_data import InputError
 
 KEY = "nicmm_curve"
+VERSION = 1
+"""Of the record's format. Those of version 0.1.0 have none and count as 0."""
 DESIGNED_ON = "nicmm_designed_on"
 
 
@@ -49,6 +51,7 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
     else:
         control_faces, control_barycentric = controls.faces, controls.barycentric
     curve_object[KEY] = {
+        "version": VERSION,
         "mesh": mesh_object,
         "vertices": len(surface.local),
         "counts": [len(curve.faces) for curve in curves],
@@ -80,6 +83,17 @@ def digest(mesh_object, surface, asked: Asked) -> str:
 def is_current(curve_object, now: str) -> bool:
     """Whether a curve was designed on what has this digest."""
     return curve_object.data.get(DESIGNED_ON) == now
+
+
+def _readable(curve_object):
+    """The record of a curve, of a version that is known here."""
+    record = curve_object[KEY]
+    if record.get("version", 0) > VERSION:
+        raise InputError(
+            f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
+            "Update the extension to go on with it"
+        )
+    return record
 
 
 def has_record(candidate) -> bool:
@@ -157,7 +171,7 @@ def recall(curve_object, surface) -> list:
     """The curves of the core that an object remembers, on the mesh as it is now."""
     from .. import nicmm_core as nicmm
 
-    record = curve_object[KEY]
+    record = _readable(curve_object)
     faces, barycentric = _recalled(record, "corners", "barycentric", surface)
     if (faces < 0).any():
         raise InputError(
@@ -186,7 +200,7 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     """
     from .. import nicmm_core as nicmm
 
-    record = curve_object[KEY]
+    record = _readable(curve_object)
     if "control_corners" not in record:  # drawn before these were remembered
         (curve,) = recall(curve_object, surface)
         index = curve.control_index

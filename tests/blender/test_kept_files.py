@@ -1,0 +1,142 @@
+"""Files that earlier versions have saved: their curves are there, are edited and updated."""
+
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender import scenes
+
+KEPT = Path(__file__).parent / "kept"
+FILES = sorted(KEPT.glob("*.blend"))
+CURVES = ("Closed", "Open", "Maps", "Variational", "Sticky", "Tube", "Placed")
+ROUNDING = 2e-6
+
+
+def module(extension, name):
+    return import_module(f"{extension.name}.nicmm_blender.{name}")
+
+
+@pytest.fixture(params=FILES, ids=lambda path: path.stem)
+def kept(request, extension):
+    bpy.ops.wm.open_mainfile(filepath=str(request.param))
+    return extension
+
+
+def drawn(curve):
+    """Positions of the points of either kind of object, in its own space."""
+    if curve.type == "CURVE":
+        return scenes.points(curve)
+    return scenes.get(curve.data.points, "position", 3).astype(float)
+
+
+def controls(extension, curve):
+    surface = module(extension, "mesh_data").triangles(bpy.data.objects["Body"])
+    points, positions = module(extension, "curve_record").recall_controls(curve, surface)
+    assert (points.faces >= 0).all()
+    return positions
+
+
+def test_there_are_some():
+    assert "0.1.0" in [path.stem for path in FILES]
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_a_curve_is_recalled_as_it_was_drawn(kept, name):
+    record = module(kept, "curve_record")
+    body, curve = bpy.data.objects["Body"], bpy.data.objects[name]
+    assert record.has_record(curve) and record.mesh_of(curve) == body
+    surface = module(kept, "mesh_data").triangles(body)
+    (recalled,) = record.recall(curve, surface)
+    np.testing.assert_allclose(drawn(curve), recalled.points, atol=ROUNDING)
+    asked = record.asked_of(curve)
+    assert asked.closed == recalled.closed == (name not in ("Open", "Tube"))
+    assert record.is_current(curve, record.digest(body, surface, asked))
+    at_controls = recalled.points[recalled.control_index]
+    np.testing.assert_allclose(controls(kept, curve), at_controls, atol=ROUNDING)
+
+
+def test_what_curves_were_asked_for(kept):
+    asked = {name: module(kept, "curve_record").asked_of(bpy.data.objects[name]) for name in CURVES}
+    assert asked["Open"].smoothness == 2.0
+    assert asked["Variational"].method == "VARIATIONAL"
+    assert (asked["Maps"].obstacle_group, asked["Maps"].alignment_group) == ("Wall", "Lane")
+    assert asked["Maps"].clearance == pytest.approx(0.05)
+    panel = bpy.context.scene.nicmm_curves
+    assert (panel.smoothness, panel.obstacle_group) == (3.0, "Wall")
+
+
+def test_curves_are_updated_on_the_mesh_as_it_is_now(kept):
+    body = bpy.data.objects["Body"]
+    scenes.activate(body)
+    before = {name: drawn(bpy.data.objects[name]) for name in CURVES}
+    place = scenes.positions(body)
+    place[:, 2] += 0.2 * place[:, 0] ** 2
+    body.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
+    body.data.update()
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    for name in CURVES:
+        curve = bpy.data.objects[name]
+        now = drawn(curve)
+        assert abs(now[:, 2].max() - before[name][:, 2].max()) > 0.01
+        assert scenes.distances_to(controls(kept, curve), now).max() < ROUNDING
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_a_curve_is_edited_in_place(kept, name):
+    curve = bpy.data.objects[name]
+    scenes.activate(curve)
+    before, at = drawn(curve), controls(kept, curve)
+    assert bpy.ops.nicmm.edit_curve(smoothness=0.1) == {"FINISHED"}
+    assert bpy.context.active_object == curve
+    assert module(kept, "curve_record").asked_of(curve).smoothness == pytest.approx(0.1)
+    assert scenes.distances_to(at, drawn(curve)).max() < ROUNDING
+    assert len(drawn(curve)) != len(before) or not np.allclose(drawn(curve), before)
+
+
+@pytest.mark.parametrize(("name", "output"), [("Closed", "STICKY"), ("Sticky", "CURVE")])
+def test_a_curve_is_converted(kept, name, output):
+    curve = bpy.data.objects[name]
+    scenes.activate(curve)
+    before = drawn(curve)
+    assert bpy.ops.nicmm.convert_curve(output=output, keep_original=True) == {"FINISHED"}
+    np.testing.assert_allclose(drawn(bpy.context.active_object), before, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", ["Sticky", "Tube"])
+def test_sticky_curves_follow_the_mesh(kept, name):
+    body, curve = bpy.data.objects["Body"], bpy.data.objects[name]
+    place = scenes.positions(body)
+    body.data.vertices.foreach_set("co", (place * [1.0, 1.0, 2.0]).astype(np.float32).ravel())
+    body.data.update()
+    bpy.context.view_layer.update()
+    if name == "Sticky":
+        at = scenes.evaluated_points(curve)
+        np.testing.assert_allclose(at, drawn(curve) * [1.0, 1.0, 2.0], atol=1e-5)
+    else:
+        evaluated = curve.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert evaluated.evaluated_geometry().mesh is not None
+
+
+def test_outputs_that_changed_their_mesh(kept):
+    edges = bpy.data.objects["Edges"].data.edges
+    assert sum(edge.use_seam for edge in edges) > 20
+    assert sum(edge.use_edge_sharp for edge in edges) > 20
+    assert "Region" in bpy.data.objects["Group"].vertex_groups
+    assert ".sculpt_face_set" in bpy.data.objects["Face Set"].data.attributes
+    assert "Objects.001" in bpy.data.objects
+    loose = bpy.data.objects["Loose"]
+    assert not any(edge.is_loose for edge in loose.data.edges)
+    assert len(loose.data.vertices) > len(bpy.data.objects["Body"].data.vertices)
+
+
+def test_a_record_of_a_newer_version_says_so(kept):
+    curve = bpy.data.objects["Closed"]
+    record = curve["nicmm_curve"].to_dict()
+    curve["nicmm_curve"] = {**record, "version": 99}
+    scenes.activate(curve)
+    with pytest.raises(RuntimeError, match="newer version of NICMM Curves"):
+        bpy.ops.nicmm.convert_curve(output="STICKY")
+    assert bpy.data.objects["Closed"] == curve
