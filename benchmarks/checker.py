@@ -350,8 +350,10 @@ def _contacts_in_faces(
             point, place = chords[names[other], which], ends[other][which]
             # Chords that follow one another share a point, which says nothing.
             shared = (point[:, None] == chords[chord]).any(axis=1)
-            side = np.where(shared, 0, _side(start, end, place))
-            for pair in np.flatnonzero((side == 0) & ~shared):
+            apart = np.flatnonzero(~shared)
+            side = np.zeros(len(pairs), dtype=np.int64)
+            side[apart] = _side(start[apart], end[apart], place[apart])
+            for pair in apart[side[apart] == 0]:
                 if _between(place[pair], start[pair], end[pair]):
                     touching.add((int(point[pair]), int(chord[pair])))
             sides.append(side)
