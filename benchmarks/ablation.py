@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nicmm_core.design_result import is_one_curve
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork

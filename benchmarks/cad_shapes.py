@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.geometry.mesh import Mesh
 
 PIECES = 36
 """Edges along the longest side of a body, about."""

@@ -13,7 +13,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import FloatArray, IntArray
 
 from . import report
 from .defects import defective_meshes

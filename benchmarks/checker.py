@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import BoolArray, FloatArray, IntArray
+from nicmm_core.geometry.array_types import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-12
 """Of sums of barycentric coordinates, and of control points in bounding-box diagonals."""

@@ -8,8 +8,8 @@ from pathlib import Path
 import igl
 
 from nicmm_core import shapes
-from nicmm_core.files import MESH_FORMATS, read_mesh
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.io.files import MESH_FORMATS, read_mesh
 
 from .scale import Scale
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import IntArray
-from nicmm_core.files import read_mesh
-from nicmm_core.surface_points import locate_points
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.surface_points import locate_points
+from nicmm_core.io.files import read_mesh
 
 from . import collections, report
 from .checker import judge

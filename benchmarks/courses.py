@@ -13,8 +13,8 @@ from collections import defaultdict
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve, curve_on_mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve, curve_on_mesh
 
 from . import collections, report
 from .measures import distances

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import IntArray
-from nicmm_core.mesh import unique_edges
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.mesh import unique_edges
 
 from . import collections, report
 from .samples import point_sets

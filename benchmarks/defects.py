@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.mesh import Mesh
 
 SEED = 0
 

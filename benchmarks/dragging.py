@@ -11,8 +11,8 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.array_types import IntArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
 from .checker import judge

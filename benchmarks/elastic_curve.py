@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve, geodesic_curvature
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve, geodesic_curvature
+from nicmm_core.geometry.mesh import Mesh
 
 from .polylines import NearestPoints
 

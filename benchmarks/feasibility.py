@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import BoolArray, FloatArray, IntArray
+from nicmm_core.geometry.array_types import BoolArray, FloatArray, IntArray
 
 SAME_PLACE = 1e-9
 """Distance, in bounding-box diagonals, up to which two points are one."""

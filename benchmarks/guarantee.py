@@ -16,7 +16,7 @@ from multiprocessing import get_context
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import FloatArray, IntArray
 
 from . import collections, plots, report
 from .checker import Verdict, judge

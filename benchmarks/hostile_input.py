@@ -19,11 +19,11 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.files import MESH_FORMATS, read_mesh, write_curve, write_mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.surface_points import locate_control_points
+from nicmm_core.io.files import MESH_FORMATS, read_mesh, write_curve, write_mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.weights_file import SHIPPED, load_weights
-from nicmm_core.surface_points import locate_control_points
 
 from .checker import judge
 from .untyped import place_of

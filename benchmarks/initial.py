@@ -9,17 +9,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray
-from nicmm_core.curve import SurfaceCurve
 from nicmm_core.design_result import is_one_curve
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.features import BASE_CHANNELS
 from nicmm_core.level_set.problem import Problem, build_problem
 from nicmm_core.level_set.signed_distance import heat_distance
-from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import DISTANCE_CHANNEL
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
-from nicmm_core.surface_points import locate_control_points
 
 from . import collections, plots, renders, report
 from .polylines import initial_path

@@ -11,13 +11,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve, resample
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve, resample
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.level_set.features import vertex_normals
-from nicmm_core.mesh import Mesh
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.exact_curve import shifted
-from nicmm_core.surface_points import SurfacePoints
 
 from . import collections, report
 from .checker import judge

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nicmm_core.array_types import FloatArray
-from nicmm_core.curve import SurfaceCurve, geodesic_curvature, resample
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.geometry.curve import SurfaceCurve, geodesic_curvature, resample
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import vertex_normals
-from nicmm_core.mesh import Mesh
 
 SAMPLES = 128
 """Evenly spaced points of a curve that curvature is taken at.

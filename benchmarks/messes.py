@@ -20,7 +20,7 @@ from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import FloatArray, IntArray
 
 from . import report
 from .checker import judge

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.level_set.guidance import BASELINE
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.losses import LossWeights, balanced
 from nicmm_core.level_set.problem import build_problem
+from nicmm_core.maps.guidance import BASELINE
 from nicmm_core.network.forward_pass import NetworkWeights
 from nicmm_core.network.trainable_network import build_network
 from nicmm_core.network.training_maps import random_maps
 from nicmm_core.network.weights_file import shipped_weights
-from nicmm_core.surface_points import locate_control_points
 
 from . import collections, report
 from .samples import random_sets

@@ -8,9 +8,9 @@ from collections import Counter
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
 from .checker import judge

@@ -11,7 +11,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.design_result import is_one_curve
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report
 from .measures import bending

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nicmm_core.array_types import FloatArray
-from nicmm_core.curve import SurfaceCurve
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.level_set.losses import LossWeights
 from nicmm_core.network.prediction import BAND_WIDTH, predict
 from nicmm_core.network.trainable_network import CurveNetwork, load_network

@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

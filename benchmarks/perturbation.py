@@ -5,8 +5,8 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.mesh import Mesh
 
 LEAST_FRACTION, GREATEST_FRACTION = 0.5, 0.9
 """[s_min, s_max]: displacements relative to the opposite edge, which the paper does not give.

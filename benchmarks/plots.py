@@ -15,7 +15,7 @@ from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: E402
 
-from nicmm_core.array_types import FloatArray  # noqa: E402
+from nicmm_core.geometry.array_types import FloatArray  # noqa: E402
 
 METHOD_COLOURS = {
     "nicmm-paper": "tab:orange",

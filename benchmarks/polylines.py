@@ -6,11 +6,11 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve, curve_on_mesh
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve, curve_on_mesh
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.level_set.problem import Problem
-from nicmm_core.mesh import Mesh
 
 PARTS_OF_A_SEGMENT = 16
 """Places on each segment that its distance to the surface is taken at."""

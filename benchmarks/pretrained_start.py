@@ -18,12 +18,12 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import BASE_CHANNELS
 from nicmm_core.level_set.problem import Problem
 from nicmm_core.level_set.solution import Solution
 from nicmm_core.level_set.zero_set import ZeroSet, zero_set
-from nicmm_core.mesh import Mesh
 from nicmm_core.network import single_pass
 from nicmm_core.network.forward_pass import NetworkWeights
 from nicmm_core.network.single_pass import predict_once

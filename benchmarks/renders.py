@@ -16,10 +16,10 @@ import bmesh
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
-from nicmm_core.array_types import FloatArray
-from nicmm_core.curve import SurfaceCurve, resample
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.geometry.curve import SurfaceCurve, resample
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import vertex_normals
-from nicmm_core.mesh import Mesh
 
 from . import plots
 from .polylines import NearestPoints

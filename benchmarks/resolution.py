@@ -11,10 +11,10 @@ from matplotlib.ticker import NullLocator
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.array_types import IntArray
-from nicmm_core.curve import SurfaceCurve
 from nicmm_core.design_result import is_one_curve
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, plots, renders, report
 from .measures import bending, distances

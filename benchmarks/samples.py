@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from nicmm_core.array_types import IntArray
-from nicmm_core.mesh import Mesh
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.mesh import Mesh
 
 FEWEST_POINTS, MOST_POINTS = 3, 5
 """Of a set, as in the paper's section 4.1."""

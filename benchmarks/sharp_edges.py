@@ -10,12 +10,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.face_walks import moved
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.level_set.redistancing import distance_to_segments
-from nicmm_core.mesh import Mesh
-from nicmm_core.relaxation.face_walks import moved
-from nicmm_core.surface_points import SurfacePoints
 
 from . import collections, report
 from .cad_shapes import cad_shapes

@@ -12,19 +12,19 @@ import numpy as np
 import torch
 
 import nicmm_core as nicmm
-from nicmm_core.array_types import FloatArray, IntArray
-from nicmm_core.curve import SurfaceCurve
+from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.contour import extract_curves
 from nicmm_core.level_set.losses import LossWeights, balanced
 from nicmm_core.level_set.problem import Problem, build_problem
 from nicmm_core.level_set.zero_set import zero_set
-from nicmm_core.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.path.band_refinement import PIECES
-from nicmm_core.surface_points import locate_control_points
 
 from . import plots, report
 from .measures import diagonal, distances

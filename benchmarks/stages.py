@@ -16,10 +16,10 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
-from nicmm_core.array_types import IntArray
 from nicmm_core.coarsening import coarse_start
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set import problem, zero_set
-from nicmm_core.mesh import Mesh
 from nicmm_core.network import single_pass
 
 from . import report

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nicmm_core.array_types import FloatArray
+from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.level_set.variational import VariationalConfig, solve
 
 from . import collections, plots, report

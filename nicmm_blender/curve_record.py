@@ -218,7 +218,7 @@ def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
     mesh of the surface, where there is one already.
     """
     from .. import nicmm_core as nicmm
-    from ..nicmm_core.surface_points import nearest_points
+    from ..nicmm_core.geometry.surface_points import nearest_points
 
     points, positions = recall_controls(curve_object, surface)
     lost = points.faces < 0

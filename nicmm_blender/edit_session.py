@@ -142,7 +142,7 @@ class EditSession:
 
     def set_points(self, positions: np.ndarray) -> None:
         """Replace all points by places on the surface in the object's own space, (k, 3)."""
-        from ..nicmm_core.surface_points import locate_points
+        from ..nicmm_core.geometry.surface_points import locate_points
 
         solved = positions @ self.surface.linear.T
         points = locate_points(self.designer.mesh, solved, "points")
@@ -363,7 +363,7 @@ class EditSession:
 
 def _with_point(nicmm, mesh, curve, segment: int, share: float):
     """A curve with one more control point on a segment, and the number of that."""
-    from ..nicmm_core.surface_points import nearest_points
+    from ..nicmm_core.geometry.surface_points import nearest_points
 
     start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
     place = ((1.0 - share) * start + share * end)[None]

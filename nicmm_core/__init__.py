@@ -3,7 +3,6 @@
 The main path is `design.design_curve`; `design.py` names the stages in order.
 """
 
-from .curve import SurfaceCurve
 from .design import Designer, design_curve
 from .design_result import Design, Status
 from .errors import (
@@ -15,7 +14,10 @@ from .errors import (
     NicmmError,
     UnreachableError,
 )
-from .feature_maps import (
+from .geometry.curve import SurfaceCurve
+from .geometry.mesh import Mesh
+from .geometry.surface_points import SurfacePoints
+from .maps.feature_maps import (
     curvature_map,
     edge_map,
     principal_curvatures,
@@ -23,11 +25,9 @@ from .feature_maps import (
     sharp_edges,
     value_map,
 )
-from .mesh import Mesh
 from .outputs.cut import CutMesh, cut_mesh
 from .outputs.parts import PartedMesh, part_mesh
 from .outputs.region import Region, enclosed_region
-from .surface_points import SurfacePoints
 
 __all__ = [
     "ArgumentError",

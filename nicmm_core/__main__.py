@@ -9,11 +9,11 @@ from pathlib import Path
 
 from . import Status, design_curve
 from .arguments import METHODS
-from .array_types import FloatArray
 from .errors import ArgumentError, NicmmError
-from .feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
-from .files import check_curve_path, read_mesh, write_curve, write_mesh
-from .mesh import Mesh
+from .geometry.array_types import FloatArray
+from .geometry.mesh import Mesh
+from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
+from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
 from .path.initial_loop import ORDERS
 from .path.via_points import parse_via_points
 

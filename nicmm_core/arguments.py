@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .array_types import FloatArray
 from .errors import ArgumentError, MissingPackageError
-from .mesh import Mesh, real_array
+from .geometry.array_types import FloatArray
+from .geometry.mesh import Mesh, real_array
 from .path.initial_loop import ORDERS
 
 METHODS = ("nicmm", "nicmm-paper", "variational")

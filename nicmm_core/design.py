@@ -31,11 +31,12 @@ from .arguments import (
     checked_map,
     checked_smoothness,
 )
-from .array_types import FloatArray
-from .curve import SurfaceCurve
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, CurveError, UnreachableError
-from .mesh import Mesh
+from .geometry.array_types import FloatArray
+from .geometry.curve import SurfaceCurve
+from .geometry.mesh import Mesh
+from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
 from .outputs.chain import checked_curve
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
@@ -44,7 +45,6 @@ from .repair.mapped_mesh import MappedMesh
 from .repaired_surface import RepairedSurface, design_on_original
 from .request import Request
 from .surface_designer import SurfaceDesigner
-from .surface_points import SurfacePoints, check_connected, locate_control_points
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices only, "

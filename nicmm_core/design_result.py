@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
 
-from .array_types import FloatArray
-from .curve import SurfaceCurve
 from .errors import CurveError
+from .geometry.array_types import FloatArray
+from .geometry.curve import SurfaceCurve
 
 
 class Status(enum.Enum):

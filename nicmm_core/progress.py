@@ -18,7 +18,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
-from .array_types import FloatArray
+from .geometry.array_types import FloatArray
 
 Progress = Callable[[float, FloatArray], object]
 """Called with the fraction done and the points of the curve so far, (n, 3); False stops."""

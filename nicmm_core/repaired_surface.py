@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from .array_types import FloatArray, IntArray
 from .design_result import Design
-from .mesh import Mesh
+from .geometry.array_types import FloatArray, IntArray
+from .geometry.mesh import Mesh
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import REPAIRS, repaired
 from .request import Request

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .array_types import FloatArray
+from .geometry.array_types import FloatArray
+from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
-from .surface_points import SurfacePoints
 
 
 @dataclass(frozen=True)

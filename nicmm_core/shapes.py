@@ -10,8 +10,8 @@ import igl
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
-from .array_types import FloatArray, IntArray
-from .mesh import Mesh
+from .geometry.array_types import FloatArray, IntArray
+from .geometry.mesh import Mesh
 
 
 def sphere(subdivisions: int = 4) -> Mesh:

@@ -11,17 +11,17 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from .array_types import FloatArray, IntArray
 from .coarsening.coarse_start import CoarseStarts
-from .curve import SurfaceCurve
 from .design_result import STATUS, Design, Status
+from .geometry.array_types import FloatArray, IntArray
+from .geometry.curve import SurfaceCurve
+from .geometry.mesh import Mesh
 from .level_set import variational
-from .level_set.guidance import component_unit, feature_map
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
-from .mesh import Mesh
+from .maps.guidance import component_unit, feature_map
 from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve

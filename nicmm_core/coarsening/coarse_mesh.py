@@ -18,13 +18,13 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from .. import tolerances
-from ..array_types import FloatArray, IntArray
 from ..errors import MeshError, UnreachableError
-from ..mesh import Mesh, edge_lengths
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh, edge_lengths
+from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..repair.degenerate_faces import flat_faces, with_areas
-from ..surface_points import SurfacePoints, nearest_points
 
 CANDIDATES = 8
 """Vertices that seeds are chosen from, for each seed."""

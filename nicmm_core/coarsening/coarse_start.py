@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve
 from ..errors import NicmmError
-from ..mesh import Mesh
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import predicted
 from ..progress import part
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request
-from ..surface_points import SurfacePoints, locate_control_points
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .lifting import lifted
 

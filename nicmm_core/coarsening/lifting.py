@@ -14,14 +14,14 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..array_types import IntArray
-from ..curve import SurfaceCurve
-from ..mesh import Mesh, unique_edges
+from ..geometry.array_types import IntArray
+from ..geometry.curve import SurfaceCurve
+from ..geometry.face_walks import strictly_inside
+from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
-from ..relaxation.face_walks import strictly_inside
-from ..surface_points import SurfacePoints, nearest_points
 from .coarse_mesh import CoarseMesh
 
 NODES = (256, 512, 128)

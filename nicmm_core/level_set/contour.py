@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve, curve_on_mesh
-from ..mesh import Mesh
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.mesh import Mesh
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint
 from .sign_bundle import SignBundle, local_signs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 
 BASE_CHANNELS = 8

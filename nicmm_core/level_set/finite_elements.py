@@ -8,9 +8,9 @@ import igl
 import numpy as np
 from scipy import sparse
 
-from ..array_types import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
-from ..mesh import triangle_areas
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import triangle_areas
 from ..progress import checkpoint
 from .sign_bundle import SignBundle, corner_matrix
 from .sparse_solver import DEGENERATE

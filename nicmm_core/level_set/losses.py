@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ..array_types import Array
+from ..geometry.array_types import Array
 from .problem import Problem
 
 Operator = Callable[[Array], Array]

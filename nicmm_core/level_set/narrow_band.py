@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from .losses import (
     DELTA_WIDTH,
     LossWeights,

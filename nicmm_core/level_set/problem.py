@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..array_types import BoolArray, FloatArray
 from ..errors import MeshError
-from ..mesh import Mesh
+from ..geometry.array_types import BoolArray, FloatArray
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
+from ..maps.guidance import component_unit, feature_map
 from ..path.band_refinement import PIECES
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint, part
 from ..request import Request
-from ..surface_points import SurfacePoints
 from .features import control_indicator, in_principal_frame, input_features, vertex_normals
 from .finite_elements import FiniteElements, build_finite_elements
-from .guidance import component_unit, feature_map
 from .sign_bundle import SignBundle, build_sign_bundle
 from .signed_distance import bounding_side, signed_distance
 from .smoothing import Smoother, build_smoother

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..progress import checkpoint
 from .contour import segment_ends, signs_with_zeros
 from .sign_bundle import SignBundle

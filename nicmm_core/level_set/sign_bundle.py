@@ -21,7 +21,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..array_types import IntArray
+from ..geometry.array_types import IntArray
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 from .finite_elements import FiniteElements
 from .sparse_solver import Factors, factorise

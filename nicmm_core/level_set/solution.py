@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..array_types import FloatArray
+from ..geometry.array_types import FloatArray
 
 
 @dataclass(frozen=True)

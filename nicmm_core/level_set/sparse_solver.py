@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph, linalg
 
-from ..array_types import FloatArray, IntArray
 from ..errors import MeshError
+from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 
 DEGENERATE = (

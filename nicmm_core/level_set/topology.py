@@ -16,7 +16,7 @@ from collections import deque
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint

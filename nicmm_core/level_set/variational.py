@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..array_types import BoolArray, FloatArray
+from ..geometry.array_types import BoolArray, FloatArray
 from ..progress import checkpoint
 from .losses import LossWeights, energy_surface, loss_terms
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system

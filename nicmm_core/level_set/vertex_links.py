@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..array_types import IntArray
+from ..geometry.array_types import IntArray
 from ..path.virtual_splits import WorkingMesh
 from .sign_bundle import SignBundle
 

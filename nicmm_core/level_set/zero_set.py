@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..array_types import FloatArray
-from ..crossings import crossing_segments
-from ..curve import SurfaceCurve
 from ..design_result import is_one_curve
-from ..mesh import Mesh
+from ..geometry.array_types import FloatArray
+from ..geometry.crossings import crossing_segments
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from ..path.leg_search import length_factor
-from ..surface_points import SurfacePoints
 from .contour import extract_curves
 from .problem import Problem
 from .topology import keep_topology

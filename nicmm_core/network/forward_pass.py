@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..array_types import Array
+from ..geometry.array_types import Array
 from ..progress import checkpoint
 
 POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)

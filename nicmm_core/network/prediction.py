@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..array_types import FloatArray
+from ..geometry.array_types import FloatArray
 from ..level_set.losses import (
     EnergySurface,
     LossWeights,

@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..array_types import FloatArray, IntArray
 from ..errors import ArgumentError, UnreachableError
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import locate_control_points
 from ..level_set.features import BASE_CHANNELS
 from ..level_set.losses import EnergySurface, LossWeights, balanced, loss_terms, total_loss
 from ..level_set.problem import Problem, build_problem
-from ..mesh import Mesh
-from ..surface_points import locate_control_points
 from .forward_pass import (
     DISTANCE_CHANNEL,
     NORMAL_CHANNELS,

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.mesh import Mesh
 from ..level_set.losses import energy_surface, loss_terms
 from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
-from ..mesh import Mesh
 from ..path.band_refinement import PIECES_TO_START
 from ..progress import part
 from ..request import Request

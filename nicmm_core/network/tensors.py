@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..array_types import FloatArray
+from ..geometry.array_types import FloatArray
 from ..level_set.losses import EnergySurface, energy_surface
 from ..level_set.problem import Problem
 from . import single_pass

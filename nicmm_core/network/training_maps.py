@@ -6,8 +6,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..array_types import FloatArray, IntArray
-from ..mesh import Mesh
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh
 
 BESIDE = 0.12
 """Farthest that the ends of a lane lie from the way between two control points, in √area."""

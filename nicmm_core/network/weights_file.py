@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..array_types import Array
 from ..errors import ArgumentError
+from ..geometry.array_types import Array
 from ..level_set.features import BASE_CHANNELS
 from .forward_pass import NetworkConfig, NetworkWeights, parameter_shapes
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..curve import SurfaceCurve
 from ..errors import CurveError
-from ..mesh import Mesh
-from ..tolerances import BARYCENTRIC_SUM, TINY
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh
+from ..geometry.tolerances import BARYCENTRIC_SUM, TINY
 
 ROUNDING = 1e-12
 """Barycentric coordinates up to this are zeros that came out of a computation."""

@@ -13,11 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve
 from ..errors import ArgumentError, CurveError
-from ..mesh import Mesh
-from ..surface_points import SurfacePoints
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from .chain import ROUNDING, Chain, build_chain, checked_curve, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..array_types import BoolArray, FloatArray, IntArray
 from ..errors import ControlPointError, CurveError
-from ..mesh import Mesh
-from ..sides import two_sides
-from ..surface_points import SurfacePoints, locate_points
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.sides import two_sides
+from ..geometry.surface_points import SurfacePoints, locate_points
 from .cut import CutMesh
 from .shared_sides import shared_sides
 

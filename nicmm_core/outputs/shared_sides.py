@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..array_types import BoolArray, IntArray
+from ..geometry.array_types import BoolArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from fractions import Fraction
 
-from ..array_types import FloatArray
+from ..geometry.array_types import FloatArray
 
 SURE = 1e-13
 """Determinants of barycentric coordinates above this have the right sign in double precision."""

@@ -12,7 +12,7 @@ import heapq
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..array_types import BoolArray, FloatArray
+from ..geometry.array_types import BoolArray, FloatArray
 from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 

@@ -15,11 +15,11 @@ import igl
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve, curve_on_mesh
 from ..errors import ArgumentError, UnreachableError
-from ..mesh import Mesh
-from ..surface_points import SurfacePoints
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
 from .simple_path import lay_path

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..by_parts import components, grouped
-from ..mesh import Mesh, side_keys
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.by_parts import components, grouped
+from ..geometry.mesh import Mesh, side_keys
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]

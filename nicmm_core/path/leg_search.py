@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh, unique_edges
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh, unique_edges
 from ..progress import checkpoint
 from .leg_graph import Node, Patch, pinched_vertices
 from .virtual_splits import SplitMesh

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
 from ..errors import UnreachableError
+from ..geometry.array_types import FloatArray, IntArray
 from .leg_graph import Node
 from .leg_search import Leg, LegSearch, Obstacles
 from .virtual_splits import SplitMesh

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
 from ..errors import UnreachableError
-from ..mesh import Mesh
-from ..surface_points import SurfacePoints
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from .leg_search import LegSearch
 from .legs import CrossingError, Legs
 from .virtual_splits import SplitMesh

@@ -12,10 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..array_types import BoolArray, IntArray
 from ..errors import ArgumentError
-from ..mesh import Mesh
-from ..surface_points import SurfacePoints, check_distinct, check_one_component, locate_points
+from ..geometry.array_types import BoolArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import (
+    SurfacePoints,
+    check_distinct,
+    check_one_component,
+    locate_points,
+)
 
 ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
 """From the index of a control point to the points on the way from there to the next one."""

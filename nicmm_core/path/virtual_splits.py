@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh, triangle_areas, unique_edges
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh, triangle_areas, unique_edges
+from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
 
 Weights = dict[int, float]
 """A point of the surface as input vertices and their weights; absent vertices weigh exactly 0."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
-from ..curve import SurfaceCurve
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.sides import two_sides
 from ..level_set.redistancing import build_distance_surface, distance_to_segments, spread
-from ..mesh import Mesh, unique_edges
-from ..sides import two_sides
 
 
 def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:

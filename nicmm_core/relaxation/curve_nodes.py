@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..by_parts import FACES, parts
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.by_parts import FACES, parts
+from ..geometry.mesh import Mesh, unoriented_vertices
+from ..geometry.surface_points import SurfacePoints
 from ..level_set.features import vertex_normals
-from ..mesh import Mesh, unoriented_vertices
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from .curve_nodes import CurveSurface, Nodes, after_each, before_each, cross, dot
 from .strand_contact import contacts_between
 

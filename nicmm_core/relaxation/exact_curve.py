@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..crossings import crossing_segments
-from ..curve import SurfaceCurve, curve_on_mesh
-from ..mesh import Mesh
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.crossings import crossing_segments
+from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.face_walks import join, moved, strictly_inside
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .face_walks import join, moved, strictly_inside
 from .node_spacing import arc_lengths, node_arcs
 
 DETOUR = 1.5

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
 from .curve_nodes import CurveSurface
 
 FEWEST_OF_A_LEG = 6

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..curve import SurfaceCurve
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.curve import SurfaceCurve
 from ..progress import CancelledError
 from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (

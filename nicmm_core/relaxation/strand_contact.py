@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import tolerances
-from ..array_types import FloatArray, IntArray
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
 from .curve_nodes import Nodes
 
 CLEARANCE = 2.0

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import FloatArray, IntArray
-from ..surface_points import SurfacePoints
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .exact_curve import ExactCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig

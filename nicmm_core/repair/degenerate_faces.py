@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..by_parts import FACES, components, parts
-from ..mesh import edge_lengths, unique_edges
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.by_parts import FACES, components, parts
+from ..geometry.mesh import edge_lengths, unique_edges
 from ..progress import checkpoint
 
 ATTEMPTS = 4

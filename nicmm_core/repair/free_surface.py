@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..array_types import BoolArray, FloatArray, IntArray
 from ..errors import UnreachableError
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
 from ..level_set.redistancing import build_distance_surface, spread
-from ..surface_points import SurfacePoints
 from .mapped_mesh import MappedMesh
 from .nonmanifold import welded_vertices
 

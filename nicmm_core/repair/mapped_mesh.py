@@ -13,13 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import FloatArray, IntArray
-from ..by_parts import grouped
-from ..curve import SurfaceCurve, curve_on_mesh
-from ..mesh import Mesh
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.by_parts import grouped
+from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
 from .strand_separation import separated
 
 Holding = list[SurfacePoints]

@@ -18,10 +18,10 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import FloatArray, IntArray
-from ..by_parts import components, distinct_rows, grouped
-from ..mesh import Mesh
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.by_parts import components, distinct_rows, grouped
+from ..geometry.mesh import Mesh
 from ..progress import checkpoint
 from .degenerate_faces import flat_faces, with_areas
 from .edge_subdivision import SubdividedFaces, subdivided

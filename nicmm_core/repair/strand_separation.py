@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
-from ..crossings import crossing_segments
-from ..mesh import Mesh
-from ..surface_points import SurfacePoints
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.crossings import crossing_segments
+from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 
 REACH = 0.05
 """Greatest distance from a vertex at which a strand passes beside it, in lengths of edges."""

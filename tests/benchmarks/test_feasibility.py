@@ -12,7 +12,7 @@ from benchmarks.feasibility import (
     why_impossible,
 )
 from nicmm_core import shapes
-from nicmm_core.surface_points import locate_points
+from nicmm_core.geometry.surface_points import locate_points
 
 MESHES = dict(defective_meshes())
 

@@ -9,8 +9,8 @@ import numpy as np
 import nicmm_core as nicmm
 from benchmarks.checker import judge_curve
 from benchmarks.named_curves import nearest_vertices  # noqa: F401 - several tests take it from here
-from nicmm_core.curve import curve_on_mesh
-from nicmm_core.relaxation.face_walks import join, strictly_inside
+from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.face_walks import join, strictly_inside
 
 
 def assert_valid_curve(mesh, curve, control_positions=None, closed=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.curve import curve_on_mesh
+from nicmm_core.geometry.curve import curve_on_mesh
 from tests.core.checks import assert_valid_curve
 
 # Two triangles that share the edge 0-2.

@@ -11,8 +11,8 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.__main__ import main
-from nicmm_core.curve import SurfaceCurve
-from nicmm_core.files import read_mesh, write_mesh
+from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.network.weights_file import load_weights
 from tests.core.checks import assert_valid_curve
 

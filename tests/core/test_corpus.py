@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import collections, corpus
-from nicmm_core.files import MESH_FORMATS
+from nicmm_core.io.files import MESH_FORMATS
 
 SHARE = 10
 

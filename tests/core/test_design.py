@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.curve import resample
+from nicmm_core.geometry.curve import resample
 from nicmm_core.progress import INTERVAL
 from tests.core.checks import (
     apart,

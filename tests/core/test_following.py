@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.design import FOLLOWING
-from nicmm_core.surface_points import nearest_points
+from nicmm_core.geometry.surface_points import nearest_points
 from tests.core.checks import assert_valid_curve, circle
 
 ANGLES = np.array([0.0, 1.3, 2.5, 3.6, 5.0])

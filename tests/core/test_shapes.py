@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nicmm_core import shapes
-from nicmm_core.mesh import unique_edges
+from nicmm_core.geometry.mesh import unique_edges
 from tests.core.checks import euler_characteristic
 
 SHAPES = {

@@ -8,8 +8,8 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
 from nicmm_core.coarsening.lifting import lifted
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_curve
 
 

@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.features import vertex_normals
-from nicmm_core.level_set.guidance import BASELINE
 from nicmm_core.level_set.problem import build_problem
-from nicmm_core.surface_points import locate_control_points
+from nicmm_core.maps.guidance import BASELINE
 from tests.core.checks import random_surface_points
 
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.level_set.losses import (
     EnergySurface,
@@ -24,7 +25,6 @@ from nicmm_core.level_set.problem import build_problem
 from nicmm_core.network.sparse_operator import SparseOperator
 from nicmm_core.network.tensors import surface_tensors
 from nicmm_core.path.virtual_splits import SplitMesh
-from nicmm_core.surface_points import locate_control_points
 
 CPU = torch.device("cpu")
 

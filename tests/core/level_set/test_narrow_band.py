@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.losses import LossWeights, energy_surface, loss_terms, total_loss
 from nicmm_core.level_set.narrow_band import build_narrow_band, evaluate, gauss_newton_system
 from nicmm_core.level_set.problem import build_problem
-from nicmm_core.surface_points import locate_control_points
 
 WEIGHTS = LossWeights(smooth=0.02, feature=0.4)
 

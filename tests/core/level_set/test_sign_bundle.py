@@ -6,10 +6,10 @@ import pytest
 import nicmm_core as nicmm
 from benchmarks.named_curves import handle_points, torus_points
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.sign_bundle import SignBundle
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
 
 METHODS = ("variational", "nicmm-paper")

@@ -5,12 +5,12 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.signed_distance import bounding_side, signed_distance
 from nicmm_core.path.initial_loop import InitialLoop
 from nicmm_core.path.virtual_splits import SplitMesh
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import joined
 
 

@@ -5,12 +5,12 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.losses import LossWeights
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.topology import breaking_vertices
 from nicmm_core.level_set.variational import VariationalConfig, solve
 from nicmm_core.level_set.vertex_links import VertexLinks
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
 
 SAME_CURVE = 0.08

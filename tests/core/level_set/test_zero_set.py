@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.zero_set import ZeroSet, shortest_by_map, zero_set
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_curve, curve_through
 
 ENDS = np.array([[-0.6, 0.03, 0.0], [0.6, 0.03, 0.0]])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import torch
 
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.losses import LossWeights, loss_terms, total_loss
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, narrow_band_energy, predict
 from nicmm_core.network.tensors import surface_tensors
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
-from nicmm_core.surface_points import locate_control_points
 
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import nicmm_core as nicmm
 from benchmarks import collections
 from nicmm_core import shapes
-from nicmm_core.curve import curve_on_mesh
+from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.outputs.cut import cut_mesh
 from nicmm_core.outputs.polygons import cut_polygons
 from tests.core.checks import flipped, grid, renumbered, scaled

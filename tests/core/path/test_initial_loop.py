@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.path import legs
 from nicmm_core.path.initial_loop import boundary_loops, build_initial_loop, path_curve
 from nicmm_core.path.visiting_order import shortest_order
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import (
     assert_valid_curve,
     circle,

@@ -5,10 +5,10 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.__main__ import main
-from nicmm_core.files import read_mesh, write_mesh
+from nicmm_core.geometry.surface_points import locate_control_points
+from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.path import legs
 from nicmm_core.path.initial_loop import build_initial_loop
-from nicmm_core.surface_points import locate_control_points
 from tests.core.checks import assert_valid_design, circle, joined, nearest_vertices
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.exact_curve import (
@@ -20,7 +21,6 @@ from nicmm_core.relaxation.exact_curve import (
     sideways,
     without_short_segments,
 )
-from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import (
     assert_lies_on_surface,
     assert_valid_curve,

@@ -7,11 +7,11 @@ import nicmm_core as nicmm
 from benchmarks.measures import distances
 from benchmarks.perturbation import perturbed
 from nicmm_core import shapes
-from nicmm_core.curve import curve_on_mesh
+from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.face_walks import join, moved
 from nicmm_core.relaxation.curve_nodes import curve_surface, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.exact_curve import drawn, exact_curve, sideways
-from nicmm_core.relaxation.face_walks import join, moved
 from tests.core.checks import (
     assert_valid_curve,
     curve_through,

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 import nicmm_core as nicmm
 from benchmarks import messes
 from nicmm_core import shapes
-from nicmm_core.crossings import crossing_segments
-from nicmm_core.curve import geodesic_curvature, resample
+from nicmm_core.geometry.crossings import crossing_segments
+from nicmm_core.geometry.curve import geodesic_curvature, resample
+from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation import relaxing
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import (
@@ -20,7 +21,6 @@ from nicmm_core.relaxation.elastic_energy import (
     feature_energy,
 )
 from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
-from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import (
     apart,
     assert_valid_curve,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nicmm_core.mesh import unique_edges
+from nicmm_core.geometry.mesh import unique_edges
 from nicmm_core.repair.edge_subdivision import subdivided
 from tests.core.checks import grid
 

@@ -7,11 +7,12 @@ import nicmm_core as nicmm
 from benchmarks import corpus
 from benchmarks.checker import judge
 from benchmarks.defects import defective_meshes
-from nicmm_core import shapes, surface_designer, tolerances
-from nicmm_core.mesh import unique_edges
+from nicmm_core import shapes, surface_designer
+from nicmm_core.geometry import tolerances
+from nicmm_core.geometry.mesh import unique_edges
+from nicmm_core.geometry.surface_points import locate_points
 from nicmm_core.path.leg_graph import pinched_vertices
 from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
-from nicmm_core.surface_points import locate_points
 from tests.core.checks import grid, joined
 
 MESHES = dict(defective_meshes())

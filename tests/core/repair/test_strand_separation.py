@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.checker import judge_curve
-from nicmm_core.curve import curve_on_mesh
+from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.repair.strand_separation import separated
-from nicmm_core.surface_points import SurfacePoints
 from tests.core.checks import grid
 
 SIZE = 4

@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.mesh import unique_edges, unoriented_vertices
+from nicmm_core.geometry.mesh import unique_edges, unoriented_vertices
 from tests.core.checks import flipped, joined
 
 CORNERS = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]]

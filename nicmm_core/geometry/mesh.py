@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from ..errors import MeshError
+from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .by_parts import components, grouped, parts
-from .errors import MeshError
-from .progress import checkpoint
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""

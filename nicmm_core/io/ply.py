@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from .numbers import floats, shown, whole
 from .polygons import FormatError, Polygons
 

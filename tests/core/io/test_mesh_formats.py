@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.files import read_mesh, write_curve, write_mesh
+from nicmm_core.io.files import read_mesh, write_curve, write_mesh
 from tests.core.checks import grid
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)

@@ -6,7 +6,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.level_set.guidance import ALIGNMENT_WIDTH, BASELINE, OBSTACLE, feature_map
+from nicmm_core.maps.guidance import ALIGNMENT_WIDTH, BASELINE, OBSTACLE, feature_map
 
 UNIT = 4.0
 KINDS = {"obstacles": 1.0, "alignment": -1.0}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.surface_points import first_hits, locate_control_points
+from nicmm_core.geometry.surface_points import first_hits, locate_control_points
 from tests.core.checks import joined, random_surface_points
 
 SurfacePoints = nicmm.SurfacePoints

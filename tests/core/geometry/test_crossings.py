@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
-from nicmm_core.crossings import crossing_segments
-from nicmm_core.surface_points import SurfacePoints
+from nicmm_core.geometry.crossings import crossing_segments
+from nicmm_core.geometry.surface_points import SurfacePoints
 from tests.core.checks import curve_through, flipped, renumbered
 
 TRIANGLE = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

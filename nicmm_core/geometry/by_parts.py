@@ -14,8 +14,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
-from .progress import checkpoint
 
 PART = 500_000
 """Entries of a part: a few hundredths of a second of sorting."""

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from ..errors import ControlPointError, UnreachableError
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .errors import ControlPointError, UnreachableError
 from .mesh import Mesh, real_array
 
 FEWEST_POINTS_CLOSED = 3

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nicmm_core.sides import two_sides
+from nicmm_core.geometry.sides import two_sides
 
 
 def ring(count):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 
 MOST_STARTS = 64
 """Corners of a polygon that are tried as the one its triangles share; a bound on the time."""

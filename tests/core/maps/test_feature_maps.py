@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.feature_maps import SHARP_ANGLE
+from nicmm_core.maps.feature_maps import SHARP_ANGLE
 
 
 def tube(radius=0.5, around=40, along=21):

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh
 from ..progress import checkpoint
-from ..surface_points import SurfacePoints
+from . import tolerances
+from .array_types import BoolArray, FloatArray, IntArray
+from .mesh import Mesh
+from .surface_points import SurfacePoints
 
 MOST_FACES = 4096
 """Faces that a way may pass; a section that goes round the surface is no short way."""

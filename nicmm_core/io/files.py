@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from .curve import SurfaceCurve
-from .errors import ArgumentError, MeshError
-from .mesh import Mesh
-from .mesh_formats.obj import read_obj
-from .mesh_formats.off import read_off
-from .mesh_formats.ply import read_ply
-from .mesh_formats.polygons import FormatError
-from .mesh_formats.stl import read_stl
-from .mesh_formats.writing import obj_bytes, off_bytes, ply_bytes, stl_bytes
+from ..errors import ArgumentError, MeshError
+from ..geometry.curve import SurfaceCurve
+from ..geometry.mesh import Mesh
+from .obj import read_obj
+from .off import read_off
+from .ply import read_ply
+from .polygons import FormatError
+from .stl import read_stl
+from .writing import obj_bytes, off_bytes, ply_bytes, stl_bytes
 
 _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply, ".stl": read_stl}
 

@@ -8,10 +8,11 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
-from nicmm_core import by_parts, mesh, shapes
-from nicmm_core.by_parts import components, distinct_rows, grouped, stable_order
+from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_mesh
-from nicmm_core.surface_points import first_hits, nearest_points
+from nicmm_core.geometry import by_parts, mesh
+from nicmm_core.geometry.by_parts import components, distinct_rows, grouped, stable_order
+from nicmm_core.geometry.surface_points import first_hits, nearest_points
 
 SEEDS = st.integers(0, 10_000)
 

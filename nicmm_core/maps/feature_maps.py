@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from . import tolerances
-from .arguments import checked_vertex_values
-from .array_types import BoolArray, FloatArray, IntArray
-from .errors import ArgumentError
-from .mesh import Mesh, unique_edges
-from .relaxation.curve_nodes import unsigned_normals
+from ..arguments import checked_vertex_values
+from ..errors import ArgumentError
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh, unique_edges
+from ..relaxation.curve_nodes import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
 """Angle between the normals of two faces from which their edge is sharp."""

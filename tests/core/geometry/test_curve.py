@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nicmm_core.curve import curve_on_mesh, geodesic_curvature, resample
+from nicmm_core.geometry.curve import curve_on_mesh, geodesic_curvature, resample
 from tests.core.checks import circle, random_surface_points
 
 ANGLES = np.arange(60) * 2 * np.pi / 60

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from ..array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from .numbers import floats
 from .polygons import FormatError, Polygons
 

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.curve import curve_on_mesh
-from nicmm_core.relaxation.face_walks import join, moved, strictly_inside
-from nicmm_core.surface_points import SurfacePoints
+from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.face_walks import join, moved, strictly_inside
+from nicmm_core.geometry.surface_points import SurfacePoints
 from tests.core.checks import (
     assert_does_not_touch_itself,
     assert_lies_on_surface,

@@ -20,11 +20,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .. import tolerances
-from ..array_types import BoolArray, FloatArray, IntArray
-from ..mesh import Mesh, edge_lengths
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh, edge_lengths
+from ..level_set.redistancing import DistanceSurface, spread
 from ..progress import checkpoint
-from .redistancing import DistanceSurface, spread
 
 BASELINE = 1.0
 """φ_fea where nothing is painted.
