@@ -12,9 +12,9 @@ from scipy.sparse import csgraph
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
-from nicmm_core.geometry.face_walks import moved
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
+from nicmm_core.geometry.tracing import trace_from
 from nicmm_core.level_set.redistancing import distance_to_segments
 
 from . import collections, report
@@ -237,7 +237,7 @@ def _beside(mesh: Mesh, left: dict[tuple[int, int], int], line: IntArray) -> Sur
         across.append(np.cross(mesh.face_normals[face], along / np.linalg.norm(along)))
     start = SurfacePoints(np.array(faces), np.array(barycentric))
     length = np.full(2, OFFSET * mesh.diagonal)
-    points, stuck, _ = moved(mesh, start, np.array(across), length)
+    points, stuck, _ = trace_from(mesh, start, np.array(across), length)
     return None if stuck.any() else points
 
 

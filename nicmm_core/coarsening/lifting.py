@@ -16,9 +16,9 @@ from scipy.sparse import csgraph
 
 from ..geometry.array_types import IntArray
 from ..geometry.curve import SurfaceCurve
-from ..geometry.face_walks import strictly_inside
 from ..geometry.mesh import Mesh, unique_edges
 from ..geometry.surface_points import SurfacePoints, nearest_points
+from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways

@@ -18,9 +18,9 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
-from ..geometry.face_walks import join, moved, strictly_inside
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
+from ..geometry.tracing import strictly_inside, trace_between, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .node_spacing import arc_lengths, node_arcs
@@ -196,7 +196,7 @@ def shifted(
         How many faces the node that passed most of them has passed.
     """
     going = np.flatnonzero(length)
-    targets, stuck, passed = moved(
+    targets, stuck, passed = trace_from(
         surface.mesh, nodes.places[going], direction[going], length[going], surface.folded
     )
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
@@ -404,7 +404,7 @@ def _drawn_stretches(
     # A mesh need not be oriented: both normals count as pointing to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
-    ways = join(mesh, places[start], places[end], plane, DETOUR, surface.folded)
+    ways = trace_between(mesh, places[start], places[end], plane, DETOUR, surface.folded)
     first, crossings = places[start], ways.crossings
     if not backwards:
         owner = np.concatenate([nodes, nodes[ways.pair]])

@@ -10,7 +10,7 @@ import nicmm_core as nicmm
 from benchmarks.checker import judge_curve
 from benchmarks.named_curves import nearest_vertices  # noqa: F401 - several tests take it from here
 from nicmm_core.geometry.curve import curve_on_mesh
-from nicmm_core.geometry.face_walks import join, strictly_inside
+from nicmm_core.geometry.tracing import strictly_inside, trace_between
 
 
 def assert_valid_curve(mesh, curve, control_positions=None, closed=True):
@@ -123,7 +123,7 @@ def curve_through(mesh, positions, controls, closed=True):
     normals = mesh.face_normals[points.faces]
     agree = np.where((normals[here] * normals[there]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[here] + agree * normals[there]
-    ways = join(mesh, chosen(points, here), chosen(points, there), plane, detour=3.0)
+    ways = trace_between(mesh, chosen(points, here), chosen(points, there), plane, detour=3.0)
     assert ways.reached.all()
     owner = np.concatenate([np.arange(len(points)), ways.pair])
     order = np.argsort(owner, kind="stable")

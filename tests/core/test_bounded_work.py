@@ -33,14 +33,14 @@ def fan(count):
 def test_a_fan_of_thousands_of_needles(monkeypatch):
     """A node that moves beside its tip passes them all."""
     passed = []
-    moved = exact_curve.moved
+    trace_from = exact_curve.trace_from
 
     def counted(*given):
-        result = moved(*given)
+        result = trace_from(*given)
         passed.append(result[2])
         return result
 
-    monkeypatch.setattr(exact_curve, "moved", counted)
+    monkeypatch.setattr(exact_curve, "trace_from", counted)
     count = 3000
     mesh = fan(count)
     faces = np.array([10, 900, 1700, 2500])

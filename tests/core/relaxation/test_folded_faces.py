@@ -8,7 +8,7 @@ from benchmarks.measures import distances
 from benchmarks.perturbation import perturbed
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
-from nicmm_core.geometry.face_walks import join, moved
+from nicmm_core.geometry.tracing import trace_between, trace_from
 from nicmm_core.relaxation.curve_nodes import curve_surface, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.exact_curve import drawn, exact_curve, sideways
@@ -108,7 +108,7 @@ def test_a_long_way_without_folds_is_lost_though_the_mesh_has_some():
     start, end = (nicmm.SurfacePoints(points.faces[[k]], points.barycentric[[k]]) for k in (0, 1))
     plane = np.array([[0.0, 0.0, 1.0]])
     none = np.zeros(len(mesh.faces), dtype=bool)
-    assert not join(mesh, start, end, plane, 1.5, none).reached.any()
+    assert not trace_between(mesh, start, end, plane, 1.5, none).reached.any()
 
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.5, 4.0])
@@ -120,7 +120,7 @@ def test_a_move_that_comes_to_a_fold_ends_behind_it(surface, distance):
     before = start.positions(mesh)
     direction = np.tile([1.0, 0.0, 0.0], (9, 1))
     length = np.full(9, distance * STEP)
-    ends, blocked, _ = moved(mesh, start, direction, length, surface.folded)
+    ends, blocked, _ = trace_from(mesh, start, direction, length, surface.folded)
     assert not blocked.any()
     np.testing.assert_allclose(
         ends.positions(mesh) - before, direction * length[:, None], atol=1e-5

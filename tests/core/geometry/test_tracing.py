@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
-from nicmm_core.geometry.face_walks import join, moved, strictly_inside
 from nicmm_core.geometry.surface_points import SurfacePoints
+from nicmm_core.geometry.tracing import strictly_inside, trace_between, trace_from
 from tests.core.checks import (
     assert_does_not_touch_itself,
     assert_lies_on_surface,
@@ -46,14 +46,14 @@ def plane_between(mesh, start, end):
 def ways(mesh, start, end, normals=None, detour=2.0):
     """Each way with its ends as an open curve, None for one that was lost."""
     normals = plane_between(mesh, start, end) if normals is None else normals
-    joins = join(mesh, start, end, normals, detour)
-    assert (np.diff(joins.pair) >= 0).all()
-    assert joins.reached[joins.pair].all()
+    traces = trace_between(mesh, start, end, normals, detour)
+    assert (np.diff(traces.pair) >= 0).all()
+    assert traces.reached[traces.pair].all()
     found = []
     for pair in range(len(start)):
-        here = joins.pair == pair
-        faces = [start.faces[[pair]], joins.crossings.faces[here], end.faces[[pair]]]
-        rows = [start.barycentric[[pair]], joins.crossings.barycentric[here]]
+        here = traces.pair == pair
+        faces = [start.faces[[pair]], traces.crossings.faces[here], end.faces[[pair]]]
+        rows = [start.barycentric[[pair]], traces.crossings.barycentric[here]]
         curve = curve_on_mesh(
             mesh,
             False,
@@ -61,7 +61,7 @@ def ways(mesh, start, end, normals=None, detour=2.0):
             np.concatenate([*rows, end.barycentric[[pair]]]),
             np.zeros(0, dtype=np.int64),
         )
-        found.append(curve if joins.reached[pair] else None)
+        found.append(curve if traces.reached[pair] else None)
     return found
 
 
@@ -78,7 +78,7 @@ def test_on_a_flat_disc_a_way_is_the_straight_segment(flat_disc, factor):
 def test_a_way_crosses_every_edge_between_its_ends_once(flat_disc):
     """The number of crossings is that of edges whose ends lie on both sides, within the segment."""
     start, end = (random_surface_points(flat_disc, 30, seed=seed) for seed in (5, 6))
-    joins = join(flat_disc, start, end, plane_between(flat_disc, start, end), 2.0)
+    traces = trace_between(flat_disc, start, end, plane_between(flat_disc, start, end), 2.0)
     first, second = start.positions(flat_disc)[:, :2], end.positions(flat_disc)[:, :2]
     sides = np.sort(flat_disc.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     a, b = flat_disc.vertices[np.unique(sides, axis=0)][:, :, :2].transpose(1, 0, 2)
@@ -89,7 +89,7 @@ def test_a_way_crosses_every_edge_between_its_ends_once(flat_disc):
     for pair in range(len(start)):
         p, q = first[pair], second[pair]
         crossed = (turn(p, q, a) * turn(p, q, b) < 0) & (turn(a, b, p) * turn(a, b, q) < 0)
-        assert (joins.pair == pair).sum() == crossed.sum()
+        assert (traces.pair == pair).sum() == crossed.sum()
 
 
 def test_on_a_cylinder_ways_come_near_the_helix_with_the_square_of_their_length():
@@ -130,7 +130,9 @@ def test_ways_on_a_random_body_stay_on_it_and_in_their_plane(body, seed):
     mesh = flipped(body, seed)
     start = random_surface_points(mesh, 12, seed)
     direction = generator.normal(size=(12, 3))
-    end, _, _ = moved(mesh, start, tangent(mesh, start, direction), generator.uniform(0, 0.3, 12))
+    end, _, _ = trace_from(
+        mesh, start, tangent(mesh, start, direction), generator.uniform(0, 0.3, 12)
+    )
     normals = plane_between(mesh, start, end)
     found = ways(mesh, start, end, normals)
     # Bodies are thin: a few planes leave the limb that the move went round.
@@ -181,9 +183,9 @@ def test_a_way_through_a_vertex_passes_it_once(end, through):
 def test_points_of_one_face_need_no_crossing(ball):
     start = SurfacePoints(np.arange(5), np.tile([0.5, 0.3, 0.2], (5, 1)))
     end = SurfacePoints(np.arange(5), np.tile([0.0, 1.0, 0.0], (5, 1)))
-    joins = join(ball, start, end, ball.face_normals[:5], 1.5)
-    assert joins.reached.all()
-    assert len(joins.pair) == 0
+    traces = trace_between(ball, start, end, ball.face_normals[:5], 1.5)
+    assert traces.reached.all()
+    assert len(traces.pair) == 0
 
 
 def test_a_way_off_the_surface_or_too_long_is_lost():
@@ -201,7 +203,7 @@ def test_a_way_off_the_surface_or_too_long_is_lost():
 def test_ways_do_not_depend_on_numbers_orientation_or_pose(body):
     start = random_surface_points(body, 20, seed=8)
     direction = tangent(body, start, np.random.default_rng(8).normal(size=(20, 3)))
-    end, _, _ = moved(body, start, direction, np.full(20, 0.2))
+    end, _, _ = trace_from(body, start, direction, np.full(20, 0.2))
     normals = plane_between(body, start, end)
     lengths = [None if way is None else way.length for way in ways(body, start, end, normals)]
     turn = Rotation.from_rotvec([0.3, -1.0, 2.0])
@@ -222,7 +224,7 @@ def test_on_a_flat_disc_points_move_by_a_translation(flat_disc, factor):
     direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     target = start.positions(mesh) + 0.3 * factor * direction
     stays = np.linalg.norm(target, axis=1) < 0.97 * factor
-    end, blocked, _ = moved(mesh, start, direction, np.full(60, 0.3 * factor))
+    end, blocked, _ = trace_from(mesh, start, direction, np.full(60, 0.3 * factor))
     assert stays.sum() > 20 and not blocked[stays].any()
     # Off an edge by no more than what keeps a point strictly inside.
     np.testing.assert_allclose(
@@ -236,7 +238,7 @@ def test_points_stop_beside_the_boundary(flat_disc):
     before = start.positions(flat_disc)
     angle = np.random.default_rng(10).uniform(0, 2 * np.pi, 40)
     direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    end, blocked, _ = moved(flat_disc, start, direction, np.full(40, 3.0))
+    end, blocked, _ = trace_from(flat_disc, start, direction, np.full(40, 3.0))
     assert blocked.all()
     place = end.positions(flat_disc)
     radius = np.linalg.norm(place, axis=1)
@@ -252,7 +254,7 @@ def test_points_stop_beside_an_edge_of_three_faces():
     vertices = [[0, -1, 0], [0, 1, 0], [-1, 0, 0], [1, 0, 0], [0, 0, 1]]
     fin = nicmm.Mesh(vertices, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     start = SurfacePoints(np.array([0]), np.full((1, 3), 1.0 / 3.0))
-    end, blocked, _ = moved(fin, start, np.array([[1.0, 0.0, 0.0]]), np.array([1.0]))
+    end, blocked, _ = trace_from(fin, start, np.array([[1.0, 0.0, 0.0]]), np.array([1.0]))
     assert blocked.all()
     assert end.faces.tolist() == [0]
     np.testing.assert_allclose(end.positions(fin), 0.0, atol=1e-5)
@@ -263,7 +265,7 @@ def test_a_move_has_the_length_asked_for_and_a_way_back(body):
     start = random_surface_points(body, 30, seed=11)
     direction = tangent(body, start, np.random.default_rng(11).normal(size=(30, 3)))
     for length in (0.01, 0.1):
-        end, blocked, _ = moved(body, start, direction, np.full(30, length))
+        end, blocked, _ = trace_from(body, start, direction, np.full(30, length))
         assert not blocked.any()
         found = ways(body, start, end, body.face_normals[start.faces])
         reached = [way.length for way in found if way is not None]
@@ -278,13 +280,13 @@ def test_a_move_round_the_equator_comes_back(ball):
     normal = ball.face_normals[start.faces]
     plane = np.cross(np.cross(normal, [0.0, 0.0, 1.0]), normal)
     direction = np.cross(plane / np.linalg.norm(plane), normal)
-    end, _, _ = moved(ball, start, direction, np.array([2.0 * np.pi]))
+    end, _, _ = trace_from(ball, start, direction, np.array([2.0 * np.pi]))
     assert np.linalg.norm(end.positions(ball) - place) < 2.0 * ball.mean_edge_length
 
 
 def test_no_move_leaves_a_point_where_it_is(ball):
     start = random_surface_points(ball, 7, seed=12)
-    end, blocked, _ = moved(ball, start, tangent(ball, start, np.ones((7, 3))), np.zeros(7))
+    end, blocked, _ = trace_from(ball, start, tangent(ball, start, np.ones((7, 3))), np.zeros(7))
     np.testing.assert_array_equal(end.faces, start.faces)
     np.testing.assert_allclose(end.barycentric, start.barycentric, atol=1e-15)
     assert not blocked.any()

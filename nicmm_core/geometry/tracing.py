@@ -1,8 +1,8 @@
-"""Straight ways over the faces of a mesh: from point to point, and sideways by a length.
+"""Straight traces over the faces of a mesh: between two points, and from a point by a length.
 
-A way is a normal section: the intersection of the surface with a plane that stands on it. It is
+A trace is a normal section: the intersection of the surface with a plane that stands on it. It is
 followed from face to face by the signs of the plane at their corners, so that it cannot get lost
-between two faces, and all ways of one call advance together. Two consecutive points of a way lie
+between two faces, and all traces of one call advance together. Two consecutive points of one lie
 in one face, the one that carries the first of them.
 
 Costs follow the number of faces passed and not the size of the mesh.
@@ -21,24 +21,24 @@ from .mesh import Mesh
 from .surface_points import SurfacePoints
 
 MOST_FACES = 4096
-"""Faces that a way may pass; a section that goes round the surface is no short way."""
+"""Faces that a trace may pass; one that goes round the surface is no short connection."""
 
 FOLDS = 4.0
-"""What a way over folded faces may be longer before it arrives, in mean edge lengths."""
+"""By how much a trace over folded faces may be longer on its way, in mean edge lengths."""
 
 
 @dataclass(frozen=True)
-class Joins:
-    """Ways between m pairs of points, without their ends.
+class Traces:
+    """Traces between m pairs of points, without their ends.
 
     Attributes
     ----------
     reached : (m,) bool array
-        Whether the way arrived. Those that did not have no crossings.
+        Whether the trace arrived. Those that did not have no crossings.
     pair : (q,) int array
         The pair that each crossing of an edge belongs to, ascending.
     crossings : SurfacePoints
-        Where the ways cross edges, in order, each in the face that it enters there.
+        Where the traces cross edges, in order, each in the face that it enters there.
     """
 
     reached: BoolArray
@@ -46,17 +46,17 @@ class Joins:
     crossings: SurfacePoints
 
 
-def join(
+def trace_between(
     mesh: Mesh,
     start: SurfacePoints,
     end: SurfacePoints,
     normals: FloatArray,
     detour: float,
     folded: BoolArray | None = None,
-) -> Joins:
-    """Ways from points inside faces to other points nearby.
+) -> Traces:
+    """Trace from points inside faces to other points nearby.
 
-    A way over faces that are folded back runs forth, back and forth again; what it runs back is
+    A trace over faces that are folded back runs forth, back and forth again; what it runs back is
     taken off its length.
 
     Parameters
@@ -69,7 +69,7 @@ def join(
     normals : (m, 3) float array
         Directions that the planes contain.
     detour : float
-        Longest way, relative to the straight distance in space.
+        Longest trace, relative to the straight distance in space.
     folded : (F,) bool array, optional
         Which faces of the mesh are.
     """
@@ -78,26 +78,26 @@ def join(
     longest = detour * np.linalg.norm(forward, axis=1)
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
     reached = _holds(mesh, end, start.faces)
-    walkers = _Walkers(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
+    fronts = _Fronts(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
     travelled, covered = np.zeros(len(origin)), np.zeros(len(origin))
     pairs, crossings = [], []
     for _ in range(MOST_FACES):
-        if not len(walkers.index):
+        if not len(fronts.index):
             break
         checkpoint()
-        step = walkers.step_lengths()
-        back = np.zeros(len(step), dtype=bool) if folded is None else folded[walkers.faces]
-        covered[walkers.index] += np.where(back, -step, step)
-        travelled[walkers.index] += step
-        walkers.enter_next_faces(travelled[walkers.index] <= longest[walkers.index] + margin)
-        pairs.append(walkers.index)
-        crossings.append(walkers.entry())
-        arrived = _holds(mesh, end[walkers.index], walkers.faces)
-        here = walkers.index[arrived]
+        step = fronts.step_lengths()
+        back = np.zeros(len(step), dtype=bool) if folded is None else folded[fronts.faces]
+        covered[fronts.index] += np.where(back, -step, step)
+        travelled[fronts.index] += step
+        fronts.enter_next_faces(travelled[fronts.index] <= longest[fronts.index] + margin)
+        pairs.append(fronts.index)
+        crossings.append(fronts.entry())
+        arrived = _holds(mesh, end[fronts.index], fronts.faces)
+        here = fronts.index[arrived]
         reached[here] = covered[here] <= longest[here]
-        walkers.leave_edges(~arrived)
+        fronts.leave_edges(~arrived)
     if not pairs:
-        return Joins(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
+        return Traces(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
     pair = np.concatenate(pairs)
     kept = np.flatnonzero(reached[pair])
     kept = kept[np.argsort(pair[kept], kind="stable")]
@@ -105,11 +105,11 @@ def join(
     faces, low, high, fraction = (np.concatenate(part)[kept] for part in parts)
     points = SurfacePoints(faces, _on_edges(mesh, faces, low, high, fraction))
     once = _last_of_each_vertex(mesh, pair[kept], points)
-    return Joins(reached, pair[kept][once], points[once])
+    return Traces(reached, pair[kept][once], points[once])
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
-    """Crossings without those of a way that turns about a vertex and crosses there once more."""
+    """Crossings without those of a trace that turns about a vertex and crosses there once more."""
     here = crossings.barycentric > 0.0
     vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
     vertex[here.sum(axis=1) > 1] = -1
@@ -118,7 +118,7 @@ def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -
     return np.flatnonzero(last)
 
 
-def moved(
+def trace_from(
     mesh: Mesh,
     start: SurfacePoints,
     direction: FloatArray,
@@ -127,7 +127,7 @@ def moved(
 ) -> tuple[SurfacePoints, BoolArray, int]:
     """Points moved along the surface.
 
-    Over faces that are folded back a way runs back, so what it has still to go gets longer there,
+    Over faces that are folded back a trace runs back, so its remaining length grows there,
     and it ends behind the fold; unless the point itself is in a fold.
 
     Parameters
@@ -154,33 +154,33 @@ def moved(
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
     blocked = length > 0.0
-    walkers = _Walkers(mesh, start.faces, origin, normals, direction, np.flatnonzero(blocked))
-    blocked[walkers.index] = False
+    fronts = _Fronts(mesh, start.faces, origin, normals, direction, np.flatnonzero(blocked))
+    blocked[fronts.index] = False
     outside = np.ones(len(length), dtype=bool) if folded is None else ~folded[start.faces]
     left = length.copy()
     faces, barycentric = start.faces.copy(), start.barycentric.copy()
     passed = 0
-    while passed < MOST_FACES and len(walkers.index):
+    while passed < MOST_FACES and len(fronts.index):
         passed += 1
         checkpoint()
-        step = walkers.step_lengths()
-        index = walkers.index
-        beyond = walkers.beyond()
+        step = fronts.step_lengths()
+        index = fronts.index
+        beyond = fronts.beyond()
         back = np.zeros(len(index), dtype=bool)
         if folded is not None:
-            back = folded[walkers.faces] & outside[index]
+            back = folded[fronts.faces] & outside[index]
         stops = (~back & (left[index] <= step)) | (beyond < 0)
         ends = index[stops]
         to_go = np.minimum(left[ends], step[stops])
         share = (to_go / np.maximum(step[stops], tolerances.TINY))[:, None]
-        leaving = walkers.exit_barycentric()[stops]
+        leaving = fronts.exit_barycentric()[stops]
         barycentric[ends] += share * (leaving - barycentric[ends])
         blocked[ends] = left[ends] > step[stops]
         left[index] -= np.where(back, -step, step)
-        walkers.enter_next_faces(~stops)
-        faces[walkers.index] = walkers.faces
-        barycentric[walkers.index] = _on_edges(mesh, *walkers.entry())
-        walkers.leave_edges(np.ones(len(walkers.index), dtype=bool))
+        fronts.enter_next_faces(~stops)
+        faces[fronts.index] = fronts.faces
+        barycentric[fronts.index] = _on_edges(mesh, *fronts.entry())
+        fronts.leave_edges(np.ones(len(fronts.index), dtype=bool))
     return SurfacePoints(faces, strictly_inside(barycentric)), blocked, passed
 
 
@@ -190,16 +190,16 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
     return drawn / drawn.sum(axis=1, keepdims=True)
 
 
-_OF_EACH_WALKER = (
+_OF_EACH_FRONT = (
     *("index", "faces", "_start", "_origin", "_across", "_position", "_side"),
     *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
     *("_fraction", "_crossing"),
 )
-"""Arrays of `_Walkers`."""
+"""Arrays of `_Fronts`."""
 
 
-class _Walkers:
-    """Walkers on their way, each in its plane, about to cross an edge of the face that it is in.
+class _Fronts:
+    """Traces in progress, each in its plane, about to cross an edge of the face that it is in.
 
     Of that edge one end lies above the plane or in it, the other below. In the next face only the
     third corner is new: its height says which of the two other sides comes next.
@@ -215,7 +215,7 @@ class _Walkers:
         index: IntArray,
     ) -> None:
         self.mesh = mesh
-        self.index = index  # (w,) which of the caller's walkers
+        self.index = index  # (w,) which of the caller's traces
         self.faces = self._start = faces[index]
         self._origin = origin[index]
         self._across = np.cross(normals[index], forward[index])
@@ -242,7 +242,7 @@ class _Walkers:
         self._high, self._low = corners[rows, high], corners[rows, low]
         self._high_height, self._low_height = height[rows, high], height[rows, low]
         self._high_position, self._low_position = positions[rows, high], positions[rows, low]
-        # A plane that leaves its face nowhere belongs to no walker.
+        # A plane that leaves its face nowhere belongs to no trace.
         self._keep(crossed[rows, side])
         self._find_crossing()
 
@@ -255,15 +255,15 @@ class _Walkers:
         return self.mesh.face_neighbours[self.faces, self._side]
 
     def exit_barycentric(self) -> FloatArray:
-        """Where the walkers leave their faces, in coordinates of these, shape (w, 3)."""
+        """Where the traces leave their faces, in coordinates of these, shape (w, 3)."""
         return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
 
     def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Where the walkers have entered their faces: face, ends of the edge and share of one."""
+        """Where the traces have entered their faces: face, ends of the edge and share of one."""
         return self.faces, self._low, self._high, self._fraction
 
     def enter_next_faces(self, goes: BoolArray) -> None:
-        """Take walkers over their edges; those that may not or cannot go drop out.
+        """Take traces over their edges; those that may not or cannot continue are dropped.
 
         So do those that come back to the face where they started: their section is closed.
         """
@@ -276,7 +276,7 @@ class _Walkers:
         self._position = self._crossing
 
     def leave_edges(self, goes: BoolArray) -> None:
-        """Find the next edge of walkers that have just entered a face; others drop out."""
+        """Find the next edge of traces that have just entered a face; others are dropped."""
         if not goes.all():
             self._keep(goes)
         corners = self.mesh.faces[self.faces]
@@ -300,7 +300,7 @@ class _Walkers:
         self._crossing = self._high_position + self._fraction[:, None] * step
 
     def _keep(self, mask: BoolArray) -> None:
-        for name in _OF_EACH_WALKER:
+        for name in _OF_EACH_FRONT:
             setattr(self, name, getattr(self, name)[mask])
 
 
