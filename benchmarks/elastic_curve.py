@@ -1,6 +1,6 @@
 """A discrete elastic curve on a surface: the yardstick of how fair a curve could be.
 
-Nodes move sideways in their tangent planes by Gauss-Newton steps on L ∫ κ_g² ds, are projected
+Nodes move along their conormals by Gauss-Newton steps on L ∫ κ_g² ds, are projected
 to the mesh and respaced between the control points, which stay where they are. An open curve has
 no curvature at its ends. Nothing keeps the curve from crossing itself, and what it finds is a local
 optimum near its start.
@@ -100,7 +100,7 @@ class _State:
         return float((self.roots**2).sum() * self.spacing.sum())
 
     @property
-    def sideways(self) -> FloatArray:
+    def conormals(self) -> FloatArray:
         """Unit vectors in the tangent planes, across the curve."""
         along = _neighbour(self.points, 1, self.closed) - _neighbour(self.points, -1, self.closed)
         across = np.cross(self.normals, along)
@@ -177,7 +177,7 @@ class _Iteration:
         return _State(on_surface, self.surface.normals(faces, barycentric), self.closed)
 
     def normal_equations(self) -> tuple[FloatArray, FloatArray]:
-        """Gauss-Newton matrix and slope of the energy for the free nodes' sideways moves.
+        """Gauss-Newton matrix and slope of the energy for moves of free nodes along the conormals.
 
         Derivatives are differences of the projected curve, so they know how the surface bends.
         A node acts on itself and its two neighbours only; every third one is moved at a time.
@@ -190,7 +190,7 @@ class _Iteration:
         rows = np.arange(n)
         for first in range(3):
             moved = state.points.copy()
-            moved[first::3] += step * state.sideways[first::3]
+            moved[first::3] += step * state.conormals[first::3]
             _, faces, barycentric = self.surface.project(moved)
             corners = self.surface.mesh.vertices[self.surface.mesh.faces[faces]]
             changed = _State(
@@ -214,7 +214,7 @@ class _Iteration:
         limit = LONGEST_MOVE * self.state.spacing.mean()
         step *= min(1.0, limit / max(np.abs(step).max(), 1e-300))
         points = self.state.points.copy()
-        points[self.free] += step[:, None] * self.state.sideways[self.free]
+        points[self.free] += step[:, None] * self.state.conormals[self.free]
         points = self.projected(points).points
         line = self.line(points)
         bounds = np.concatenate([[0], np.cumsum(self.counts)])

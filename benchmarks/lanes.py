@@ -17,7 +17,7 @@ from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
-from nicmm_core.relaxation.exact_curve import shifted
+from nicmm_core.relaxation.noded_curve import shifted
 
 from . import collections, report
 from .checker import judge

@@ -29,7 +29,7 @@ from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.exact_curve import ExactCurve, exact_curve
+from .relaxation.noded_curve import NodedCurve, noded_curve
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import LONGEST_MOVE, LONGEST_MOVE_OF_A_FRAME, WARM, moved_along
 from .request import Request, same_course, same_request
@@ -48,7 +48,7 @@ CROWDED = 3
 class _Start:
     """A simple curve on the mesh from which relaxation begins."""
 
-    curve: SurfaceCurve | ExactCurve
+    curve: SurfaceCurve | NodedCurve
     visited: IntArray  # (k,) which control points it passes, in order
     surface: CurveSurface
     unit: float  # square root of the surface's area
@@ -61,7 +61,7 @@ class _Remembered:
 
     request: Request
     start: _Start
-    exact: ExactCurve  # the design's curve with its nodes
+    exact: NodedCurve  # the design's curve with its nodes
     design: Design | None  # None where the curve has not converged yet
     crowded: int = 0  # frames in which it is better drawn after every step
 
@@ -131,7 +131,7 @@ class SurfaceDesigner:
         config = replace(WARM, iterations=iterations, drawn_iterations=1)
         if last is not None and last.crowded:
             # Without would fail once more.
-            config = replace(config, drawn_at_rest=False)
+            config = replace(config, defer_tracing=False)
         start = self._start_from_last(request, LONGEST_MOVE_OF_A_FRAME)
         return None if start is None else self._relaxed(request, start, config, started)
 
@@ -148,7 +148,7 @@ class SurfaceDesigner:
         self.forget()
         surface, unit = self._curve_surface(request), self._unit(request)
         start = _Start(curve, np.arange(len(request.points)), surface, unit)
-        exact = exact_curve(surface, curve, WARM.levels[-1])
+        exact = noded_curve(surface, curve, WARM.levels[-1])
         self._last = _Remembered(request, start, exact, None)
         return True
 
@@ -234,7 +234,7 @@ class SurfaceDesigner:
         if design.status is not Status.CANCELLED:
             at_rest = design.status is not Status.ITERATION_LIMIT
             before = 0 if self._last is None else self._last.crowded
-            failed = config.drawn_at_rest and relaxed.iterations > config.iterations
+            failed = config.defer_tracing and relaxed.iterations > config.iterations
             crowded = CROWDED if failed else max(before - 1, 0)
             kept = design if at_rest else None
             self._last = _Remembered(request, start, relaxed.exact, kept, crowded)
@@ -274,9 +274,9 @@ class SurfaceDesigner:
         if not request.has_maps:
             return self._surface
         unit = self._unit(request)
-        importance = feature_map(self.mesh, request.obstacles, request.alignment, unit)
+        phi_fea = feature_map(self.mesh, request.obstacles, request.alignment, unit)
         weight = FEATURE_TENSION / unit**2
-        return replace(self._surface, feature_map=importance, feature_weight=weight)
+        return replace(self._surface, feature_map=phi_fea, feature_weight=weight)
 
     def _unit(self, request: Request) -> float:
         return component_unit(self.mesh, int(request.points.faces[0]))

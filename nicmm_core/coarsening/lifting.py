@@ -21,7 +21,7 @@ from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
-from ..relaxation.exact_curve import ExactCurve, exact_curve, is_simple, straight_ways
+from ..relaxation.noded_curve import NodedCurve, is_simple, noded_curve, straight_ways
 from .coarse_mesh import CoarseMesh
 
 NODES = (256, 512, 128)
@@ -58,7 +58,7 @@ def lifted(
     """
     for count in NODES:
         checkpoint()
-        exact = exact_curve(coarse_surface, curve, count)
+        exact = noded_curve(coarse_surface, curve, count)
         result = _lifted_nodes(surface, coarse, exact, controls)
         if result is not None and is_simple(surface, result):
             return result.surface_curve(surface.mesh)
@@ -66,8 +66,8 @@ def lifted(
 
 
 def _lifted_nodes(
-    surface: CurveSurface, coarse: CoarseMesh, exact: ExactCurve, controls: SurfacePoints
-) -> ExactCurve | None:
+    surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
+) -> NodedCurve | None:
     """The curve through the nodes of a coarse one, simple or not."""
     fine = surface.mesh
     places, cell = _nearest_points(fine, coarse, exact.nodes.places)
@@ -180,12 +180,12 @@ def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
 
 
 def _with_bridges(
-    curve: ExactCurve,
+    curve: NodedCurve,
     nodes: Nodes,
     polyline: SurfacePoints,
     node_place: IntArray,
     bridges: dict[int, SurfacePoints],
-) -> ExactCurve:
+) -> NodedCurve:
     """The polyline with the ways that replace single stretches between nodes."""
     bounds = np.append(node_place, len(polyline))
     parts = [
@@ -197,4 +197,4 @@ def _with_bridges(
         np.concatenate([part.faces for part in parts]),
         np.concatenate([part.barycentric for part in parts]),
     )
-    return ExactCurve(nodes, curve.control_nodes, joined, np.cumsum(lengths) - lengths)
+    return NodedCurve(nodes, curve.control_nodes, joined, np.cumsum(lengths) - lengths)

@@ -114,7 +114,7 @@ class Mesh:
         return _edges(_edge_keys(start, end, size), size)
 
     @cached_property
-    def branches(self) -> bool:
+    def has_nonmanifold_edges(self) -> bool:
         """Whether more than two faces share some edge."""
         return bool((self.unpaired_edges[1] > 1).any())
 

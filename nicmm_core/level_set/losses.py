@@ -78,7 +78,7 @@ class EnergySurface:
 def energy_surface(problem: Problem) -> EnergySurface:
     """The surface of a problem as NumPy arrays; `tensors.surface_tensors` has it as tensors."""
     elements = problem.elements
-    importance = problem.feature_map
+    phi_fea = problem.feature_map
     return EnergySurface(
         face_areas=elements.face_areas,
         gradient=lambda phi: elements.gradient @ phi,
@@ -86,7 +86,7 @@ def energy_surface(problem: Problem) -> EnergySurface:
         centroid=lambda phi: elements.centroid @ phi,
         control_vertices=problem.loop.control_vertices,
         delta_width=DELTA_WIDTH * problem.edge_length,
-        feature_map=None if importance is None else elements.plain_centroid @ importance,
+        feature_map=None if phi_fea is None else elements.plain_centroid @ phi_fea,
     )
 
 
@@ -110,9 +110,9 @@ def bending_residual(laplacian: Array, phi: Array, width: float) -> Array:
     return laplacian * root_delta(phi, width)
 
 
-def feature_residual(importance: Array, phi: Array, width: float) -> Array:
+def feature_residual(phi_fea: Array, phi: Array, width: float) -> Array:
     """Residual of Eq. 7, φ_fea √G_σ(φ)."""
-    return importance * root_delta(phi, width)
+    return phi_fea * root_delta(phi, width)
 
 
 def squared_slope(surface: EnergySurface, phi: Array) -> Array:

@@ -119,7 +119,7 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
     mass = elements.vertex_areas[unknowns] / problem.edge_length**2
     stiffness = gradient.T @ _rows(np.tile(areas, 3), gradient)
     centroid = elements.centroid[inner]
-    importance = problem.feature_map
+    phi_fea = problem.feature_map
     return NarrowBand(
         unknowns=unknowns,
         face_areas=areas,
@@ -127,7 +127,7 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
         inner_areas=elements.face_areas[inner],
         laplacian=(centroid @ elements.laplacian)[:, unknowns],
         centroid=centroid[:, unknowns],
-        feature_map=None if importance is None else elements.plain_centroid[inner] @ importance,
+        feature_map=None if phi_fea is None else elements.plain_centroid[inner] @ phi_fea,
         damping=stiffness + sparse.diags_array(MASS_SHARE * mass),
         delta_width=DELTA_WIDTH * problem.edge_length,
     )

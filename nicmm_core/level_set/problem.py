@@ -134,14 +134,12 @@ def build_problem(
     component = mesh.face_component == mesh.face_component[points.faces[0]]
     if not (mesh.face_areas[component] > 0.0).all():
         raise MeshError(DEGENERATE)
-    importance = None
+    phi_fea = None
     if obstacles is not None or alignment is not None:
         width = component_unit(mesh, int(points.faces[0]))
-        importance = feature_map(mesh, obstacles, alignment, width)
+        phi_fea = feature_map(mesh, obstacles, alignment, width)
     with part(0.0, PATH_SHARE):
-        working, loop = build_initial_loop(
-            mesh, points, order, importance, closed, via_points, pieces
-        )
+        working, loop = build_initial_loop(mesh, points, order, phi_fea, closed, via_points, pieces)
     checkpoint(PATH_SHARE, lambda: working.vertices[loop.vertices])
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
@@ -164,14 +162,14 @@ def build_problem(
     initial_distance, _ = keep_topology(
         working, loop, distance, smoother.smoothed(distance), bundle
     )
-    if importance is not None:
-        importance = working.interpolation @ importance
+    if phi_fea is not None:
+        phi_fea = working.interpolation @ phi_fea
     features = input_features(
         vertices,
         vertex_normals(vertices, working.faces),
         control_indicator(smoother.response),
         initial_distance,
-        importance,
+        phi_fea,
     )
     return Problem(
         working=working,
@@ -183,7 +181,7 @@ def build_problem(
         distance=distance,
         smoother=smoother,
         initial_distance=initial_distance,
-        feature_map=importance,
+        feature_map=phi_fea,
         features=features,
     )
 

@@ -100,9 +100,9 @@ def _length_by_map(mesh: Mesh, problem: Problem, curve: SurfaceCurve) -> float:
     """Length of a curve where every part counts as for the initial path, in mesh units."""
     assert problem.feature_map is not None
     known = problem.working.input_vertex >= 0
-    importance = np.ones(len(mesh.vertices))
-    importance[problem.working.input_vertex[known]] = problem.feature_map[known]
-    factor = length_factor((importance[mesh.faces[curve.faces]] * curve.barycentric).sum(axis=1))
+    phi_fea = np.ones(len(mesh.vertices))
+    phi_fea[problem.working.input_vertex[known]] = problem.feature_map[known]
+    factor = length_factor((phi_fea[mesh.faces[curve.faces]] * curve.barycentric).sum(axis=1))
     positions = curve.points
     if curve.closed:
         positions, factor = np.concatenate([positions, positions[:1]]), np.append(factor, factor[0])

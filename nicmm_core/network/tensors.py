@@ -17,7 +17,7 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
     """Move what the energy needs of a problem to a device."""
     arrays = energy_surface(problem)
     elements = problem.elements
-    importance = arrays.feature_map
+    phi_fea = arrays.feature_map
     return EnergySurface(
         face_areas=_tensor(arrays.face_areas, device),
         gradient=SparseOperator(elements.gradient, device),
@@ -25,7 +25,7 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
         centroid=SparseOperator(elements.centroid, device),
         control_vertices=torch.as_tensor(arrays.control_vertices, device=device),
         delta_width=arrays.delta_width,
-        feature_map=None if importance is None else _tensor(importance, device),
+        feature_map=None if phi_fea is None else _tensor(phi_fea, device),
     )
 
 

@@ -69,7 +69,7 @@ def build_initial_loop(
     mesh: Mesh,
     points: SurfacePoints,
     order: str,
-    importance: FloatArray | None = None,
+    phi_fea: FloatArray | None = None,
     closed: bool = True,
     via_points: ViaPoints | None = None,
     pieces: int = PIECES,
@@ -83,7 +83,7 @@ def build_initial_loop(
         At least three, or two of an open path, on one component.
     order : {"given", "shortest"}
         Visit the points as given, or in the shortest order.
-    importance : (V,) float array, optional
+    phi_fea : (V,) float array, optional
         φ_fea at the input vertices. Lengths count times its square, as the curve's does in Eq. 7,
         so the loop goes round obstacles and along alignment from the start.
     closed : bool
@@ -118,7 +118,7 @@ def build_initial_loop(
         if via_points is not None:
             way = with_via_points(mesh, points, via_points, order, closed)
         try:
-            path = lay_path(mesh, way.points, importance, closed)
+            path = lay_path(mesh, way.points, phi_fea, closed)
             break
         except UnreachableError as error:
             failure = error
@@ -127,7 +127,7 @@ def build_initial_loop(
         if isinstance(failure, CrossingError):
             here, there = way.names[failure.leg], way.names[(failure.leg + 1) % len(way.names)]
             what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
-        advice = _advice(mesh, points, tours, visit, importance, not way.is_control.all())
+        advice = _advice(mesh, points, tours, visit, phi_fea, not way.is_control.all())
         raise UnreachableError(f"{what}; {advice}") from failure
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
@@ -217,14 +217,14 @@ def _advice(
     points: SurfacePoints,
     tours: _Tours,
     visited: IntArray,
-    importance: FloatArray | None,
+    phi_fea: FloatArray | None,
     via: bool,
 ) -> str:
     """What to change, tried before it is said.
 
     Parameters
     ----------
-    mesh, points, importance
+    mesh, points, phi_fea
         As in `build_initial_loop`.
     tours : _Tours
     visited : (k,) int array
@@ -238,7 +238,7 @@ def _advice(
             continue
         tried.append(order.tolist())
         try:
-            lay_path(mesh, _chosen(points, order), importance, tours.closed)
+            lay_path(mesh, _chosen(points, order), phi_fea, tours.closed)
         except UnreachableError:
             continue
         without = "without via points " if via else ""

@@ -32,7 +32,7 @@ class Patch:
     positions : (n + E, 3) float array
         Of the nodes.
     weight : (n + E,) float array
-        Squared importance at the nodes.
+        Squared phi_fea at the nodes.
     arcs : (a, 2) int array
     through_midpoints : (a,) bool array
     """
@@ -53,7 +53,7 @@ class Patch:
 
     @cached_property
     def lengths(self) -> FloatArray:
-        """Lengths of the arcs, weighted by importance, shape (a,)."""
+        """Lengths of the arcs, weighted by phi_fea, shape (a,)."""
         return self.step_lengths(self.arcs)
 
     def step_lengths(self, steps: IntArray) -> FloatArray:
@@ -94,7 +94,7 @@ class Patch:
         return int(start), int(end)
 
 
-def pinched_vertices(mesh: Mesh) -> BoolArray:
+def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
     """Vertices whose faces form more than one fan, shape (V,)."""
     _, vertex_of_fan = fans(mesh)
     return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1

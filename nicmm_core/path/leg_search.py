@@ -15,7 +15,7 @@ from scipy.sparse import csgraph
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, unique_edges
 from ..progress import checkpoint
-from .leg_graph import Node, Patch, pinched_vertices
+from .leg_graph import Node, Patch, nonmanifold_vertices
 from .virtual_splits import SplitMesh
 
 MIDPOINT_DETOUR = 2.0
@@ -54,13 +54,13 @@ WHOLE_SHARE = 0.5
 """Share of the faces beyond which a part of the surface is no cheaper to search than the whole."""
 
 
-def length_factor(importance: FloatArray) -> FloatArray:
+def length_factor(phi_fea: FloatArray) -> FloatArray:
     """What a length counts for where φ_fea has these values, any shape."""
-    return np.maximum(importance**2, LEAST_WEIGHT)
+    return np.maximum(phi_fea**2, LEAST_WEIGHT)
 
 
 @dataclass(frozen=True)
-class Obstacles:
+class BlockedElements:
     """What a leg has to keep off.
 
     Attributes
@@ -86,7 +86,7 @@ class Leg:
     ----------
     nodes : list of Node
     length : float
-        Weighted by importance, without what counts longer only in the search.
+        Weighted by phi_fea, without what counts longer only in the search.
     """
 
     nodes: list[Node]
@@ -104,7 +104,7 @@ class LegSearch:
         Its splits; they may go on between searches.
     component : (F,) bool array
         The input faces of the component.
-    importance : (V,) float array or None
+    phi_fea : (V,) float array or None
         φ_fea at the input vertices.
     clearance : float
         Distance within which a leg avoids the others.
@@ -115,25 +115,25 @@ class LegSearch:
         mesh: Mesh,
         split: SplitMesh,
         component: BoolArray,
-        importance: FloatArray | None,
+        phi_fea: FloatArray | None,
         clearance: float,
     ) -> None:
         self._mesh = mesh
         self._split = split
         self._component = component
-        self._importance = importance
+        self._phi_fea = phi_fea
         self._clearance = clearance
-        self._pinched = pinched_vertices(mesh)
+        self._pinched = nonmanifold_vertices(mesh)
         corners = mesh.vertices[mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
         np.maximum.at(self._longest_edge, mesh.faces, sides[:, None])
         self._kept: tuple[int, Patch] | None = None
         self._least_factor = 1.0
-        if importance is not None:
-            self._least_factor = min(1.0, float(length_factor(importance).min()))
+        if phi_fea is not None:
+            self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
 
-    def shortest(self, source: int, target: int, obstacles: Obstacles) -> Leg | None:
+    def shortest(self, source: int, target: int, obstacles: BlockedElements) -> Leg | None:
         """The shortest free leg; None when there is none.
 
         Only the part of the surface is searched where a leg up to some length can be, then a
@@ -155,7 +155,7 @@ class LegSearch:
                 return leg
             reach *= REACH_GROWTH
 
-    def are_joinable(self, pairs: list[tuple[int, int]], obstacles: Obstacles) -> bool:
+    def are_joinable(self, pairs: list[tuple[int, int]], obstacles: BlockedElements) -> bool:
         """Whether each pair of vertices has a way, every one for itself."""
         patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
@@ -174,7 +174,7 @@ class LegSearch:
         return all(reached(first) & reached(second) for first, second in pairs)
 
     def _search(
-        self, patch: Patch, source: int, target: int, obstacles: Obstacles, limit: float
+        self, patch: Patch, source: int, target: int, obstacles: BlockedElements, limit: float
     ) -> Leg | None:
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
         factor = self._branch_factor(patch)
@@ -243,9 +243,9 @@ class LegSearch:
             ]
         )
         weight = np.ones(len(node_position))
-        if self._importance is not None:
-            importance = self._importance_at(vertices)
-            at_nodes = np.concatenate([importance, importance[edges].mean(axis=1)])
+        if self._phi_fea is not None:
+            phi_fea = self._phi_fea_at(vertices)
+            at_nodes = np.concatenate([phi_fea, phi_fea[edges].mean(axis=1)])
             weight = length_factor(at_nodes)
         return Patch(
             vertices=vertices,
@@ -258,7 +258,7 @@ class LegSearch:
             through_midpoints=np.arange(len(arcs)) >= len(midpoint),
         )
 
-    def _free(self, patch: Patch, obstacles: Obstacles, ends: IntArray) -> BoolArray:
+    def _free(self, patch: Patch, obstacles: BlockedElements, ends: IntArray) -> BoolArray:
         """Nodes that a leg between two ends may use: off the boundary and the obstacles."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
@@ -290,13 +290,13 @@ class LegSearch:
         n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
         return np.flatnonzero(self._pinched[patch.vertices[:n_input]])
 
-    def _importance_at(self, vertices: IntArray) -> FloatArray:
-        assert self._importance is not None
+    def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
+        assert self._phi_fea is not None
         n_input = len(self._mesh.vertices)
-        result = self._importance[np.minimum(vertices, n_input - 1)]
+        result = self._phi_fea[np.minimum(vertices, n_input - 1)]
         for place in np.flatnonzero(vertices >= n_input).tolist():
             weights = self._split.weights(int(vertices[place]))
-            result[place] = sum(w * self._importance[vertex] for vertex, w in weights.items())
+            result[place] = sum(w * self._phi_fea[vertex] for vertex, w in weights.items())
         return result
 
     def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from .leg_graph import Node
-from .leg_search import Leg, LegSearch, Obstacles
+from .leg_search import BlockedElements, Leg, LegSearch
 from .virtual_splits import SplitMesh
 
 MOST_PATH_SPLITS = 12_000
@@ -70,7 +70,7 @@ class Legs:
 
     @property
     def length(self) -> float:
-        """Length of what is laid, weighted by importance."""
+        """Length of what is laid, weighted by phi_fea."""
         return sum(self._length.values())
 
     @property
@@ -90,7 +90,7 @@ class Legs:
             is laid.
         """
         nothing = np.zeros(0, dtype=np.int64)
-        free = Obstacles(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
+        free = BlockedElements(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
         lengths = np.zeros(self.count)
         for leg in range(self.count):
             start, end = (self._split.position(vertex) for vertex in self.ends(leg))
@@ -188,13 +188,13 @@ class Legs:
                 self._open_corners(vertex)
         return self._search.are_joinable([self.ends(leg) for leg in legs], self._obstacles())
 
-    def _obstacles(self, *free: int) -> Obstacles:
+    def _obstacles(self, *free: int) -> BlockedElements:
         """All legs, and all waypoints but those that are free."""
         laid = [np.array(path, dtype=np.int64) for path in self._laid.values()]
         edges = [np.stack([path[:-1], path[1:]], axis=1) for path in laid]
         nothing = np.zeros((0, 2), dtype=np.int64)
         vertices = np.concatenate([*laid, np.array(self._waypoints, dtype=np.int64)])
-        return Obstacles(
+        return BlockedElements(
             vertices=np.setdiff1d(vertices, free),
             edges=np.concatenate([*edges, nothing]),
             ends=self._loose(),

@@ -53,7 +53,7 @@ class Path:
     waypoints : (k,) int array
         Vertices of the path that had to be visited, in order.
     length : float
-        Weighted by importance.
+        Weighted by phi_fea.
     """
 
     split: SplitMesh
@@ -62,9 +62,7 @@ class Path:
     length: float
 
 
-def lay_path(
-    mesh: Mesh, points: SurfacePoints, importance: FloatArray | None, closed: bool
-) -> Path:
+def lay_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
     """A simple path through points in their order, on a mesh that is split for it virtually.
 
     The legs are laid as the points follow one another. If that makes a path much longer than its
@@ -75,7 +73,7 @@ def lay_path(
     mesh : Mesh
     points : SurfacePoints
         Different ones on one component.
-    importance : (V,) float array or None
+    phi_fea : (V,) float array or None
         φ_fea at the input vertices; lengths count times its square.
     closed : bool
 
@@ -98,7 +96,7 @@ def lay_path(
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
         separate(split, waypoints)
-        search = LegSearch(mesh, split, component, importance, clearance)
+        search = LegSearch(mesh, split, component, phi_fea, clearance)
         legs = Legs(split, search, waypoints.tolist(), closed)
         done = False
         try:

@@ -127,7 +127,7 @@ class Nodes:
     positions : (n, 3) float array
     normals : (n, 3) float array
         Unit vectors.
-    importance : (n,) float array
+    phi_fea : (n,) float array
         φ_fea.
     """
 
@@ -135,7 +135,7 @@ class Nodes:
     closed: bool
     positions: FloatArray
     normals: FloatArray
-    importance: FloatArray
+    phi_fea: FloatArray
 
     @cached_property
     def steps(self) -> FloatArray:
@@ -150,19 +150,19 @@ class Nodes:
         return lengths if self.closed else lengths[:-1]
 
     @cached_property
-    def sideways(self) -> FloatArray:
+    def conormals(self) -> FloatArray:
         """Unit vectors across the curve in the tangent planes, shape (n, 3)."""
         unit = _unit(self.steps)
         return _unit(cross(self.normals.T, unit.T + before_each(unit.T)).T)
 
-    def sideways_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
-        """How normals, (n, 3), and φ_fea, (n,), change with a sideways move of their node."""
+    def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
+        """How normals, (n, 3), and φ_fea, (n,), change as their node moves along its conormal."""
         mesh, faces = surface.mesh, self.places.faces
         a, b, c = mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2)
         one, other = b - a, c - a
         # Barycentric coordinates of the move: least squares in the plane of the face.
         p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
-        f, g = (one * self.sideways).sum(axis=1), (other * self.sideways).sum(axis=1)
+        f, g = (one * self.conormals).sum(axis=1), (other * self.conormals).sum(axis=1)
         # No smaller than what rounding leaves of it where two long sides make hardly any angle.
         determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
         determinant = np.maximum(determinant, tolerances.TINY)
@@ -183,11 +183,11 @@ def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool) -> Node
     """Nodes with what the energy needs of the surface there."""
     weight = places.barycentric
     normals = _unit(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
-    importance = np.ones(len(places))
+    phi_fea = np.ones(len(places))
     if surface.feature_map is not None:
         corners = surface.mesh.faces[places.faces]
-        importance = (weight * surface.feature_map[corners]).sum(axis=1)
-    return Nodes(places, closed, places.positions(surface.mesh), normals, importance)
+        phi_fea = (weight * surface.feature_map[corners]).sum(axis=1)
+    return Nodes(places, closed, places.positions(surface.mesh), normals, phi_fea)
 
 
 def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:

@@ -12,7 +12,7 @@ where φ_fea is more, adds to the tension. Along a lane it is less; there only w
 counts and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of
 length. Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).
 
-The unknowns are sideways moves of nodes in their tangent planes. A node's residuals know only its
+The unknowns are moves of nodes along their conormals. A node's residuals know only its
 two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
 nothing.
 """
@@ -104,14 +104,14 @@ def bending_energy(nodes: Nodes) -> float:
 
 def feature_energy(nodes: Nodes) -> float:
     """∮ φ_fea² ds, in units of length."""
-    return float((nodes.importance**2 * _ds(nodes)).sum())
+    return float((nodes.phi_fea**2 * _ds(nodes)).sum())
 
 
 def elastic_energy(nodes: Nodes, weights: Balance) -> float:
     """E, with contact where that has a weight."""
     energy = float(_bending(nodes).sum() + (_tension(nodes, weights) * _ds(nodes)).sum())
     if weights.held is not None:
-        lane = np.minimum(nodes.importance, 1.0)
+        lane = np.minimum(nodes.phi_fea, 1.0)
         energy += weights.feature * float(lane**2 @ weights.held)
     if weights.contact:
         energy += 2.0 * weights.contact * float((contacts_between(nodes).overlap ** 2).sum())
@@ -127,7 +127,7 @@ def _ds(nodes: Nodes) -> FloatArray:
 
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
     """Energy of the curve's length at each node, (n,): τ, and more in an obstacle."""
-    return weights.tension + weights.feature * np.maximum(nodes.importance**2 - 1.0, 0.0)
+    return weights.tension + weights.feature * np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
 
 
 def _bending(nodes: Nodes) -> FloatArray:
@@ -154,7 +154,9 @@ def _no_entries() -> FloatArray:
 
 @dataclass(frozen=True)
 class ElasticSystem:
-    """Gauss-Newton's matrix and the slope, halves of the energy's derivatives by sideways moves.
+    """Gauss-Newton's matrix and the slope: halves of the energy's derivatives.
+
+    By moves of the nodes along their conormals.
 
     Attributes
     ----------
@@ -189,9 +191,9 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
     bands = _squared(bending_by) + _squared(stretch_by)
     slope = _transposed(bending_by, bending) + _transposed(stretch_by, stretch)
     if weights.held is not None:
-        pull = np.where(nodes.importance < 1.0, weights.feature * weights.held * drift, 0.0)
+        pull = np.where(nodes.phi_fea < 1.0, weights.feature * weights.held * drift, 0.0)
         bands[0] += pull * drift
-        slope += pull * nodes.importance
+        slope += pull * nodes.phi_fea
     # Residuals do not have all of the length's second derivative: this is a string's stiffness.
     stiffness = np.zeros(n)
     count = len(nodes.lengths)
@@ -235,7 +237,7 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> Float
 
 
 def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
-    """By how much sideways moves lower the linearised energy."""
+    """By how much moves along the conormals lower the linearised energy."""
     return -float(move @ (2.0 * system.slope + _product(system, move)))
 
 
@@ -249,14 +251,14 @@ def _linearised(
     (n,) float array
     (n,) float array
     (3, n) float array
-        Derivatives of the first by the sideways moves of nodes i - 1, i and i + 1.
+        Derivatives of the first by the moves of nodes i - 1, i and i + 1.
     (3, n) float array
         Of the second.
     (n,) float array
         Change of φ_fea with a node's own move.
     """
-    here = nodes.sideways.T
-    normal_turn, drift = nodes.sideways_derivatives(surface)
+    here = nodes.conormals.T
+    normal_turn, drift = nodes.conormal_derivatives(surface)
     turn, normal = normal_turn.T, nodes.normals.T
     after = nodes.steps.T
     before = before_each(after)
@@ -301,7 +303,7 @@ def _linearised(
     bending = turning / root
     pulled = np.sqrt(np.maximum(tension, tolerances.TINY))
     stretch_by = pulled * root_by
-    rising = np.where(nodes.importance > 1.0, weights.feature * nodes.importance * drift, 0.0)
+    rising = np.where(nodes.phi_fea > 1.0, weights.feature * nodes.phi_fea * drift, 0.0)
     stretch_by[1] += rising / pulled * root
     bending_by = (turning_by - bending * root_by) / root
     return bending, pulled * root, bending_by, stretch_by, drift

@@ -37,15 +37,15 @@ from .elastic_energy import (
     feature_energy,
     predicted_fall,
 )
-from .exact_curve import (
-    ExactCurve,
+from .noded_curve import (
+    NodedCurve,
     drawn,
-    exact_curve,
     is_simple,
+    moved_along_conormals,
+    noded_curve,
     redrawn,
     respaced,
     rounded,
-    sideways,
     without_short_segments,
 )
 
@@ -82,7 +82,7 @@ class RelaxationConfig:
         The same for moves of all nodes, taken or only tried; a move over many faces counts as
         several. Where a surface is so defective that few steps lower the energy, an iteration
         takes many of them.
-    drawn_at_rest : bool
+    defer_tracing : bool
         Whether to try first without drawing the curve after every iteration.
     drawn_iterations : int
         The cap where it is drawn after every iteration, if that is lower.
@@ -101,7 +101,7 @@ class RelaxationConfig:
     stretch: float = 1.6
     iterations: int = 100
     work: float = 800.0
-    drawn_at_rest: bool = False
+    defer_tracing: bool = False
     drawn_iterations: int = 100
     taut: float = 1.0
 
@@ -159,7 +159,7 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         Simple.
-    exact : ExactCurve
+    exact : NodedCurve
         The same with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
@@ -173,7 +173,7 @@ class Relaxed:
     """
 
     curve: SurfaceCurve
-    exact: ExactCurve
+    exact: NodedCurve
     bending: float
     feature: float
     iterations: int
@@ -185,7 +185,7 @@ Watch = Callable[[float, FloatArray], bool]
 
 def relax(
     surface: CurveSurface,
-    start: SurfaceCurve | ExactCurve,
+    start: SurfaceCurve | NodedCurve,
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
@@ -195,7 +195,7 @@ def relax(
     Parameters
     ----------
     surface : CurveSurface
-    start : SurfaceCurve or ExactCurve
+    start : SurfaceCurve or NodedCurve
         Simple, and through its control points in order.
     smoothness : float
         Divides the tension.
@@ -206,13 +206,13 @@ def relax(
         curve as it was last drawn, where `progress` says so.
     """
     relaxation = _Relaxation(surface, smoothness, config, watch)
-    if isinstance(start, ExactCurve):
+    if isinstance(start, NodedCurve):
         first, start = start, start.surface_curve(surface.mesh)
     else:
-        first = exact_curve(surface, start, config.levels[0])
+        first = noded_curve(surface, start, config.levels[0])
     relaxation.drawn = first
     try:
-        for simple in (False, True) if config.drawn_at_rest else (True,):
+        for simple in (False, True) if config.defer_tracing else (True,):
             curve = relaxation.run(first, simple)
             if relaxation.stopped == "cancelled" or _is_simple(surface, curve):
                 break
@@ -234,7 +234,7 @@ def relax(
     )
 
 
-def _is_simple(surface: CurveSurface, curve: ExactCurve | None) -> bool:
+def _is_simple(surface: CurveSurface, curve: NodedCurve | None) -> bool:
     return curve is not None and is_simple(surface, curve)
 
 
@@ -250,7 +250,7 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
 class _State:
     """A curve between two iterations, with its energy linearised."""
 
-    curve: ExactCurve  # as it was last drawn
+    curve: NodedCurve  # as it was last drawn
     nodes: Nodes
     held: BoolArray  # (n,) nodes that could not follow
     weights: Balance
@@ -280,7 +280,7 @@ class _Moved:
 class _Iteration:
     """Steps that lowered the energy, drawn."""
 
-    curve: ExactCurve  # as it was last drawn
+    curve: NodedCurve  # as it was last drawn
     nodes: Nodes
     energy: float
     held: BoolArray  # (n,) nodes that could not follow
@@ -304,9 +304,9 @@ class _Relaxation:
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
         self.iterations, self.work, self.stopped = 0, 0.0, "converged"
-        self.drawn: ExactCurve | None = None  # the last state, if it is stopped at once
+        self.drawn: NodedCurve | None = None  # the last state, if it is stopped at once
 
-    def run(self, curve: ExactCurve, simple: bool) -> ExactCurve | None:
+    def run(self, curve: NodedCurve, simple: bool) -> NodedCurve | None:
         """Relax a curve level by level; None where it could not be traced."""
         config = self.config
         cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
@@ -328,13 +328,13 @@ class _Relaxation:
 
     def _level(
         self,
-        curve: ExactCurve,
+        curve: NodedCurve,
         level: int,
         least: float,
         last_iteration: int,
         simple: bool,
         taut: float,
-    ) -> ExactCurve:
+    ) -> NodedCurve:
         """Iterations with one number of nodes until the energy falls by less than a share."""
         config, least_damping = self.config, self._least_damping(level)
         damping = least_damping
@@ -446,13 +446,13 @@ class _Relaxation:
             if not np.isfinite(move).all():
                 return None
             move, farthest = self._trusted(nodes, move)
-            moved, stayed = self._sideways(nodes, move)
+            moved, stayed = self._moved(nodes, move)
             reached = elastic_energy(moved, weights)
             # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
             # both energies with the slope here is lower at twice the step after such a fall.
             fallen = state.energy - reached
             if fallen > 0.0 and fallen > -TWICE * float(state.system.slope @ move):
-                farther, also_stayed = self._sideways(nodes, 2.0 * move)
+                farther, also_stayed = self._moved(nodes, 2.0 * move)
                 reached_there = elastic_energy(farther, weights)
                 if reached_there < reached:
                     return _Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
@@ -474,7 +474,7 @@ class _Relaxation:
             return None
         move, farthest = self._trusted(nodes, move)
         for share in (1.0, 0.5):
-            reached, stayed = self._sideways(nodes, share * move)
+            reached, stayed = self._moved(nodes, share * move)
             energy = elastic_energy(reached, weights)
             if energy < moved.energy:
                 stayed = moved.stayed | stayed
@@ -486,9 +486,9 @@ class _Relaxation:
         """Whether an attempt has taken all the work that it may."""
         return self.work >= self.config.work
 
-    def _sideways(self, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
+    def _moved(self, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
         """Nodes moved across the curve, and which came to a boundary."""
-        moved, stayed, passed = sideways(self.surface, nodes, step)
+        moved, stayed, passed = moved_along_conormals(self.surface, nodes, step)
         self.work += 1.0 + passed / FACES_OF_A_MOVE
         return moved, stayed
 
@@ -500,14 +500,14 @@ class _Relaxation:
             return move * (longest / farthest), longest
         return move, farthest
 
-    def _drawn(self, curve: ExactCurve, nodes: Nodes) -> ExactCurve:
+    def _drawn(self, curve: NodedCurve, nodes: Nodes) -> NodedCurve:
         """The curve through its nodes, which may have moved since it was last drawn."""
         changed = curve if nodes is curve.nodes else drawn(self.surface, curve, nodes)
         if changed is None:
             raise _LostError
         return changed
 
-    def _respaced(self, curve: ExactCurve, level: int, simple: bool) -> ExactCurve:
+    def _respaced(self, curve: NodedCurve, level: int, simple: bool) -> NodedCurve:
         """Nodes at about equal distances; where they would make strands touch, those it has."""
         alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
         if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
@@ -517,7 +517,7 @@ class _Relaxation:
             return curve
         return changed if alike else self._rounded(curve, changed)
 
-    def _rounded(self, coarse: ExactCurve, fine: ExactCurve) -> ExactCurve:
+    def _rounded(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
         """The fine nodes on a smooth curve through the coarse ones, if that bends less."""
         if len(fine.nodes.positions) < len(coarse.nodes.positions):
             return fine

@@ -32,7 +32,7 @@ class Contacts:
     overlap : (p,) float array
         1 - distance / clearance.
     derivatives : (p, 2) float array
-        Of the overlap by the two nodes' sideways moves.
+        Of the overlap by the two nodes' moves along their conormals.
     """
 
     pairs: IntArray
@@ -55,5 +55,5 @@ def contacts_between(nodes: Nodes) -> Contacts:
     direction = offset / distance[:, None]
     kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
     pairs, distance, direction = pairs[kept], distance[kept], direction[kept]
-    approach = np.einsum("pd,pkd->pk", direction, nodes.sideways[pairs]) * [-1.0, 1.0]
+    approach = np.einsum("pd,pkd->pk", direction, nodes.conormals[pairs]) * [-1.0, 1.0]
     return Contacts(pairs, 1.0 - distance / clearance, approach / clearance)

@@ -12,11 +12,11 @@ from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .exact_curve import ExactCurve, drawn, is_simple, shifted
+from .noded_curve import NodedCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(
-    levels=(512,), steps=1, longest_move=4.0, least_decrease=1e-3, drawn_at_rest=True
+    levels=(512,), steps=1, longest_move=4.0, least_decrease=1e-3, defer_tracing=True
 )
 """Relaxation from there: the curve has enough nodes and has nearly converged.
 
@@ -35,16 +35,16 @@ TAKEN_ALONG = 4.0
 
 def moved_along(
     surface: CurveSurface,
-    curve: ExactCurve,
+    curve: NodedCurve,
     controls: SurfacePoints,
     longest: float = LONGEST_MOVE,
-) -> ExactCurve | None:
+) -> NodedCurve | None:
     """A curve with its control points at new places nearby.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : ExactCurve
+    curve : NodedCurve
         Simple, and through its control points in order.
     controls : SurfacePoints
         The new places, in the order visited.
@@ -53,7 +53,7 @@ def moved_along(
 
     Returns
     -------
-    ExactCurve or None
+    NodedCurve or None
         Simple; None where the moves are too far for that.
     """
     mesh = surface.mesh

@@ -65,7 +65,7 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     is_welded = number >= 2
     checkpoint()
     kept = usable
-    if mesh.branches or is_welded:
+    if mesh.has_nonmanifold_edges or is_welded:
         kept = kept[_without_twins(welded[mesh.faces[kept]])]
     sides = _Sides(mesh.faces[kept], welded)
     if not sides.branching:

@@ -6,7 +6,7 @@ import nicmm_core as nicmm
 from benchmarks.checker import judge
 from nicmm_core import shapes
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
-from nicmm_core.relaxation import exact_curve, relaxing
+from nicmm_core.relaxation import noded_curve, relaxing
 
 WORK = relaxing.RelaxationConfig().work
 
@@ -33,14 +33,14 @@ def fan(count):
 def test_a_fan_of_thousands_of_needles(monkeypatch):
     """A node that moves beside its tip passes them all."""
     passed = []
-    trace_from = exact_curve.trace_from
+    trace_from = noded_curve.trace_from
 
     def counted(*given):
         result = trace_from(*given)
         passed.append(result[2])
         return result
 
-    monkeypatch.setattr(exact_curve, "trace_from", counted)
+    monkeypatch.setattr(noded_curve, "trace_from", counted)
     count = 3000
     mesh = fan(count)
     faces = np.array([10, 900, 1700, 2500])

@@ -29,7 +29,7 @@ from nicmm_core.path.virtual_splits import SplitMesh
 CPU = torch.device("cpu")
 
 
-def dense_tensors(mesh, delta_width, controls=(), importance=None):
+def dense_tensors(mesh, delta_width, controls=(), phi_fea=None):
     """The same surface in double precision with dense matrices, in the mesh's own unit."""
     working, _ = SplitMesh(mesh).assemble(0)
     elements = build_finite_elements(working.vertices, working.faces, working.on_boundary)
@@ -45,7 +45,7 @@ def dense_tensors(mesh, delta_width, controls=(), importance=None):
         centroid=operator(elements.centroid),
         control_vertices=torch.as_tensor(np.array(controls, dtype=np.int64)),
         delta_width=delta_width,
-        feature_map=None if importance is None else torch.as_tensor(importance),
+        feature_map=None if phi_fea is None else torch.as_tensor(phi_fea),
     )
 
 
@@ -88,13 +88,13 @@ def test_smoothness_term_of_a_straight_line_is_zero(flat_disc):
     assert smoothness_loss(dense_tensors(flat_disc, 0.08), phi).item() < 1e-15
 
 
-@pytest.mark.parametrize("importance", [1.0, 0.5, 2.0])
-def test_feature_term_of_a_circle(importance):
+@pytest.mark.parametrize("phi_fea", [1.0, 0.5, 2.0])
+def test_feature_term_of_a_circle(phi_fea):
     """Eq. 7 and 8: ½ b² times the length for a constant map b."""
     mesh, radius = shapes.disc(24), 0.5
     phi = field(np.linalg.norm(mesh.vertices, axis=1) - radius)
-    surface = dense_tensors(mesh, 1 / 24, importance=np.full(len(mesh.faces), importance))
-    expected = 0.5 * importance**2 * 2 * np.pi * radius
+    surface = dense_tensors(mesh, 1 / 24, phi_fea=np.full(len(mesh.faces), phi_fea))
+    expected = 0.5 * phi_fea**2 * 2 * np.pi * radius
     assert feature_loss(surface, phi).item() == pytest.approx(expected, rel=0.01)
 
 
@@ -102,7 +102,7 @@ def test_feature_term_of_a_circle_on_the_sphere(ball):
     """The length of a parallel at height z, φ its signed distance."""
     height = 0.3
     phi = field(np.arccos(np.clip(ball.vertices[:, 2], -1, 1)) - np.arccos(height))
-    surface = dense_tensors(ball, 0.15, importance=np.ones(len(ball.faces)))
+    surface = dense_tensors(ball, 0.15, phi_fea=np.ones(len(ball.faces)))
     expected = 0.5 * 2 * np.pi * np.sqrt(1 - height**2)
     assert feature_loss(surface, phi).item() == pytest.approx(expected, rel=0.02)
 
@@ -110,7 +110,7 @@ def test_feature_term_of_a_circle_on_the_sphere(ball):
 def test_feature_term_weighs_the_map_where_the_curve_runs(flat_disc):
     """A map that is 2 on one half and 1 on the other: the mean of both squares on a diameter."""
     left = flat_disc.vertices[flat_disc.faces].mean(axis=1)[:, 0] < 0.0
-    surface = dense_tensors(flat_disc, 0.08, importance=np.where(left, 2.0, 1.0))
+    surface = dense_tensors(flat_disc, 0.08, phi_fea=np.where(left, 2.0, 1.0))
     phi = field(flat_disc.vertices[:, 1] - 0.01)
     assert feature_loss(surface, phi).item() == pytest.approx(0.5 * (4.0 + 1.0), rel=0.03)
     assert feature_loss(dense_tensors(flat_disc, 0.08), phi).item() == 0.0
@@ -183,7 +183,7 @@ def test_sparse_operator_and_its_gradient_equal_the_dense_matrix():
 def test_gradients_of_all_terms_are_those_of_differences(small_ball):
     """In double precision, by finite differences."""
     surface = dense_tensors(
-        small_ball, 0.3, controls=[3, 40, 111], importance=np.linspace(0.5, 2.0, 320)
+        small_ball, 0.3, controls=[3, 40, 111], phi_fea=np.linspace(0.5, 2.0, 320)
     )
     start = field(small_ball.vertices[:, 2] + 0.1 * small_ball.vertices[:, 0] ** 2)
     start.requires_grad_()

@@ -62,10 +62,10 @@ def test_sideways_of_a_circle_is_its_radius(flat_disc, closed):
     nodes = circle_on_disc(flat_disc, closed=closed)
     radius = -nodes.positions / 0.6
     between = slice(None) if closed else slice(1, -1)
-    np.testing.assert_allclose(nodes.sideways[between], radius[between], atol=1e-4)
-    np.testing.assert_allclose(np.linalg.norm(nodes.sideways, axis=1), 1.0)
+    np.testing.assert_allclose(nodes.conormals[between], radius[between], atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(nodes.conormals, axis=1), 1.0)
     if not closed:
-        ends = (nodes.sideways * nodes.steps)[0], nodes.sideways[-1] * nodes.steps[-2]
+        ends = (nodes.conormals * nodes.steps)[0], nodes.conormals[-1] * nodes.steps[-2]
         np.testing.assert_allclose([end.sum() for end in ends], 0.0, atol=1e-12)
 
 
@@ -89,7 +89,7 @@ def test_normals_take_the_side_of_their_face(ball):
 def test_without_a_map_every_place_has_importance_one(ball):
     surface = CurveSurface(ball, unsigned_normals(ball))
     places = random_surface_points(ball, 5, seed=1)
-    np.testing.assert_array_equal(nodes_at(surface, places, True).importance, 1.0)
+    np.testing.assert_array_equal(nodes_at(surface, places, True).phi_fea, 1.0)
 
 
 def test_a_linear_map_is_read_exactly(body):
@@ -97,7 +97,7 @@ def test_a_linear_map_is_read_exactly(body):
     gradient = np.array([0.1, -0.2, 0.3])
     surface = CurveSurface(body, unsigned_normals(body), 2.0 + body.vertices @ gradient, 1.0)
     nodes = nodes_at(surface, random_surface_points(body, 30, seed=4), True)
-    np.testing.assert_allclose(nodes.importance, 2.0 + nodes.positions @ gradient)
+    np.testing.assert_allclose(nodes.phi_fea, 2.0 + nodes.positions @ gradient)
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
@@ -110,17 +110,17 @@ def test_derivatives_are_those_of_small_moves_inside_the_faces(body, factor):
     # Sideways moves here have a part out of the plane of the face, which it does not see.
     corner = mesh.vertices[mesh.faces[places.faces]]
     edges = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=2)
-    change = np.einsum("nij,nj->ni", np.linalg.pinv(edges), nodes.sideways)
+    change = np.einsum("nij,nj->ni", np.linalg.pinv(edges), nodes.conormals)
     change = np.concatenate([-change.sum(axis=1, keepdims=True), change], axis=1)
     step = 1e-5 * factor
     ahead, behind = (
         nodes_at(surface, SurfacePoints(places.faces, places.barycentric + sign * step * change), 1)
         for sign in (1.0, -1.0)
     )
-    turn, drift = nodes.sideways_derivatives(surface)
+    turn, drift = nodes.conormal_derivatives(surface)
     expected = (ahead.normals - behind.normals) / (2.0 * step)
     np.testing.assert_allclose(turn, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    expected = (ahead.importance - behind.importance) / (2.0 * step)
+    expected = (ahead.phi_fea - behind.phi_fea) / (2.0 * step)
     np.testing.assert_allclose(drift, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
@@ -129,8 +129,8 @@ def test_on_a_sphere_normals_turn_with_the_move(ball):
     mesh = shapes.sphere(4)
     surface = CurveSurface(mesh, unsigned_normals(mesh))
     nodes = nodes_at(surface, points_near(mesh, circle(ANGLES) + [0, 0, 0.01]), True)
-    turn, drift = nodes.sideways_derivatives(surface)
-    np.testing.assert_allclose(turn, nodes.sideways, atol=0.06)
+    turn, drift = nodes.conormal_derivatives(surface)
+    np.testing.assert_allclose(turn, nodes.conormals, atol=0.06)
     np.testing.assert_array_equal(drift, 0.0)
 
 
@@ -142,4 +142,4 @@ def test_normals_and_sideways_turn_with_the_surface(body):
         nodes_at(CurveSurface(mesh, unsigned_normals(mesh)), places, True) for mesh in (body, posed)
     )
     np.testing.assert_allclose(there.normals, turn.apply(here.normals), atol=1e-12)
-    np.testing.assert_allclose(there.sideways, turn.apply(here.sideways), atol=1e-12)
+    np.testing.assert_allclose(there.conormals, turn.apply(here.conormals), atol=1e-12)

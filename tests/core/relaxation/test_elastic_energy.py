@@ -21,7 +21,7 @@ from nicmm_core.relaxation.elastic_energy import (
     feature_energy,
     predicted_fall,
 )
-from nicmm_core.relaxation.exact_curve import sideways
+from nicmm_core.relaxation.noded_curve import moved_along_conormals
 from tests.core.checks import circle, flipped, points_near, renumbered, scaled
 
 
@@ -249,7 +249,9 @@ def test_the_slope_is_half_the_derivative_by_moves_on_the_surface(points, closed
     for node in range(len(slope)):
         move = np.zeros(len(slope))
         move[node] = step
-        ahead, behind = (sideways(surface, nodes, sign * move)[0] for sign in (1.0, -1.0))
+        ahead, behind = (
+            moved_along_conormals(surface, nodes, sign * move)[0] for sign in (1.0, -1.0)
+        )
         change = elastic_energy(ahead, weights) - elastic_energy(behind, weights)
         expected[node] = 0.5 * change / (2.0 * step)
     # The mean step, which contact compares with, knows of single nodes only at sharp tips.
@@ -272,7 +274,9 @@ def test_on_a_sphere_the_slope_is_nearly_that_of_the_energy():
     for _ in range(5):
         phase, waves = generator.uniform(0, 6), generator.integers(1, 6)
         move = np.cos(waves * angle + phase)
-        ahead, behind = (sideways(surface, nodes, s * step * move)[0] for s in (1.0, -1.0))
+        ahead, behind = (
+            moved_along_conormals(surface, nodes, s * step * move)[0] for s in (1.0, -1.0)
+        )
         change = elastic_energy(ahead, weights) - elastic_energy(behind, weights)
         expected = 0.5 * change / (2.0 * step)
         assert move @ slope == pytest.approx(expected, abs=0.05 * np.linalg.norm(slope))
@@ -353,7 +357,7 @@ def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
     assert len(system.pairs) > 0
     step = 1e-3 * damped_step(system, np.ones(len(nodes.positions), dtype=bool), 1.0)
     fall = elastic_energy(nodes, weights) - elastic_energy(
-        sideways(surface, nodes, step)[0], weights
+        moved_along_conormals(surface, nodes, step)[0], weights
     )
     assert fall > 0.0
     assert fall == pytest.approx(predicted_fall(system, step), rel=0.05)
@@ -395,7 +399,7 @@ def test_a_step_lowers_the_energy_to_second_order(flat_disc):
     free = np.ones(40, dtype=bool)
     free[[0, -1]] = False
     step = damped_step(elastic_system(surface, nodes, weights), free, 1e-10)
-    moved, _, _ = sideways(surface, nodes, step)
+    moved, _, _ = moved_along_conormals(surface, nodes, step)
     excess = [elastic_energy(n, weights) - 1.0 for n in (nodes, moved)]
     assert excess[0] > 1e-3
     assert excess[1] < 0.01 * excess[0]

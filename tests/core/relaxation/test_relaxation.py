@@ -446,8 +446,10 @@ def test_work_is_bounded_by_moves(flat_disc, work):
 def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
     """Its nodes are spaced anew again and again, and steps over folds gain less than that costs."""
     moves = []
-    sideways = relaxing.sideways
-    monkeypatch.setattr(relaxing, "sideways", lambda *given: moves.append(1) or sideways(*given))
+    step = relaxing.moved_along_conormals
+    monkeypatch.setattr(
+        relaxing, "moved_along_conormals", lambda *given: moves.append(1) or step(*given)
+    )
     mess = messes.mess(number)
     nicmm.design_curve(mess.mesh, mess.points, **mess.arguments)
     assert len(moves) <= DEFAULT.work

@@ -117,8 +117,8 @@ def test_the_derivative_is_that_of_the_overlap(flat_disc):
     move = 1e-6 * STEP
     for node in (8, 14, 60):
         positions = nodes.positions.copy()
-        positions[node] += move * nodes.sideways[node]
-        moved = Nodes(nodes.places, False, positions, nodes.normals, nodes.importance)
+        positions[node] += move * nodes.conormals[node]
+        moved = Nodes(nodes.places, False, positions, nodes.normals, nodes.phi_fea)
         after = seen_by_nodes(moved)
         scale = CLEARANCE * moved.lengths.mean() / clearance
         own = contacts.node == node

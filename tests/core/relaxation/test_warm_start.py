@@ -8,7 +8,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
-from nicmm_core.relaxation.exact_curve import without_short_segments
+from nicmm_core.relaxation.noded_curve import without_short_segments
 from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
 from nicmm_core.relaxation.warm_start import WARM, moved_along
 from tests.core.checks import apart, assert_valid_design, circle, nearest_vertices

@@ -11,7 +11,7 @@ from nicmm_core import shapes, surface_designer
 from nicmm_core.geometry import tolerances
 from nicmm_core.geometry.mesh import unique_edges
 from nicmm_core.geometry.surface_points import locate_points
-from nicmm_core.path.leg_graph import pinched_vertices
+from nicmm_core.path.leg_graph import nonmanifold_vertices
 from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
 from tests.core.checks import grid, joined
 
@@ -55,7 +55,7 @@ def test_repairs_are_manifolds_of_the_same_faces(name):
     mesh = MESHES[name]
     repairs = repairs_of(mesh)
     there = [number for number, mapped in enumerate(repairs) if mapped is not None]
-    assert there == JOINED.get(name, [0, 1] if mesh.branches else [0])
+    assert there == JOINED.get(name, [0, 1] if mesh.has_nonmanifold_edges else [0])
     for mapped in (repairs[number] for number in there):
         assert_manifold(mapped.mesh)
         assert (mapped.mesh.face_areas > 0.0).all()
@@ -99,7 +99,7 @@ def test_all_faces_at_one_edge_are_connected(count):
 def assert_manifold(mesh):
     """At most two faces an edge, one fan of faces a vertex."""
     assert (unique_edges(mesh.faces)[1] <= 2).all()
-    assert not pinched_vertices(mesh).any()
+    assert not nonmanifold_vertices(mesh).any()
 
 
 def test_copies_of_one_vertex_are_at_different_places():
@@ -297,7 +297,7 @@ class TestEdgesOfManyFaces:
         vertices = np.concatenate([np.zeros((1, 3)), axes])
         pairs = [(a, b) for a in range(1, 7) for b in range(a + 1, 7) if b != a + 3]
         mesh = nicmm.Mesh(vertices, [[0, a, b] for a, b in pairs])
-        assert mesh.branches
+        assert mesh.has_nonmanifold_edges
         chosen = np.random.default_rng(seed).choice(np.arange(1, 7), 3, replace=False)
         design = nicmm.design_curve(mesh, chosen, order="shortest", closed=False)
         assert not judge(mesh, design, chosen, closed=False, order="shortest").faults

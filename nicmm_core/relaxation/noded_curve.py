@@ -39,7 +39,7 @@ A tube drawn along the curve would show it as a notch.
 
 
 @dataclass(frozen=True)
-class ExactCurve:
+class NodedCurve:
     """A polyline on the mesh with its nodes; the first point is a node.
 
     Attributes
@@ -71,7 +71,7 @@ class ExactCurve:
         return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
-def without_short_segments(mesh: Mesh, curve: ExactCurve) -> SurfaceCurve:
+def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
     """The polyline as a result, where that leaves it simple without nodes close beside edges.
 
     The neighbours of a node inside a face can be joined in the same face.
@@ -92,7 +92,7 @@ def without_short_segments(mesh: Mesh, curve: ExactCurve) -> SurfaceCurve:
     return curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
-def exact_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> ExactCurve:
+def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> NodedCurve:
     """Put nodes on a curve that passes its control points in order.
 
     Parameters
@@ -109,13 +109,13 @@ def exact_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Exact
     return _with_nodes(surface, polyline, control_place, count, curve.closed)
 
 
-def respaced(surface: CurveSurface, curve: ExactCurve, count: int) -> ExactCurve:
+def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
     """Another number of nodes, or the same at equal distances, on the same polyline."""
     at_controls = curve.node_place[curve.control_nodes]
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
 
-def rounded(surface: CurveSurface, coarse: ExactCurve, fine: ExactCurve) -> ExactCurve:
+def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
     """Fine nodes on a smooth curve through the coarse ones of the same polyline.
 
     Between two coarse nodes the polyline is straight, so all of its turning is at a quarter of the
@@ -125,14 +125,14 @@ def rounded(surface: CurveSurface, coarse: ExactCurve, fine: ExactCurve) -> Exac
     Parameters
     ----------
     surface : CurveSurface
-    coarse : ExactCurve
+    coarse : NodedCurve
         Simple.
-    fine : ExactCurve
+    fine : NodedCurve
         More nodes on its polyline.
 
     Returns
     -------
-    ExactCurve
+    NodedCurve
         Simple; nodes that could not move are where they were, all if a leg has no length.
     """
     at, total = _arc_lengths(surface.mesh, coarse)
@@ -148,19 +148,21 @@ def rounded(surface: CurveSurface, coarse: ExactCurve, fine: ExactCurve) -> Exac
     along = _arc_lengths(surface.mesh, fine)[0]
     straight = make_interp_spline(at, through, k=1)(along)
     aside = CubicHermiteSpline(at, through, slope)(along) - straight
-    step = (aside * fine.nodes.sideways).sum(axis=1)
+    step = (aside * fine.nodes.conormals).sum(axis=1)
     step[fine.control_nodes] = 0.0
-    return redrawn(surface, fine, sideways(surface, fine.nodes, step)[0])[0]
+    return redrawn(surface, fine, moved_along_conormals(surface, fine.nodes, step)[0])[0]
 
 
-def _arc_lengths(mesh: Mesh, curve: ExactCurve) -> tuple[FloatArray, float]:
+def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
     """Arc length at the nodes, (n,), and of the whole curve."""
     arc = arc_lengths(curve.polyline.positions(mesh), curve.closed)
     return arc[curve.node_place], float(arc[-1])
 
 
-def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray, int]:
-    """Nodes moved across the curve by lengths along `Nodes.sideways`, (n,).
+def moved_along_conormals(
+    surface: CurveSurface, nodes: Nodes, step: FloatArray
+) -> tuple[Nodes, BoolArray, int]:
+    """Nodes moved across the curve by lengths along `Nodes.conormals`, (n,).
 
     Returns
     -------
@@ -170,7 +172,7 @@ def sideways(surface: CurveSurface, nodes: Nodes, step: FloatArray) -> tuple[Nod
     int
         How many faces the node that passed most of them has passed.
     """
-    return shifted(surface, nodes, nodes.sideways * np.sign(step)[:, None], np.abs(step))
+    return shifted(surface, nodes, nodes.conormals * np.sign(step)[:, None], np.abs(step))
 
 
 def shifted(
@@ -206,14 +208,14 @@ def shifted(
     return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked, passed
 
 
-def is_simple(surface: CurveSurface, curve: ExactCurve) -> bool:
+def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:
     """Whether the curve neither crosses nor touches itself."""
     return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
 def drawn(
-    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, still: BoolArray | None = None
-) -> ExactCurve | None:
+    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, still: BoolArray | None = None
+) -> NodedCurve | None:
     """The curve through nodes at new places, simple or not; None where it cannot be drawn.
 
     Between two nodes that are `still`, (n,), it stays as it is.
@@ -226,11 +228,11 @@ def drawn(
     polyline, node_place, lost = _drawn(surface, curve, nodes, kept)
     if lost.any():
         return None
-    return ExactCurve(nodes, curve.control_nodes, polyline, node_place)
+    return NodedCurve(nodes, curve.control_nodes, polyline, node_place)
 
 
 def straight_ways(
-    surface: CurveSurface, curve: ExactCurve, nodes: Nodes
+    surface: CurveSurface, curve: NodedCurve, nodes: Nodes
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline of straight ways between nodes at new places.
 
@@ -245,20 +247,20 @@ def straight_ways(
     return _drawn(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
 
 
-def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[ExactCurve, BoolArray]:
+def redrawn(surface: CurveSurface, curve: NodedCurve, nodes: Nodes) -> tuple[NodedCurve, BoolArray]:
     """The curve through nodes at new places where that leaves it simple, the old one elsewhere.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : ExactCurve
+    curve : NodedCurve
         Simple.
     nodes : Nodes
         n nodes, the control points where they are.
 
     Returns
     -------
-    ExactCurve
+    NodedCurve
     (n,) bool array
         Nodes that had to stay where they were.
     """
@@ -278,7 +280,7 @@ def redrawn(surface: CurveSurface, curve: ExactCurve, nodes: Nodes) -> tuple[Exa
             pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
         if not bad.any():
-            return ExactCurve(nodes, curve.control_nodes, polyline, node_place), stays
+            return NodedCurve(nodes, curve.control_nodes, polyline, node_place), stays
         if not (bad & ~kept).any():
             return curve, np.ones(len(old), dtype=bool)
         kept |= bad
@@ -291,7 +293,7 @@ def _with_nodes(
     control_place: IntArray,
     count: int,
     closed: bool,
-) -> ExactCurve:
+) -> NodedCurve:
     """Insert nodes at equal distances on each leg and drop what was no more than a node."""
     mesh, n = surface.mesh, len(polyline)
     arc = arc_lengths(polyline.positions(mesh), closed)
@@ -326,18 +328,18 @@ def _with_nodes(
     )
     node_place = np.flatnonzero(order < len(at))
     nodes = nodes_at(surface, places, closed)
-    return ExactCurve(nodes, control_nodes, merged, node_place)
+    return NodedCurve(nodes, control_nodes, merged, node_place)
 
 
 def _drawn(
-    surface: CurveSurface, curve: ExactCurve, nodes: Nodes, kept: BoolArray
+    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline through nodes at new places.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : ExactCurve
+    curve : NodedCurve
     nodes : Nodes
         n nodes at new places.
     kept : (n,) bool array
@@ -382,7 +384,7 @@ Stretches = tuple[IntArray, SurfacePoints]
 """Points of stretches between nodes, each with the node before it; that node comes first."""
 
 
-def _kept_stretches(curve: ExactCurve, nodes: IntArray) -> Stretches:
+def _kept_stretches(curve: NodedCurve, nodes: IntArray) -> Stretches:
     bounds = np.append(curve.node_place, len(curve.polyline))
     count = bounds[nodes + 1] - bounds[nodes]
     owner = np.repeat(nodes, count)

@@ -10,15 +10,15 @@ from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
-from nicmm_core.relaxation.exact_curve import (
+from nicmm_core.relaxation.noded_curve import (
     drawn,
-    exact_curve,
     in_faces,
     is_simple,
+    moved_along_conormals,
+    noded_curve,
     redrawn,
     respaced,
     rounded,
-    sideways,
     without_short_segments,
 )
 from tests.core.checks import (
@@ -58,7 +58,7 @@ def distance_to(points, polyline, closed):
 @pytest.mark.parametrize("count", [10, 64, 300])
 def test_nodes_are_points_of_the_same_curve_at_equal_distances_on_each_leg(ball, closed, count):
     curve = ring_on(ball, closed, radius=1.0)
-    exact = exact_curve(surface_of(ball), curve, count)
+    exact = noded_curve(surface_of(ball), curve, count)
     result = exact.surface_curve(ball)
     assert_valid_curve(ball, result, curve.points[curve.control_index], closed)
     assert result.length == pytest.approx(curve.length, rel=1e-5)
@@ -79,7 +79,7 @@ def test_nodes_are_points_of_the_same_curve_at_equal_distances_on_each_leg(ball,
 
 def test_the_first_control_point_is_the_first_node(ball):
     curve = ring_on(ball)
-    exact = exact_curve(surface_of(ball), curve, 50)
+    exact = noded_curve(surface_of(ball), curve, 50)
     assert exact.control_nodes[0] == exact.node_place[0] == 0
     np.testing.assert_array_equal(
         exact.nodes.positions[exact.control_nodes], curve.points[curve.control_index]
@@ -88,7 +88,7 @@ def test_the_first_control_point_is_the_first_node(ball):
 
 def test_control_points_at_vertices_are_there_once(ball):
     curve = nicmm.design_curve(ball, [12, 80, 41], method="variational").curves[0]
-    exact = exact_curve(surface_of(ball), curve, 64)
+    exact = noded_curve(surface_of(ball), curve, 64)
     assert_valid_curve(ball, exact.surface_curve(ball), ball.vertices[[12, 80, 41]])
     again = respaced(surface_of(ball), exact, 100)
     assert_valid_curve(ball, again.surface_curve(ball), ball.vertices[[12, 80, 41]])
@@ -102,7 +102,7 @@ def test_nodes_exactly_at_points_of_edges_keep_the_order():
     curve = curve_through(mesh, np.pad(corners, ((0, 0), (0, 1))), np.arange(4))
     # Inside a face, on its diagonal, at whole coordinates and so on: no rounding anywhere.
     for count in (32, 64, 128, 256):
-        result = exact_curve(surface_of(mesh), curve, count).surface_curve(mesh)
+        result = noded_curve(surface_of(mesh), curve, count).surface_curve(mesh)
         assert_valid_curve(mesh, result, curve.points[curve.control_index])
         assert result.length == pytest.approx(2.0, rel=1e-4)
 
@@ -114,7 +114,7 @@ def test_spacing_nodes_anew_leaves_the_curve_where_it_is(ring, counts):
     place[:, :2] *= 1.3
     curve = curve_through(ring, place, CONTROLS)
     surface = surface_of(ring)
-    first = exact_curve(surface, curve, counts[0])
+    first = noded_curve(surface, curve, counts[0])
     again = respaced(surface, first, counts[1]).surface_curve(ring)
     assert_valid_curve(ring, again, curve.points[curve.control_index])
     assert again.length == pytest.approx(curve.length, rel=1e-5)
@@ -126,15 +126,15 @@ def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
     mesh = scaled(flat_disc, factor)
     surface = surface_of(mesh)
     curve = curve_through(mesh, circle(ANGLES, 0.6 * factor), CONTROLS)
-    nodes = exact_curve(surface, curve, 60).nodes
+    nodes = noded_curve(surface, curve, 60).nodes
     step = np.full(len(nodes.positions), 0.1 * factor)
     step[::7] = 0.0
-    moved, blocked, _ = sideways(surface, nodes, step)
+    moved, blocked, _ = moved_along_conormals(surface, nodes, step)
     assert not blocked.any()
     before, after = (np.linalg.norm(n.positions, axis=1) for n in (nodes, moved))
     np.testing.assert_allclose(before - after, step, atol=5e-3 * factor)
     np.testing.assert_array_equal(moved.positions[::7], nodes.positions[::7])
-    outwards, blocked, _ = sideways(surface, nodes, -7.0 * step)
+    outwards, blocked, _ = moved_along_conormals(surface, nodes, -7.0 * step)
     np.testing.assert_array_equal(blocked, step > 0.0)
     assert np.linalg.norm(outwards.positions, axis=1).max() < factor
 
@@ -145,10 +145,10 @@ def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed)
     """Round a section of the body, every node moved a little to its own side."""
     mesh = body if seed is None else flipped(body, seed)
     surface = surface_of(mesh)
-    exact = exact_curve(surface, section(mesh, closed), 80)
+    exact = noded_curve(surface, section(mesh, closed), 80)
     step = 0.02 * np.sin(np.arange(len(exact.nodes.positions)))
     step[exact.control_nodes] = 0.0
-    nodes, _, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
     new = drawn(surface, exact, nodes)
     result = new.surface_curve(mesh)
     assert_lies_on_surface(mesh, result)
@@ -176,7 +176,7 @@ def sides(mesh):
 
 def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
     surface = surface_of(ball)
-    exact = exact_curve(surface, ring_on(ball, radius=1.0), 100)
+    exact = noded_curve(surface, ring_on(ball, radius=1.0), 100)
     again = drawn(surface, exact, exact.nodes)
     assert_valid_curve(ball, again.surface_curve(ball))
     length = exact.surface_curve(ball).length
@@ -189,13 +189,13 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
     """Random moves of up to half the radius, where ways cross one another everywhere."""
     generator = np.random.default_rng(seed)
     surface = surface_of(flat_disc)
-    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    exact = noded_curve(surface, ring_on(flat_disc), 60)
     n = len(exact.nodes.positions)
     controls = exact.nodes.positions[exact.control_nodes]
     for size in (0.02, 0.1, 0.3):
         step = generator.normal(scale=size, size=n)
         step[exact.control_nodes] = 0.0
-        nodes, _, _ = sideways(surface, exact.nodes, step)
+        nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
         new, stays = redrawn(surface, exact, nodes)
         assert is_simple(surface, new)
         result = new.surface_curve(flat_disc)
@@ -208,10 +208,10 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
 
 def test_moves_that_cross_nothing_are_all_made(flat_disc):
     surface = surface_of(flat_disc)
-    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    exact = noded_curve(surface, ring_on(flat_disc), 60)
     step = np.full(len(exact.nodes.positions), 0.02)
     step[exact.control_nodes] = 0.0
-    nodes, _, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
     new, stays = redrawn(surface, exact, nodes)
     assert not stays.any()
     np.testing.assert_array_equal(new.nodes.positions, nodes.positions)
@@ -220,12 +220,12 @@ def test_moves_that_cross_nothing_are_all_made(flat_disc):
 def test_only_the_nodes_that_would_cross_stay(flat_disc):
     """Far from the crossing nodes do move."""
     surface = surface_of(flat_disc)
-    exact = exact_curve(surface, ring_on(flat_disc), 60)
+    exact = noded_curve(surface, ring_on(flat_disc), 60)
     here = exact.nodes.positions
     step = np.full(len(here), 0.02)
     step[here[:, 0] > 0.5] = 1.19  # over to the other side
     step[exact.control_nodes] = 0.0
-    nodes, _, _ = sideways(surface, exact.nodes, step)
+    nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
     assert not is_simple(surface, drawn(surface, exact, nodes))
     simple, stays = redrawn(surface, exact, nodes)
     assert is_simple(surface, simple)
@@ -236,7 +236,7 @@ def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
     """On both sides of a hole in the disc."""
     mesh = shapes.annulus(12, 0.4)
     surface = surface_of(mesh)
-    exact = exact_curve(surface, ring_on(mesh), 60)
+    exact = noded_curve(surface, ring_on(mesh), 60)
     n = len(exact.nodes.positions)
     chosen = SurfacePoints(exact.nodes.places.faces.copy(), exact.nodes.places.barycentric.copy())
     node = int(np.setdiff1d(np.arange(n), exact.control_nodes)[20])
@@ -253,8 +253,8 @@ def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
 def test_a_curve_that_crosses_itself_is_not_simple(flat_disc):
     eight = np.stack([0.6 * np.sin(ANGLES), 0.4 * np.sin(2 * ANGLES), 0 * ANGLES], axis=1)
     surface = surface_of(flat_disc)
-    assert not is_simple(surface, exact_curve(surface, curve_through(flat_disc, eight, [0]), 60))
-    assert is_simple(surface, exact_curve(surface, ring_on(flat_disc), 60))
+    assert not is_simple(surface, noded_curve(surface, curve_through(flat_disc, eight, [0]), 60))
+    assert is_simple(surface, noded_curve(surface, ring_on(flat_disc), 60))
 
 
 def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
@@ -273,7 +273,7 @@ def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
 def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(flat_disc):
     """∮ κ² ds of a circle is 2π / r; a polygon has more than twice that."""
     surface = surface_of(flat_disc)
-    ring = exact_curve(surface, ring_on(flat_disc), 48)
+    ring = noded_curve(surface, ring_on(flat_disc), 48)
     polygon = drawn(surface, ring, ring.nodes)
     finer = respaced(surface, polygon, 144)
     assert bending_energy(finer.nodes) > 2.0 * 2.0 * np.pi / 0.6
@@ -287,7 +287,7 @@ def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(
 def test_a_node_close_beside_an_edge_makes_no_short_segment(flat_disc):
     """Nodes are moved along the curve to a hundredth of a step behind the crossing before them."""
     surface = surface_of(flat_disc)
-    ring = exact_curve(surface, ring_on(flat_disc), 64)
+    ring = noded_curve(surface, ring_on(flat_disc), 64)
     ring = drawn(surface, ring, ring.nodes)
     places = ring.nodes.places
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
