@@ -26,7 +26,7 @@ def refusal(**arguments):
 def assert_on_surface(core, curve, mesh_object):
     """A curve object's points are on the mesh, in its own space."""
     mesh = core.Mesh(scenes.positions(mesh_object), scenes.triangles(mesh_object))
-    surface_points = import_module(f"{core.__name__}.surface_points")
+    surface_points = import_module(f"{core.__name__}.geometry.surface_points")
     _, distance = surface_points.nearest_points(mesh, scenes.points(curve))
     assert distance.max() < 1e-6 * mesh.diagonal
     assert len(distance) > 10
