@@ -28,7 +28,7 @@ BAND_SHARE = 0.05
 It holds what the curve may move. Farther out, the longest edge grows with twice the distance.
 """
 
-MOST_SPLITS = 4_000
+MOST_SPLITS = 3_000
 """Edges that are halved at most; needle-shaped faces side by side would ask for many times more.
 
 The longest edges come first, so that stopping leaves the band evenly coarser.
