@@ -20,7 +20,7 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
-MOST_FACES = 2048
+MOST_FACES = 4096
 """Faces that a trace may pass; one that goes round the surface is no short connection."""
 
 FOLDS = 4.0
