@@ -88,7 +88,7 @@ class MappedMesh:
         return SurfacePoints(part, local)
 
     def common_component(self, holding: Holding) -> int | None:
-        """The largest component of the mesh that has all points; None where there is none."""
+        """The largest component of the mesh that has all points; None where no component has."""
         component = self.mesh.face_component
         common: set[int] | None = None
         for point in holding:
