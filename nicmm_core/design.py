@@ -34,10 +34,9 @@ from .arguments import (
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, CurveError, UnreachableError
 from .geometry.array_types import FloatArray
-from .geometry.curve import SurfaceCurve
+from .geometry.curve import SurfaceCurve, checked_curve
 from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
-from .outputs.chain import checked_curve
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .repair.free_surface import check_reachable, free_faces

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .array_types import BoolArray, FloatArray, IntArray
-from .surface_points import SurfacePoints
+from .surface_points import SurfacePoints, weights_at
 
 TOUCHING = 1e-12
 """Distance in barycentric coordinates at which strands touch: where they cross on an edge, rounding
@@ -34,8 +34,7 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     faces = polyline.faces[:n_segments]
     start = polyline.barycentric[:n_segments, :2]
     theirs = all_faces[polyline.faces[following]]
-    same = theirs[:, :, None] == all_faces[faces][:, None, :2]
-    end = (polyline.barycentric[following][:, :, None] * same).sum(axis=1)
+    end = weights_at(theirs, polyline.barycentric[following], all_faces[faces][:, :2])
 
     order = np.argsort(faces, kind="stable")
     count = np.unique(faces, return_counts=True)[1]
@@ -53,8 +52,8 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     first, second = first[~neighbours], second[~neighbours]
     a, b, c, d = start[first], end[first], start[second], end[second]
     meets = _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
-    in_faces = np.stack([first[meets], second[meets]], axis=1)
-    return np.concatenate([in_faces, _vertices_passed_twice(all_faces, polyline, n_segments)])
+    inside = np.stack([first[meets], second[meets]], axis=1)
+    return np.concatenate([inside, _vertices_passed_twice(all_faces, polyline, n_segments)])
 
 
 def _vertices_passed_twice(

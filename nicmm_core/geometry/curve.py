@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .array_types import FloatArray, IntArray
+from ..errors import CurveError
+from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
+from .tolerances import BARYCENTRIC_SUM
+
+ROUNDING = 1e-12
+"""Barycentric coordinates up to this are zeros that came out of a computation."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,43 @@ def curve_on_mesh(
     corners = mesh.vertices[mesh.faces[faces]]
     points = (barycentric[:, :, None] * corners).sum(axis=1)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
+
+
+def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray, IntArray]:
+    """Faces, (n,), and coordinates, (n, 3), of a curve's points, and faces of its segments, (n,).
+
+    Raises
+    ------
+    CurveError
+        If the curve does not lie on this mesh.
+    """
+    faces, barycentric = np.asarray(curve.faces), np.asarray(curve.barycentric, dtype=np.float64)
+    if faces.ndim != 1 or barycentric.shape != (len(faces), 3):
+        raise CurveError(
+            f"curve has faces of shape {faces.shape} and barycentric of shape "
+            f"{barycentric.shape}; pass (n,) and (n, 3)"
+        )
+    least = 3 if curve.closed else 2
+    if len(faces) < least:
+        raise CurveError(f"curve has {len(faces)} points, too few; it needs {least}")
+    off = (faces < 0) | (faces >= len(mesh.faces))
+    off |= ~(barycentric >= -ROUNDING).all(axis=1)
+    off |= ~(np.abs(barycentric.sum(axis=1) - 1.0) <= BARYCENTRIC_SUM)
+    if off.any():
+        first = int(off.argmax())
+        raise CurveError(
+            f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
+            f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
+        )
+    faces = faces.astype(np.int64)
+    barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDING))
+    return faces, barycentric, _segment_faces(mesh, curve.closed, faces, barycentric)
+
+
+def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
+    """Coordinates below a margin set to zero, and the others to the sum 1."""
+    kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
+    return kept / kept.sum(axis=1, keepdims=True)
 
 
 def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = True) -> FloatArray:
@@ -110,3 +152,34 @@ def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[Float
     even = np.stack([np.interp(wanted, arc, line[:, axis]) for axis in range(3)], axis=1)
     segment = np.clip(np.searchsorted(arc, wanted, side="right") - 1, 0, len(line) - 2)
     return even, segment.astype(np.int64)
+
+
+def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray) -> IntArray:
+    """A face that holds each point and the next one, shape (n,)."""
+    n = len(faces)
+    following = (np.arange(n) + 1) % n
+    support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
+    found = faces.copy()
+    unknown = ~_holds(mesh.faces[found], support[following])
+    found[unknown] = faces[following][unknown]
+    unknown &= ~_holds(mesh.faces[found], support)
+    if not closed:
+        unknown[-1] = False
+    for point in np.flatnonzero(unknown).tolist():
+        both = np.concatenate([support[point], support[following[point]]])
+        candidates = mesh.faces_at(both[both >= 0][:1])
+        holds = _holds(mesh.faces[candidates], np.tile(both, (len(candidates), 1)))
+        if not holds.any():
+            raise CurveError(
+                f"curve is not on this mesh: no face holds its points {point} and "
+                f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
+                "there share no vertices, merge vertices by distance and design it again"
+            )
+        found[point] = candidates[holds.argmax()]
+    return found
+
+
+def _holds(corners: IntArray, support: IntArray) -> BoolArray:
+    """Whether faces have all vertices of a support, which is filled up with -1."""
+    found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
+    return (found | (support < 0)).all(axis=1)

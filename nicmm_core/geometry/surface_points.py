@@ -348,3 +348,30 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[str]) -> 
             "components of the mesh, so no curve joins them; join the components, or merge "
             "vertices by distance where only hair-thin gaps part them"
         )
+
+
+def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
+    """The same points seen from other faces that hold them."""
+    corners = mesh.faces
+    return SurfacePoints(
+        faces, weights_at(corners[points.faces], points.barycentric, corners[faces])
+    )
+
+
+def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
+    """Barycentric coordinates with respect to other vertices, as far as these are among their own.
+
+    Parameters
+    ----------
+    corners : (n, 3) int array
+    barycentric : (n, 3) float array
+        With respect to them.
+    others : (n, m) int array
+
+    Returns
+    -------
+    (n, m) float array
+        Zero at vertices that are not among the corners.
+    """
+    same = corners[:, :, None] == others[:, None, :]
+    return (barycentric[:, :, None] * same).sum(axis=1)

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve
+from ..geometry.curve import without_small_weights
 from ..geometry.mesh import Mesh
-from ..geometry.tolerances import BARYCENTRIC_SUM, TINY
-
-ROUNDING = 1e-12
-"""Barycentric coordinates up to this are zeros that came out of a computation."""
+from ..geometry.surface_points import weights_at
+from ..geometry.tolerances import TINY
 
 
 @dataclass(frozen=True)
@@ -52,37 +49,6 @@ class Chain:
         return len(self.faces)
 
 
-def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray, IntArray]:
-    """Faces, (n,), and coordinates, (n, 3), of a curve's points, and faces of its segments, (n,).
-
-    Raises
-    ------
-    CurveError
-        If the curve does not lie on this mesh.
-    """
-    faces, barycentric = np.asarray(curve.faces), np.asarray(curve.barycentric, dtype=np.float64)
-    if faces.ndim != 1 or barycentric.shape != (len(faces), 3):
-        raise CurveError(
-            f"curve has faces of shape {faces.shape} and barycentric of shape "
-            f"{barycentric.shape}; pass (n,) and (n, 3)"
-        )
-    least = 3 if curve.closed else 2
-    if len(faces) < least:
-        raise CurveError(f"curve has {len(faces)} points, too few to cut; it needs {least}")
-    off = (faces < 0) | (faces >= len(mesh.faces))
-    off |= ~(barycentric >= -ROUNDING).all(axis=1)
-    off |= ~(np.abs(barycentric.sum(axis=1) - 1.0) <= BARYCENTRIC_SUM)
-    if off.any():
-        first = int(off.argmax())
-        raise CurveError(
-            f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
-            f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
-        )
-    faces = faces.astype(np.int64)
-    barycentric = _without(barycentric, np.full(len(faces), ROUNDING))
-    return faces, barycentric, _segment_faces(mesh, curve.closed, faces, barycentric)
-
-
 def build_chain(
     mesh: Mesh,
     closed: bool,
@@ -105,12 +71,12 @@ def build_chain(
     wanted : (n,) bool array
         Points that stand for their place rather than their neighbours, such as control points.
     """
-    barycentric = _without(barycentric, margin)
+    barycentric = without_small_weights(barycentric, margin)
     corners = mesh.faces[faces]
     n = len(faces)
     following = (np.arange(n) + 1) % n
     same = _same_support(corners, barycentric, following)
-    theirs = _in_other_face(corners[following], barycentric[following], corners)
+    theirs = weights_at(corners[following], barycentric[following], corners)
     near = np.abs(theirs - barycentric).max(axis=1) < np.minimum(margin, margin[following])
     at_vertex = (barycentric > 0.0).sum(axis=1) == 1
     joins = same & (near | at_vertex)  # with the next one
@@ -151,7 +117,7 @@ def _broken_runs(
         found.append(first)
         for p in range(begin + 1, end):
             here = p % n
-            theirs = _in_other_face(corners[[here]], barycentric[[here]], corners[[first % n]])[0]
+            theirs = weights_at(corners[[here]], barycentric[[here]], corners[[first % n]])[0]
             at_vertex = np.count_nonzero(theirs) == 1
             if not at_vertex and np.abs(theirs - barycentric[first % n]).max() >= margin[here]:
                 first = p
@@ -235,50 +201,7 @@ def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int
     return np.array([point for run in runs for point in run], dtype=np.int64)
 
 
-def _without(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
-    """Coordinates below a margin set to zero, and the others to the sum 1."""
-    kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
-    return kept / kept.sum(axis=1, keepdims=True)
-
-
 def _same_support(corners: IntArray, barycentric: FloatArray, following: IntArray) -> BoolArray:
     """Whether points lie at one vertex, on one edge or inside one face with the next ones."""
     support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
     return (support == support[following]).all(axis=1)
-
-
-def _in_other_face(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
-    """Coordinates with respect to the corners of other faces, as far as these have them."""
-    same = corners[:, :, None] == others[:, None, :]
-    return (barycentric[:, :, None] * same).sum(axis=1)
-
-
-def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray) -> IntArray:
-    """A face that holds each point and the next one, shape (n,)."""
-    n = len(faces)
-    following = (np.arange(n) + 1) % n
-    support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
-    found = faces.copy()
-    unknown = ~_holds(mesh.faces[found], support[following])
-    found[unknown] = faces[following][unknown]
-    unknown &= ~_holds(mesh.faces[found], support)
-    if not closed:
-        unknown[-1] = False
-    for point in np.flatnonzero(unknown).tolist():
-        both = np.concatenate([support[point], support[following[point]]])
-        candidates = mesh.faces_at(both[both >= 0][:1])
-        holds = _holds(mesh.faces[candidates], np.tile(both, (len(candidates), 1)))
-        if not holds.any():
-            raise CurveError(
-                f"curve is not on this mesh: no face holds its points {point} and "
-                f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
-                "there share no vertices, merge vertices by distance and design it again"
-            )
-        found[point] = candidates[holds.argmax()]
-    return found
-
-
-def _holds(corners: IntArray, support: IntArray) -> BoolArray:
-    """Whether faces have all vertices of a support, which is filled up with -1."""
-    found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
-    return (found | (support < 0)).all(axis=1)

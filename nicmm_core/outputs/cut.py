@@ -15,10 +15,10 @@ import numpy as np
 
 from ..errors import ArgumentError, CurveError
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve
+from ..geometry.curve import ROUNDING, SurfaceCurve, checked_curve
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints
-from .chain import ROUNDING, Chain, build_chain, checked_curve, points_of, superfluous_points
+from ..geometry.surface_points import SurfacePoints, weights_at
+from .chain import Chain, build_chain, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 
 SNAP_CUT = 1e-3
@@ -95,9 +95,8 @@ class CutMesh:
         weights = (self.faces[:, :, None] == theirs[:, None, :]).astype(np.float64)
         face, corner = np.nonzero(self.faces >= n_input)
         new = self.faces[face, corner] - n_input
-        same = mesh.faces[self.new_face[new]][:, :, None] == theirs[face][:, None, :]
-        inside = (self.new_barycentric[new][:, :, None] * same).sum(axis=1)
-        weights[face, corner] = inside
+        corners = mesh.faces[self.new_face[new]]
+        weights[face, corner] = weights_at(corners, self.new_barycentric[new], theirs[face])
         return weights
 
     def at_corners(self, mesh: Mesh, values: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, in_faces
 from ..geometry.tracing import strictly_inside, trace_between, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
@@ -429,12 +429,6 @@ def _drawn_stretches(
     owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
     order = np.argsort(owner, kind="stable")
     return (owner[order], _joined(node_points, crossings)[order]), ways.reached
-
-
-def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
-    """The same points seen from other faces that hold them."""
-    same = mesh.faces[points.faces][:, :, None] == mesh.faces[faces][:, None, :]
-    return SurfacePoints(faces, (points.barycentric[:, :, None] * same).sum(axis=1))
 
 
 def _joined(first: SurfacePoints, second: SurfacePoints) -> SurfacePoints:
