@@ -19,6 +19,7 @@ from . import (
     settings,
     toolbar,
     turns,
+    update_curves,
 )
 
 MODULES = (
@@ -27,6 +28,7 @@ MODULES = (
     turns,
     operators,
     edit_operator,
+    update_curves,
     curve_list,
     maps,
     live_update,

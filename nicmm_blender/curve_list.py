@@ -1,140 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The curves that were designed on a mesh: their list, and designing them again."""
+"""The list of the curves that were designed on a mesh."""
 
 import bpy
-from bpy.props import BoolProperty, IntProperty, StringProperty
+from bpy.props import IntProperty
 
-from . import curve_object, curve_record, design_request, mesh_data, outputs
+from . import curve_object, curve_record
 from .edit_operator import NICMM_OT_edit_curve
-from .long_solves import LongSolves
+from .update_curves import NICMM_OT_update_curves
 
 ICONS = {"CURVE": "OUTLINER_OB_CURVE", "CURVES": "OUTLINER_OB_CURVES"}
 EDIT_ICON = "EDITMODE_HLT"
 UPDATE_ICON = "FILE_REFRESH"
-
-
-class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
-    """Design curves again with their own settings, on the mesh and its weights as they are now"""
-
-    bl_idname = "nicmm.update_curves"
-    bl_label = "Update Curves"
-    bl_options = {"REGISTER", "UNDO"}
-
-    curve: StringProperty(
-        name="Curve",
-        description="Name of a designed curve. Without one, all curves on the mesh are updated",
-        options={"SKIP_SAVE"},
-    )
-    use_panel: BoolProperty(
-        name="Settings of the Panel",
-        description="Use the settings in the sidebar from now on, not those that each curve has",
-        default=False,
-    )
-
-    @classmethod
-    def poll(cls, context):
-        if mesh_of_context(context) is None:
-            cls.poll_message_set("Make a mesh active, or a curve that was designed on one")
-            return False
-        return True
-
-    def requests(self, context) -> list:
-        curves = self._curves(context)
-        for designed in curves:
-            check_replaceable(designed)
-        self._names = [designed.name for designed in curves]
-        chosen = None
-        if self.use_panel:
-            chosen = curve_record.asked_by(context.scene.nicmm_curves)
-        return [request_again(designed, chosen) for designed in curves]
-
-    def _curves(self, context) -> list:
-        if self.curve:
-            return [named(self.curve)]
-        mesh_object = mesh_of_context(context)
-        curves = curve_record.designed_on(mesh_object)
-        if not curves:
-            raise mesh_data.InputError(
-                f'No curve was designed on "{mesh_object.name}". Select vertices and run '
-                "Design Curve on Surface"
-            )
-        return curves
-
-    def finish(self, _context, requests: list, answers: list) -> set:
-        failed = []
-        for name, request, answer in zip(self._names, requests, answers, strict=True):
-            try:
-                replace(named(name), request, answer)
-            except mesh_data.InputError as error:
-                failed.append(f'"{name}": {error}')
-        if len(failed) == len(requests):
-            raise mesh_data.InputError("; ".join(failed))
-        done = f"{len(requests) - len(failed)} of {len(requests)} curves updated"
-        moved = sum(request.moved for request in requests)
-        if moved:
-            failed.append(f"{moved} control points lay on triangles that are gone and were moved")
-        if failed:
-            self.report({"WARNING"}, f"{done}; {'; '.join(failed)}")
-        else:
-            self.report({"INFO"}, done)
-        return {"FINISHED"}
-
-
-def mesh_of_context(context):
-    """The mesh whose curves are meant: the active one, or that of the active designed curve."""
-    active = context.active_object
-    if curve_record.has_record(active):
-        return curve_record.mesh_of(active)
-    return mesh_data.mesh_object(context)
-
-
-def named(name: str):
-    """A designed curve by its name."""
-    found = bpy.data.objects.get(name)
-    if not curve_record.has_record(found):
-        raise mesh_data.InputError(
-            f'There is no designed curve "{name}". Choose one from the list of curves'
-        )
-    return found
-
-
-def check_replaceable(designed) -> None:
-    """Refuse a curve object whose points cannot be replaced."""
-    library = designed.library or designed.data.library
-    if library is not None:
-        raise mesh_data.InputError(
-            f'"{designed.name}" is linked from {library.filepath}. '
-            "Make it local (Object > Relations > Make Local)"
-        )
-    if designed.mode != "OBJECT":
-        raise mesh_data.InputError(
-            f'"{designed.name}" is being edited. Switch to Object Mode first'
-        )
-
-
-def request_again(designed, chosen=None):
-    """A request for a curve once more, with its own settings or others."""
-    mesh_object = curve_record.mesh_of(designed)
-    if mesh_object is None:
-        raise mesh_data.InputError(
-            f'The mesh that "{designed.name}" was designed on is gone. Draw the curve again'
-        )
-    mesh_data.synchronise(mesh_object)
-    surface = mesh_data.triangles(mesh_object)
-    asked = curve_record.asked_of(designed) if chosen is None else chosen
-    return design_request.for_curve(designed, mesh_object, surface, asked)
-
-
-def replace(designed, request, answer) -> None:
-    """Give a curve object the curve that has been found."""
-    if isinstance(answer, Exception):
-        raise mesh_data.InputError(str(answer)) from answer
-    if not answer.curves:
-        raise mesh_data.InputError(str(answer.status))
-    outputs.redraw(designed, request.surface, answer.curves)
-    curve_record.remember(
-        designed, request.mesh_object(), request.surface, answer.curves, request.asked
-    )
 
 
 class NICMM_UL_curves(bpy.types.UIList):
@@ -152,7 +28,7 @@ class NICMM_UL_curves(bpy.types.UIList):
         row.prop(item, "hide_viewport", text="", emboss=False)
 
     def filter_items(self, context, data, name):
-        shown = set(curve_record.designed_on(mesh_of_context(context)))
+        shown = set(curve_record.designed_on(curve_record.mesh_of_context(context)))
         objects = getattr(data, name)
         wanted = self.filter_name.casefold()
         flags = [
@@ -188,12 +64,8 @@ def draw(layout, context) -> None:
     row.prop(context.scene, "nicmm_live_update", text="Live", toggle=True, icon="PLAY")
 
 
-CLASSES = (NICMM_OT_update_curves, NICMM_UL_curves)
-
-
 def register() -> None:
-    for found in CLASSES:
-        bpy.utils.register_class(found)
+    bpy.utils.register_class(NICMM_UL_curves)
     bpy.types.WindowManager.nicmm_active_curve = IntProperty(
         name="Active Curve",
         description="The curve that is active in the viewport",
@@ -205,5 +77,4 @@ def register() -> None:
 
 def unregister() -> None:
     del bpy.types.WindowManager.nicmm_active_curve
-    for found in reversed(CLASSES):
-        bpy.utils.unregister_class(found)
+    bpy.utils.unregister_class(NICMM_UL_curves)

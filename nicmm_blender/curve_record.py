@@ -118,6 +118,14 @@ def present_mesh(context, curve_object):
     return found
 
 
+def mesh_of_context(context):
+    """The mesh whose curves are meant: the active one, or that of the active designed curve."""
+    active = context.active_object
+    if has_record(active):
+        return mesh_of(active)
+    return mesh_data.mesh_object(context)
+
+
 def curves_on(context, mesh_object) -> list:
     """Visible objects of the view layer that were designed on a mesh."""
     return [

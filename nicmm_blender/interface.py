@@ -48,14 +48,14 @@ class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return curve_list.mesh_of_context(context) is not None
+        return curve_record.mesh_of_context(context) is not None
 
     def draw(self, context):
         properties = context.scene.nicmm_curves
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        mesh_object = curve_list.mesh_of_context(context)
+        mesh_object = curve_record.mesh_of_context(context)
         maps.draw_row(layout, properties, "OBSTACLES", context, mesh_object)
         settings.draw_clearance(layout, properties)
         maps.draw_row(layout, properties, "ALIGNMENT", context, mesh_object)
@@ -69,11 +69,11 @@ class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return curve_list.mesh_of_context(context) is not None
+        return curve_record.mesh_of_context(context) is not None
 
     def draw(self, context):
         curve_list.draw(self.layout, context)
-        for message in live_update.messages(curve_list.mesh_of_context(context)):
+        for message in live_update.messages(curve_record.mesh_of_context(context)):
             self.layout.label(text=message, icon="ERROR")
 
 

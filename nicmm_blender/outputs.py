@@ -64,6 +64,30 @@ def redraw(drawn, surface, curves) -> None:
         curve_object.write_polylines(drawn.data, _polylines(surface, curves))
 
 
+def check_replaceable(designed) -> None:
+    """Refuse a curve object whose points cannot be replaced."""
+    library = designed.library or designed.data.library
+    if library is not None:
+        raise InputError(
+            f'"{designed.name}" is linked from {library.filepath}. '
+            "Make it local (Object > Relations > Make Local)"
+        )
+    if designed.mode != "OBJECT":
+        raise InputError(f'"{designed.name}" is being edited. Switch to Object Mode first')
+
+
+def replace(designed, request, answer) -> None:
+    """Give a curve object the curve that has been found."""
+    if isinstance(answer, Exception):
+        raise InputError(str(answer)) from answer
+    if not answer.curves:
+        raise InputError(str(answer.status))
+    redraw(designed, request.surface, answer.curves)
+    curve_record.remember(
+        designed, request.mesh_object(), request.surface, answer.curves, request.asked
+    )
+
+
 def _polylines(surface, curves) -> list:
     return [(surface.points(curve.faces, curve.barycentric), curve.closed) for curve in curves]
 

@@ -172,14 +172,13 @@ def test_update_is_one_undo_step(sphere):
 
 
 def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
-    curve_list = module(empty_scene, "curve_list")
     mine = [draw(sphere), draw(sphere, output="STICKY")]
     other = scenes.sphere()
     draw(other)
     record = module(empty_scene, "curve_record")
     assert record.designed_on(sphere) == sorted(mine, key=lambda found: found.name)
     scenes.activate(mine[1])
-    assert curve_list.mesh_of_context(bpy.context) == sphere
+    assert record.mesh_of_context(bpy.context) == sphere
     objects = bpy.data.objects
     assert objects[bpy.context.window_manager.nicmm_active_curve] == mine[1]
     bpy.context.window_manager.nicmm_active_curve = objects.find(mine[0].name)
@@ -251,7 +250,7 @@ def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch
     pull(sphere)
     settle(live)
     written = []
-    monkeypatch.setattr(live.curve_list, "replace", lambda *_: written.append(1))
+    monkeypatch.setattr(live.outputs, "replace", lambda *_: written.append(1))
     for _ in range(3):
         bpy.context.view_layer.update()
         settle(live)

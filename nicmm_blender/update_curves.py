@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that designs curves of a mesh again."""
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from . import curve_record, design_request, mesh_data, outputs
+from .long_solves import LongSolves
+
+
+class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
+    """Design curves again with their own settings, on the mesh and its weights as they are now"""
+
+    bl_idname = "nicmm.update_curves"
+    bl_label = "Update Curves"
+    bl_options = {"REGISTER", "UNDO"}
+
+    curve: StringProperty(
+        name="Curve",
+        description="Name of a designed curve. Without one, all curves on the mesh are updated",
+        options={"SKIP_SAVE"},
+    )
+    use_panel: BoolProperty(
+        name="Settings of the Panel",
+        description="Use the settings in the sidebar from now on, not those that each curve has",
+        default=False,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if curve_record.mesh_of_context(context) is None:
+            cls.poll_message_set("Make a mesh active, or a curve that was designed on one")
+            return False
+        return True
+
+    def requests(self, context) -> list:
+        curves = self._curves(context)
+        for designed in curves:
+            outputs.check_replaceable(designed)
+        self._names = [designed.name for designed in curves]
+        chosen = None
+        if self.use_panel:
+            chosen = curve_record.asked_by(context.scene.nicmm_curves)
+        return [request_again(designed, chosen) for designed in curves]
+
+    def _curves(self, context) -> list:
+        if self.curve:
+            return [named(self.curve)]
+        mesh_object = curve_record.mesh_of_context(context)
+        curves = curve_record.designed_on(mesh_object)
+        if not curves:
+            raise mesh_data.InputError(
+                f'No curve was designed on "{mesh_object.name}". Select vertices and run '
+                "Design Curve on Surface"
+            )
+        return curves
+
+    def finish(self, _context, requests: list, answers: list) -> set:
+        failed = []
+        for name, request, answer in zip(self._names, requests, answers, strict=True):
+            try:
+                outputs.replace(named(name), request, answer)
+            except mesh_data.InputError as error:
+                failed.append(f'"{name}": {error}')
+        if len(failed) == len(requests):
+            raise mesh_data.InputError("; ".join(failed))
+        done = f"{len(requests) - len(failed)} of {len(requests)} curves updated"
+        moved = sum(request.moved for request in requests)
+        if moved:
+            failed.append(f"{moved} control points lay on triangles that are gone and were moved")
+        if failed:
+            self.report({"WARNING"}, f"{done}; {'; '.join(failed)}")
+        else:
+            self.report({"INFO"}, done)
+        return {"FINISHED"}
+
+
+def named(name: str):
+    """A designed curve by its name."""
+    found = bpy.data.objects.get(name)
+    if not curve_record.has_record(found):
+        raise mesh_data.InputError(
+            f'There is no designed curve "{name}". Choose one from the list of curves'
+        )
+    return found
+
+
+def request_again(designed, chosen=None):
+    """A request for a curve once more, with its own settings or others."""
+    mesh_object = curve_record.mesh_of(designed)
+    if mesh_object is None:
+        raise mesh_data.InputError(
+            f'The mesh that "{designed.name}" was designed on is gone. Draw the curve again'
+        )
+    mesh_data.synchronise(mesh_object)
+    surface = mesh_data.triangles(mesh_object)
+    asked = curve_record.asked_of(designed) if chosen is None else chosen
+    return design_request.for_curve(designed, mesh_object, surface, asked)
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_OT_update_curves)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_update_curves)
