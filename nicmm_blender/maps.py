@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Obstacle and alignment maps: made as vertex groups, painted, and shown in Weight Paint mode."""
+"""The operators that make obstacle and alignment maps as vertex groups, and let them be painted."""
 
 import bpy
 import numpy as np
@@ -134,44 +134,6 @@ def is_painting(context, mesh_object, name: str) -> bool:
     return context.mode == "PAINT_WEIGHT" and active is not None and active.name == name
 
 
-def draw_row(layout, properties, role: str, context, mesh_object) -> None:
-    """Draw the choice of a group with buttons to make and paint it."""
-    field = FIELDS[role]
-    row = layout.row(align=True)
-    row.prop_search(properties, field, mesh_object, "vertex_groups")
-    name = getattr(properties, field)
-    if name:
-        painting = is_painting(context, mesh_object, name)
-        paint = row.operator(
-            NICMM_OT_paint_map.bl_idname, text="", icon="BRUSH_DATA", depress=painting
-        )
-        paint.role = role
-    row.menu(MENUS[role].__name__, text="", icon="ADD")
-
-
-def _draw_menu(menu, role: str) -> None:
-    for identifier, name, _description, icon, _number in SOURCES:
-        entry = menu.layout.operator(NICMM_OT_new_map.bl_idname, text=name, icon=icon)
-        entry.role, entry.source = role, identifier
-
-
-class NICMM_MT_new_obstacles(bpy.types.Menu):
-    bl_label = "New Obstacles"
-
-    def draw(self, _context):
-        _draw_menu(self, "OBSTACLES")
-
-
-class NICMM_MT_new_alignment(bpy.types.Menu):
-    bl_label = "New Alignment"
-
-    def draw(self, _context):
-        _draw_menu(self, "ALIGNMENT")
-
-
-MENUS = {"OBSTACLES": NICMM_MT_new_obstacles, "ALIGNMENT": NICMM_MT_new_alignment}
-
-
 def _poll(cls, context) -> bool:
     has_mesh = mesh_data.mesh_object(context) is not None
     return polls.usable(cls, context, has_mesh, polls.NO_MESH, polls.OBJECT_EDIT_OR_WEIGHTS)
@@ -211,12 +173,7 @@ def _enter(context, mesh_object, mode: str) -> None:
         bpy.ops.object.mode_set(mode=mode)
 
 
-CLASSES = (
-    NICMM_OT_new_map,
-    NICMM_OT_paint_map,
-    NICMM_MT_new_obstacles,
-    NICMM_MT_new_alignment,
-)
+CLASSES = (NICMM_OT_new_map, NICMM_OT_paint_map)
 
 
 def register() -> None:

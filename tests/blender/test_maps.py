@@ -147,7 +147,8 @@ def test_undo_takes_a_map_away(cube):
 
 def test_rows_and_menus_follow_the_sources(extension):
     maps = import_module(f"{extension.name}.nicmm_blender.maps")
-    for menu in maps.MENUS.values():
+    map_rows = import_module(f"{extension.name}.nicmm_blender.map_rows")
+    for menu in map_rows.MENUS.values():
         assert hasattr(bpy.types, menu.__name__)
     kinds = bpy.ops.nicmm.new_map.get_rna_type().properties
     assert [item.identifier for item in kinds["source"].enum_items] == [s[0] for s in maps.SOURCES]

@@ -209,8 +209,9 @@ def all_points(request, extension, monkeypatch):
 @pytest.fixture
 def window(extension, monkeypatch):
     """Operators begin with `invoke`, which Blender does not call without a window."""
-    operators = module(extension, "operators")
-    for operator in (operators.NICMM_OT_design_curve, operators.NICMM_OT_convert_curve):
+    design = module(extension, "design_curve").NICMM_OT_design_curve
+    convert = module(extension, "convert_curve").NICMM_OT_convert_curve
+    for operator in (design, convert):
         monkeypatch.setattr(operator, "execute", through_invoke(operator, operator.execute))
 
 

@@ -119,14 +119,14 @@ class Window:
 @pytest.fixture
 def window(empty_scene, monkeypatch):
     """An operator as the window runs it, with no patience at all; background has no events."""
-    operators = import_module(f"{empty_scene.name}.nicmm_blender.operators")
+    design_curve = import_module(f"{empty_scene.name}.nicmm_blender.design_curve")
     long_solves = import_module(f"{empty_scene.name}.nicmm_blender.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
     monkeypatch.setattr(long_solves, "LONGEST_TURN", 0.0)
     monkeypatch.setattr(long_solves, "answer_all", slow(long_solves.answer_all))
     sphere = scenes.sphere(5)
     scenes.select(sphere, scenes.ring(sphere, 4, height=0.3))
-    window = Window(operators, sphere)
+    window = Window(design_curve, sphere)
     window.sphere = sphere
     defaults = {
         name: found.default
@@ -137,9 +137,9 @@ def window(empty_scene, monkeypatch):
     class Operator(long_solves.LongSolves):
         bl_label = "Design"
         points = point_group = ()
-        requests = operators.NICMM_OT_design_curve.requests
-        _control_points = operators.NICMM_OT_design_curve._control_points
-        finish = operators.NICMM_OT_design_curve.finish
+        requests = design_curve.NICMM_OT_design_curve.requests
+        _control_points = design_curve.NICMM_OT_design_curve._control_points
+        finish = design_curve.NICMM_OT_design_curve.finish
 
         def __init__(self):
             for name, value in defaults.items():

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators: a curve through the selected vertices, and other things made from a curve."""
+"""The operator that draws a curve through the selected vertices."""
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import StringProperty
 
-from . import curve_object, curve_record, design_request, mesh_data, outputs, polls, settings
-from .long_solves import LongSolves, reporting
+from . import curve_record, design_request, mesh_data, outputs, polls, settings
+from .long_solves import LongSolves
 
 ORDER_NAMES = {  # by the core's name, and whether the points are what is selected
     ("given", True): "in the order of selection",
@@ -90,51 +90,6 @@ class NICMM_OT_design_curve(
         return {"FINISHED"}
 
 
-class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
-    """Turn a designed curve into another one, or into edges, a region or parts of its mesh"""
-
-    bl_idname = "nicmm.convert_curve"
-    bl_label = "Convert Designed Curve"
-    bl_options = {"REGISTER", "UNDO"}
-
-    keep_original: BoolProperty(
-        name="Keep Original",
-        description="Keep the curve object",
-        default=False,
-    )
-
-    @classmethod
-    def poll(cls, context):
-        has_curve = curve_record.has_record(context.active_object)
-        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.OBJECT)
-
-    def draw(self, context):
-        settings.draw_output(self.layout, self)
-        self.layout.prop(self, "keep_original")
-
-    def invoke(self, context, _event):
-        settings.choose_tube(self)
-        return self.execute(context)
-
-    def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
-
-    def _execute(self, context):
-        original = context.active_object
-        name = original.name
-        mesh_object = curve_record.present_mesh(context, original)
-        surface = mesh_data.triangles(mesh_object)
-        curves = curve_record.recall(original, surface)
-        asked = curve_record.asked_of(original)
-        made = outputs.apply(context, mesh_object, surface, curves, self, asked)
-        if not self.keep_original:
-            curve_object.remove(original)
-        if self.output not in {"CURVE", "STICKY"}:
-            curve_object.select_only(context, mesh_object)
-        self.report({"INFO"}, f"{name}: {made}")
-        return {"FINISHED"}
-
-
 def _summary(mesh_object, design, order: str) -> str:
     curve = design.curves[0]
     summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
@@ -142,14 +97,9 @@ def _summary(mesh_object, design, order: str) -> str:
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 
-CLASSES = (NICMM_OT_design_curve, NICMM_OT_convert_curve)
-
-
 def register() -> None:
-    for found in CLASSES:
-        bpy.utils.register_class(found)
+    bpy.utils.register_class(NICMM_OT_design_curve)
 
 
 def unregister() -> None:
-    for found in reversed(CLASSES):
-        bpy.utils.unregister_class(found)
+    bpy.utils.unregister_class(NICMM_OT_design_curve)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that makes something else from a designed curve."""
+
+import bpy
+from bpy.props import BoolProperty
+
+from . import curve_object, curve_record, mesh_data, outputs, polls, settings
+from .long_solves import reporting
+
+
+class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
+    """Turn a designed curve into another one, or into edges, a region or parts of its mesh"""
+
+    bl_idname = "nicmm.convert_curve"
+    bl_label = "Convert Designed Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    keep_original: BoolProperty(
+        name="Keep Original",
+        description="Keep the curve object",
+        default=False,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        has_curve = curve_record.has_record(context.active_object)
+        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.OBJECT)
+
+    def draw(self, context):
+        settings.draw_output(self.layout, self)
+        self.layout.prop(self, "keep_original")
+
+    def invoke(self, context, _event):
+        settings.choose_tube(self)
+        return self.execute(context)
+
+    def execute(self, context):
+        return reporting(self, lambda: self._execute(context))
+
+    def _execute(self, context):
+        original = context.active_object
+        name = original.name
+        mesh_object = curve_record.present_mesh(context, original)
+        surface = mesh_data.triangles(mesh_object)
+        curves = curve_record.recall(original, surface)
+        asked = curve_record.asked_of(original)
+        made = outputs.apply(context, mesh_object, surface, curves, self, asked)
+        if not self.keep_original:
+            curve_object.remove(original)
+        if self.output not in {"CURVE", "STICKY"}:
+            curve_object.select_only(context, mesh_object)
+        self.report({"INFO"}, f"{name}: {made}")
+        return {"FINISHED"}
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_OT_convert_curve)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_convert_curve)

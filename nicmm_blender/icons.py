@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Icons of the operators, the same in panels and menus."""
+
+DESIGN = "CURVE_BEZCIRCLE"
+EDIT = "CURVE_PATH"
+CONVERT = "MOD_EDGESPLIT"

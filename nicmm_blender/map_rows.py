@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of a panel that choose, make and paint a map, and the menus that they open."""
+
+import bpy
+
+from . import maps
+
+
+def draw_row(layout, properties, role: str, context, mesh_object) -> None:
+    """Draw the choice of a group with buttons to make and paint it."""
+    field = maps.FIELDS[role]
+    row = layout.row(align=True)
+    row.prop_search(properties, field, mesh_object, "vertex_groups")
+    name = getattr(properties, field)
+    if name:
+        painting = maps.is_painting(context, mesh_object, name)
+        paint = row.operator(
+            maps.NICMM_OT_paint_map.bl_idname, text="", icon="BRUSH_DATA", depress=painting
+        )
+        paint.role = role
+    row.menu(MENUS[role].__name__, text="", icon="ADD")
+
+
+def _draw_menu(menu, role: str) -> None:
+    for identifier, name, _description, icon, _number in maps.SOURCES:
+        entry = menu.layout.operator(maps.NICMM_OT_new_map.bl_idname, text=name, icon=icon)
+        entry.role, entry.source = role, identifier
+
+
+class NICMM_MT_new_obstacles(bpy.types.Menu):
+    bl_label = "New Obstacles"
+
+    def draw(self, _context):
+        _draw_menu(self, "OBSTACLES")
+
+
+class NICMM_MT_new_alignment(bpy.types.Menu):
+    bl_label = "New Alignment"
+
+    def draw(self, _context):
+        _draw_menu(self, "ALIGNMENT")
+
+
+MENUS = {"OBSTACLES": NICMM_MT_new_obstacles, "ALIGNMENT": NICMM_MT_new_alignment}
+
+
+def register() -> None:
+    for menu in MENUS.values():
+        bpy.utils.register_class(menu)
+
+
+def unregister() -> None:
+    for menu in reversed(MENUS.values()):
+        bpy.utils.unregister_class(menu)

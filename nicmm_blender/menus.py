@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Entries in Blender's own menus."""
+
+import bpy
+
+from . import curve_record, icons
+from .convert_curve import NICMM_OT_convert_curve
+from .design_curve import NICMM_OT_design_curve
+from .edit_operator import NICMM_OT_edit_curve
+
+
+def draw_in_menu(menu, _context) -> None:
+    _begin(menu)
+    menu.layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
+    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=icons.EDIT)
+
+
+def draw_in_context_menu(menu, context) -> None:
+    """The context menu of Edit Mode is one menu for vertices, edges and faces."""
+    if context.tool_settings.mesh_select_mode[0]:
+        draw_in_menu(menu, context)
+
+
+def draw_conversions(menu, context) -> None:
+    """One entry for each output, where a designed curve is active."""
+    if not curve_record.has_record(context.active_object):
+        return
+    _begin(menu)
+    menu.layout.operator_menu_enum(
+        NICMM_OT_convert_curve.bl_idname,
+        "output",
+        text="Convert Designed Curve",
+        icon=icons.CONVERT,
+    )
+    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=icons.EDIT)
+
+
+def _begin(menu) -> None:
+    menu.layout.separator()
+    # Some of Blender's menus call operators as scripts do; ours ask what suits the window.
+    menu.layout.operator_context = "INVOKE_REGION_WIN"
+
+
+MENUS = (
+    ("VIEW3D_MT_edit_mesh_vertices", draw_in_menu),
+    ("VIEW3D_MT_edit_mesh_context_menu", draw_in_context_menu),
+    ("VIEW3D_MT_curve_add", draw_in_menu),
+    ("VIEW3D_MT_object_convert", draw_conversions),
+    ("VIEW3D_MT_object_context_menu", draw_conversions),
+)
+
+
+def register() -> None:
+    for menu, draw in MENUS:
+        getattr(bpy.types, menu).append(draw)
+
+
+def unregister() -> None:
+    for menu, draw in MENUS:
+        getattr(bpy.types, menu).remove(draw)
