@@ -1,29 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Blender side: reads Blender data, calls the core, writes Blender data.
 
+Each folder imports only from those before it: `scene`, `outputs`, `operators`, `tool`, `interface`.
+
 Nothing here loads the core, or a library that it needs, before a curve is asked for: enabling the
 extension stays quick and works where a library is missing, and the operator then says which one.
 """
 
-from . import (
-    command_line,
+from . import command_line, preferences, settings
+from .interface import curve_list, map_rows, menus, panels
+from .operators import (
     convert_curve,
-    curve_list,
     design_curve,
-    designers,
-    edit_operator,
     live_update,
     long_solves,
-    map_rows,
     maps,
-    menus,
-    panels,
-    preferences,
-    settings,
-    toolbar,
     turns,
     update_curves,
 )
+from .scene import designers
+from .tool import edit_operator, toolbar
 
 MODULES = (
     preferences,

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from . import mesh_data, settings
+from . import settings
+from .scene import mesh_data
 
 COMMAND = "nicmm"
 FAILED = 2

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
-from . import sticky_curves
+from .outputs import sticky_curves
 
 
 class DesignProperties:

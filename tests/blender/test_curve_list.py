@@ -175,7 +175,7 @@ def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
     mine = [draw(sphere), draw(sphere, output="STICKY")]
     other = scenes.sphere()
     draw(other)
-    record = module(empty_scene, "curve_record")
+    record = module(empty_scene, "scene.curve_record")
     assert record.designed_on(sphere) == sorted(mine, key=lambda found: found.name)
     scenes.activate(mine[1])
     assert record.mesh_of_context(bpy.context) == sphere
@@ -192,7 +192,7 @@ def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
 @pytest.fixture
 def live(empty_scene, sphere):
     bpy.context.scene.nicmm_live_update = True
-    return module(empty_scene, "live_update")
+    return module(empty_scene, "operators.live_update")
 
 
 def settle(live):
@@ -208,7 +208,7 @@ def settle(live):
 
 
 def test_live_update_is_off_at_first(empty_scene, sphere):
-    live = module(empty_scene, "live_update")
+    live = module(empty_scene, "operators.live_update")
     curve = draw(sphere)
     before = places(curve)
     pull(sphere)
@@ -250,7 +250,7 @@ def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch
     pull(sphere)
     settle(live)
     written = []
-    monkeypatch.setattr(live.outputs, "replace", lambda *_: written.append(1))
+    monkeypatch.setattr(live.writing, "replace", lambda *_: written.append(1))
     for _ in range(3):
         bpy.context.view_layer.update()
         settle(live)

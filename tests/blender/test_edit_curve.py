@@ -170,7 +170,8 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     curve = bpy.data.objects["Icosphere Curve"]
     bpy.context.view_layer.objects.active = curve
-    edited_curve, record = module(empty_scene, "edited_curve"), module(empty_scene, "curve_record")
+    edited_curve = module(empty_scene, "tool.edited_curve")
+    record = module(empty_scene, "scene.curve_record")
     opened = edited_curve.open_session(bpy.context, curve, record.asked_of(curve))
     assert opened.session.resting and opened.session.state.rested
     assert not opened.session.asked.closed and opened.session.asked.smoothness == 2.0
@@ -303,7 +304,7 @@ def test_the_tool_is_in_the_toolbar(empty_scene):
 
 def test_hints_have_icons_that_exist(empty_scene):
     icons = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys()
-    for icon, _ in module(empty_scene, "edit_operator").HINTS:
+    for icon, _ in module(empty_scene, "tool.edit_operator").HINTS:
         assert icon in icons
 
 
@@ -316,7 +317,7 @@ class Tool:
     """The operator's methods on a session, looking along the y axis; no window."""
 
     def __init__(self, extension, mesh_object, edited=None):
-        operator = module(extension, "edit_operator")
+        operator = module(extension, "tool.edit_operator")
         for name, value in vars(operator.NICMM_OT_edit_curve).items():
             if callable(value) and name.startswith("_") and not name.startswith("__"):
                 setattr(self, name, value.__get__(self))
@@ -326,14 +327,15 @@ class Tool:
         self._show = self._redraw = lambda _context: None
         self.report = lambda _kind, text: self.reports.append(text)
         self.ended = False
-        edited_curve, record = module(extension, "edited_curve"), module(extension, "curve_record")
+        edited_curve = module(extension, "tool.edited_curve")
+        record = module(extension, "scene.curve_record")
         asked = record.Asked() if edited is None else record.asked_of(edited)
         self._opened = edited_curve.open_session(bpy.context, edited, asked)
         self.session = self._opened.session
         self._edited_name = ""
         self._grabbed, self._grip, self._last_move = None, np.zeros(2), 0.0
         self._overlay = SimpleNamespace(hover=None)
-        parts = SimpleNamespace(edit_view=module(extension, "edit_view"))
+        parts = SimpleNamespace(edit_view=module(extension, "tool.edit_view"))
         view = looking(parts, self.session, -5.0, True)
         self.view = view
         self._view = lambda _context, event, anywhere=False: (view, event.pixel)

@@ -15,8 +15,15 @@ ANGLES = np.array([0.2, 1.4, 2.6, 3.7, 5.1])
 @pytest.fixture
 def parts(empty_scene):
     """Modules of the extension, by their names."""
-    names = ("edit_session", "edit_view", "edited_curve", "curve_record", "mesh_data", "designers")
-    found = {name: import_module(f"{empty_scene.name}.nicmm_blender.{name}") for name in names}
+    rooms = {
+        "scene": ("curve_record", "mesh_data", "designers"),
+        "tool": ("edit_session", "edit_view", "edited_curve"),
+    }
+    found = {
+        name: import_module(f"{empty_scene.name}.nicmm_blender.{room}.{name}")
+        for room, names in rooms.items()
+        for name in names
+    }
     return SimpleNamespace(core=empty_scene.core, **found)
 
 

@@ -77,7 +77,7 @@ def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded)
 
 def test_menus_and_panel(extension):
     for menu in MENUS:
-        assert f"{extension.name}.nicmm_blender.menus" in entries(menu)
+        assert f"{extension.name}.nicmm_blender.interface.menus" in entries(menu)
     assert bpy.types.NICMM_PT_design_curve.bl_category == "NICMM"
 
 
@@ -98,7 +98,7 @@ class Layout:
 
 
 def test_entries_of_menus_call_operators_as_the_window_does(empty_scene):
-    menus = import_module(f"{empty_scene.name}.nicmm_blender.menus")
+    menus = import_module(f"{empty_scene.name}.nicmm_blender.interface.menus")
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 3))
     bpy.ops.nicmm.design_curve()

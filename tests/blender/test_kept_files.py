@@ -33,8 +33,8 @@ def drawn(curve):
 
 
 def controls(extension, curve):
-    surface = module(extension, "mesh_data").triangles(bpy.data.objects["Body"])
-    points, positions = module(extension, "curve_record").recall_controls(curve, surface)
+    surface = module(extension, "scene.mesh_data").triangles(bpy.data.objects["Body"])
+    points, positions = module(extension, "scene.curve_record").recall_controls(curve, surface)
     assert (points.faces >= 0).all()
     return positions
 
@@ -45,10 +45,10 @@ def test_there_are_some():
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_is_recalled_as_it_was_drawn(kept, name):
-    record = module(kept, "curve_record")
+    record = module(kept, "scene.curve_record")
     body, curve = bpy.data.objects["Body"], bpy.data.objects[name]
     assert record.has_record(curve) and record.mesh_of(curve) == body
-    surface = module(kept, "mesh_data").triangles(body)
+    surface = module(kept, "scene.mesh_data").triangles(body)
     (recalled,) = record.recall(curve, surface)
     np.testing.assert_allclose(drawn(curve), recalled.points, atol=ROUNDING)
     asked = record.asked_of(curve)
@@ -59,7 +59,8 @@ def test_a_curve_is_recalled_as_it_was_drawn(kept, name):
 
 
 def test_what_curves_were_asked_for(kept):
-    asked = {name: module(kept, "curve_record").asked_of(bpy.data.objects[name]) for name in CURVES}
+    record = module(kept, "scene.curve_record")
+    asked = {name: record.asked_of(bpy.data.objects[name]) for name in CURVES}
     assert asked["Open"].smoothness == 2.0
     assert asked["Variational"].method == "VARIATIONAL"
     assert (asked["Maps"].obstacle_group, asked["Maps"].alignment_group) == ("Wall", "Lane")
@@ -91,7 +92,7 @@ def test_a_curve_is_edited_in_place(kept, name):
     before, at = drawn(curve), controls(kept, curve)
     assert bpy.ops.nicmm.edit_curve(smoothness=0.1) == {"FINISHED"}
     assert bpy.context.active_object == curve
-    assert module(kept, "curve_record").asked_of(curve).smoothness == pytest.approx(0.1)
+    assert module(kept, "scene.curve_record").asked_of(curve).smoothness == pytest.approx(0.1)
     assert scenes.distances_to(at, drawn(curve)).max() < ROUNDING
     assert len(drawn(curve)) != len(before) or not np.allclose(drawn(curve), before)
 

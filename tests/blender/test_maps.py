@@ -146,8 +146,8 @@ def test_undo_takes_a_map_away(cube):
 
 
 def test_rows_and_menus_follow_the_sources(extension):
-    maps = import_module(f"{extension.name}.nicmm_blender.maps")
-    map_rows = import_module(f"{extension.name}.nicmm_blender.map_rows")
+    maps = import_module(f"{extension.name}.nicmm_blender.operators.maps")
+    map_rows = import_module(f"{extension.name}.nicmm_blender.interface.map_rows")
     for menu in map_rows.MENUS.values():
         assert hasattr(bpy.types, menu.__name__)
     kinds = bpy.ops.nicmm.new_map.get_rna_type().properties

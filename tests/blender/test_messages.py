@@ -53,7 +53,7 @@ def messages(paths, kinds):
 
 
 def of_blender():
-    return messages(sorted((build.ROOT / "nicmm_blender").glob("*.py")), {"InputError"})
+    return messages(sorted((build.ROOT / "nicmm_blender").rglob("*.py")), {"InputError"})
 
 
 def of_core():
@@ -65,7 +65,7 @@ def of_core():
 
 def polls():
     """What grey buttons say: constants of polls.py, and what other modules say directly."""
-    for path in sorted((build.ROOT / "nicmm_blender").glob("*.py")):
+    for path in sorted((build.ROOT / "nicmm_blender").rglob("*.py")):
         text = path.read_text("utf-8")
         for said in re.findall(r'poll_message_set\("([^"]+)"\)', text):
             yield path.name, [plain(said)]

@@ -327,7 +327,7 @@ def test_open_curve_is_not_cyclic(empty_scene):
     [("igl", "NICMM", "Install the zip"), ("torch", "NICMM_PAPER", "built with --with-torch")],
 )
 def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, remedy):
-    import_module(f"{empty_scene.name}.nicmm_blender.designers").forget()
+    import_module(f"{empty_scene.name}.nicmm_blender.scene.designers").forget()
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     # As in a new session, where the core has not been loaded yet.
@@ -342,7 +342,7 @@ def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, 
 
 
 def test_the_same_mesh_is_factorised_once(empty_scene):
-    designers = import_module(f"{empty_scene.name}.nicmm_blender.designers")
+    designers = import_module(f"{empty_scene.name}.nicmm_blender.scene.designers")
     designers.forget()
     sphere = scenes.sphere()
     kept = []

@@ -563,4 +563,4 @@ def test_only_designed_curves_are_converted(empty_scene):
 def test_convert_stands_in_menus(extension):
     for menu in ("VIEW3D_MT_object_convert", "VIEW3D_MT_object_context_menu"):
         draws = getattr(bpy.types, menu).draw._draw_funcs
-        assert f"{extension.name}.nicmm_blender.menus" in [d.__module__ for d in draws]
+        assert f"{extension.name}.nicmm_blender.interface.menus" in [d.__module__ for d in draws]

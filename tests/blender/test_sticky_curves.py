@@ -192,7 +192,7 @@ def test_tube_has_the_material_of_the_curve(monkey):
 
 
 def test_blender_draws_all_points_since_5(extension):
-    found = module(extension, "sticky_curves").are_drawn_with_all_points()
+    found = module(extension, "outputs.sticky_curves").are_drawn_with_all_points()
     assert found == (bpy.app.version >= (5, 0, 0))
     of_panel = bpy.types.Scene.bl_rna.properties["nicmm_curves"].fixed_type.properties
     assert of_panel["tube"].default != found
@@ -201,7 +201,7 @@ def test_blender_draws_all_points_since_5(extension):
 @pytest.fixture(params=[True, False], ids=["all points", "few points"])
 def all_points(request, extension, monkeypatch):
     """A Blender of either kind."""
-    sticky_curves = module(extension, "sticky_curves")
+    sticky_curves = module(extension, "outputs.sticky_curves")
     monkeypatch.setattr(sticky_curves, "are_drawn_with_all_points", lambda: request.param)
     return request.param
 
@@ -209,8 +209,8 @@ def all_points(request, extension, monkeypatch):
 @pytest.fixture
 def window(extension, monkeypatch):
     """Operators begin with `invoke`, which Blender does not call without a window."""
-    design = module(extension, "design_curve").NICMM_OT_design_curve
-    convert = module(extension, "convert_curve").NICMM_OT_convert_curve
+    design = module(extension, "operators.design_curve").NICMM_OT_design_curve
+    convert = module(extension, "operators.convert_curve").NICMM_OT_convert_curve
     for operator in (design, convert):
         monkeypatch.setattr(operator, "execute", through_invoke(operator, operator.execute))
 
@@ -282,7 +282,7 @@ def input_of(modifier, name):
 
 
 def test_group_of_before_the_tube_gets_one(monkey, extension, tmp_path):
-    nodes = module(extension, "sticky_nodes")
+    nodes = module(extension, "outputs.sticky_nodes")
     old = sticky(monkey)
     bpy.data.node_groups.remove(old.modifiers[0].node_group)
     modifier = old.modifiers[0]
@@ -307,7 +307,7 @@ def test_group_of_before_the_tube_gets_one(monkey, extension, tmp_path):
 
 
 def test_nodes_that_somebody_put_into_the_group_stay(monkey, extension):
-    nodes = module(extension, "sticky_nodes")
+    nodes = module(extension, "outputs.sticky_nodes")
     group = nodes._new_group()
     output = next(node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
     raise_ = group.nodes.new("GeometryNodeTransform")
@@ -322,7 +322,7 @@ def test_nodes_that_somebody_put_into_the_group_stay(monkey, extension):
 
 @pytest.mark.parametrize("kind", ["GeometryNodeTree", "ShaderNodeTree"])
 def test_group_of_that_name_which_is_none_of_ours_is_left_alone(monkey, extension, kind):
-    name = module(extension, "sticky_nodes").GROUP_NAME
+    name = module(extension, "outputs.sticky_nodes").GROUP_NAME
     other = bpy.data.node_groups.new(name, kind)
     curves = sticky(monkey, tube=True)
     assert len(rings(curves)) and curves.modifiers[0].node_group != other
@@ -330,7 +330,7 @@ def test_group_of_that_name_which_is_none_of_ours_is_left_alone(monkey, extensio
 
 
 def test_linked_group_is_left_alone(monkey, extension, tmp_path):
-    nodes = module(extension, "sticky_nodes")
+    nodes = module(extension, "outputs.sticky_nodes")
     file = str(tmp_path / "library.blend")
     bpy.data.libraries.write(file, {nodes._new_group()})
     bpy.data.node_groups.remove(bpy.data.node_groups[nodes.GROUP_NAME])

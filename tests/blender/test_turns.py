@@ -15,7 +15,7 @@ from tests.blender import scenes
 
 @pytest.fixture
 def turns(extension):
-    return import_module(f"{extension.name}.nicmm_blender.turns")
+    return import_module(f"{extension.name}.nicmm_blender.operators.turns")
 
 
 def counting(steps, seen, thread=None):
@@ -119,8 +119,8 @@ class Window:
 @pytest.fixture
 def window(empty_scene, monkeypatch):
     """An operator as the window runs it, with no patience at all; background has no events."""
-    design_curve = import_module(f"{empty_scene.name}.nicmm_blender.design_curve")
-    long_solves = import_module(f"{empty_scene.name}.nicmm_blender.long_solves")
+    design_curve = import_module(f"{empty_scene.name}.nicmm_blender.operators.design_curve")
+    long_solves = import_module(f"{empty_scene.name}.nicmm_blender.operators.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
     monkeypatch.setattr(long_solves, "LONGEST_TURN", 0.0)
     monkeypatch.setattr(long_solves, "answer_all", slow(long_solves.answer_all))

@@ -100,7 +100,7 @@ def _vector(place):
 
 def watch_tool():
     """Measure every event of the tool, and know which one runs."""
-    operator = import_module(f"{MODULE}.edit_operator").NICMM_OT_edit_curve
+    operator = import_module(f"{MODULE}.tool.edit_operator").NICMM_OT_edit_curve
     modal, invoke = operator.modal, operator.invoke
 
     def watched_invoke(self, context, event):

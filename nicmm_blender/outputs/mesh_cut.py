@@ -12,7 +12,7 @@ import numpy as np
 
 import bmesh
 
-from .mesh_data import InputError
+from ..scene.mesh_data import InputError
 
 
 @contextmanager

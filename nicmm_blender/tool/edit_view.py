@@ -43,7 +43,7 @@ class View:
 
     def place_at(self, pixel) -> tuple[int, np.ndarray] | None:
         """Face and barycentrics of the surface under a pixel; None beside the mesh."""
-        from ..nicmm_core.geometry.surface_points import first_hits
+        from ...nicmm_core.geometry.surface_points import first_hits
 
         rays = [vector[None] @ self.surface.linear.T for vector in self.ray(pixel)]
         points, _ = first_hits(self.mesh, *rays)
@@ -52,7 +52,7 @@ class View:
 
     def visible(self, positions: np.ndarray) -> np.ndarray:
         """Which positions no part of the mesh hides, (n,)."""
-        from ..nicmm_core.geometry.surface_points import first_hits
+        from ...nicmm_core.geometry.surface_points import first_hits
 
         if not len(positions):
             return np.zeros(0, dtype=bool)

@@ -2,7 +2,7 @@
 """A curve that is asked for, as plain arrays: read from Blender, then answered by the core.
 
 Reading takes place in Blender's thread. The answer touches no Blender data, so that it can be
-found by turns (`turns`).
+found by turns (`operators.turns`).
 """
 
 from dataclasses import dataclass, replace
@@ -81,7 +81,7 @@ def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest
 
 def answer(request: DesignRequest, progress):
     """Let the core design the curve; touches no Blender data."""
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     asked = request.asked
     with designers.lent(request.surface.solved, request.surface.faces) as designer:

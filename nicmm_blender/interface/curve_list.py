@@ -4,9 +4,10 @@
 import bpy
 from bpy.props import IntProperty
 
-from . import curve_object, curve_record
-from .edit_operator import NICMM_OT_edit_curve
-from .update_curves import NICMM_OT_update_curves
+from ..operators.update_curves import NICMM_OT_update_curves
+from ..outputs import curve_object
+from ..scene import curve_record
+from ..tool.edit_operator import NICMM_OT_edit_curve
 
 ICONS = {"CURVE": "OUTLINER_OB_CURVE", "CURVES": "OUTLINER_OB_CURVES"}
 EDIT_ICON = "EDITMODE_HLT"

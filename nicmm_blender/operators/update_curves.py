@@ -4,7 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from . import curve_record, design_request, mesh_data, outputs
+from ..outputs import writing
+from ..scene import curve_record, design_request, mesh_data
 from .long_solves import LongSolves
 
 
@@ -36,7 +37,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
     def requests(self, context) -> list:
         curves = self._curves(context)
         for designed in curves:
-            outputs.check_replaceable(designed)
+            writing.check_replaceable(designed)
         self._names = [designed.name for designed in curves]
         chosen = None
         if self.use_panel:
@@ -59,7 +60,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         failed = []
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:
-                outputs.replace(named(name), request, answer)
+                writing.replace(named(name), request, answer)
             except mesh_data.InputError as error:
                 failed.append(f'"{name}": {error}')
         if len(failed) == len(requests):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import mesh_data
+from ..scene import mesh_data
 from .edit_operator import NICMM_OT_edit_curve
 
 ICON = "ops.curve.pen"

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from . import preferences
+from .. import preferences
 
 _designers: dict = {}
 
@@ -50,7 +50,7 @@ def _fingerprint(vertices: np.ndarray, faces: np.ndarray) -> bytes:
 
 def _taken(fingerprint: bytes, vertices: np.ndarray, faces: np.ndarray):
     """The designer for a mesh, which is kept no longer."""
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     designer = _designers.pop(fingerprint, None)
     return nicmm.Designer(nicmm.Mesh(vertices, faces)) if designer is None else designer

@@ -4,7 +4,10 @@
 import bpy
 from bpy.props import StringProperty
 
-from . import curve_record, design_request, mesh_data, outputs, polls, settings
+from .. import settings
+from ..outputs import writing
+from ..scene import curve_record, design_request, mesh_data
+from . import polls
 from .long_solves import LongSolves
 
 ORDER_NAMES = {  # by the core's name, and whether the points are what is selected
@@ -69,7 +72,7 @@ class NICMM_OT_design_curve(
         return mesh_data.selected_points(mesh_object, self.order)
 
     def finish(self, context, requests: list, answers: list) -> set:
-        from .. import nicmm_core as nicmm
+        from ... import nicmm_core as nicmm
 
         (request,), (design,) = requests, answers
         if isinstance(design, Exception):
@@ -77,7 +80,7 @@ class NICMM_OT_design_curve(
         if not design.curves:
             raise mesh_data.InputError(str(design.status))
         mesh_object = request.mesh_object()
-        made = outputs.apply(
+        made = writing.apply(
             context, mesh_object, request.surface, design.curves, self, request.asked
         )
         selected = not (self.points or self.point_group)

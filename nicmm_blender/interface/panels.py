@@ -3,10 +3,13 @@
 
 import bpy
 
-from . import curve_list, curve_record, icons, live_update, map_rows, settings
-from .convert_curve import NICMM_OT_convert_curve
-from .design_curve import NICMM_OT_design_curve
-from .edit_operator import NICMM_OT_edit_curve
+from .. import settings
+from ..operators import live_update
+from ..operators.convert_curve import NICMM_OT_convert_curve
+from ..operators.design_curve import NICMM_OT_design_curve
+from ..scene import curve_record
+from ..tool.edit_operator import NICMM_OT_edit_curve
+from . import curve_list, icons, map_rows
 
 
 class SidebarPanel:

@@ -13,7 +13,10 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import BoolProperty
 
-from . import curve_record, design_request, mesh_data, outputs, preferences, turns
+from .. import preferences
+from ..outputs import writing
+from ..scene import curve_record, design_request, mesh_data
+from . import turns
 from .long_solves import TURN, answer_all
 
 PAUSE = 0.01
@@ -116,7 +119,7 @@ def _ask(designed, mesh_object, surface) -> None:
             return
         if _updates.failed.get(uid, ("",))[0] == now:
             return
-        outputs.check_replaceable(designed)
+        writing.check_replaceable(designed)
         request = design_request.for_curve(designed, mesh_object, surface, asked)
     except mesh_data.InputError as error:
         _updates.failed[uid] = now, f"{designed.name}: {error}"
@@ -137,9 +140,9 @@ def _write() -> None:
         now = curve_record.digest(request.mesh_object(), request.surface, request.asked)
         _updates.failed.pop(uid, None)
         try:
-            outputs.check_replaceable(designed)
+            writing.check_replaceable(designed)
             request.check_unchanged()
-            outputs.replace(designed, request, answer)
+            writing.replace(designed, request, answer)
         except mesh_data.InputError as error:
             _updates.failed[uid] = now, f"{designed.name}: {error}"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of a curve: an object of its own, cut edges, a region or parts of the mesh."""
+"""Writes a curve as an object of its own, or as cut edges, a region or parts of the mesh."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,9 @@ import numpy as np
 
 import bmesh
 
-from . import curve_object, curve_record, mesh_cut, sticky_curves
-from .mesh_data import InputError
+from ..scene import curve_record
+from ..scene.mesh_data import InputError
+from . import curve_object, mesh_cut, sticky_curves
 
 FACE_SETS = ".sculpt_face_set"
 DEFAULT_FACE_SET = 1
@@ -93,8 +94,8 @@ def _polylines(surface, curves) -> list:
 
 
 def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cutting:
-    from .. import nicmm_core as nicmm
-    from ..nicmm_core.outputs.polygons import cut_polygons
+    from ... import nicmm_core as nicmm
+    from ...nicmm_core.outputs.polygons import cut_polygons
 
     core_mesh = nicmm.Mesh(surface.solved, surface.faces)
     deviation = settings.simplify * core_mesh.mean_edge_length
@@ -221,7 +222,7 @@ def _chain_edges(edited, cutting: _Cutting, vertices: list) -> list:
 
 
 def _enclosed(cutting: _Cutting, other_side: bool):
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     region = nicmm.enclosed_region(cutting.core_mesh, cutting.cut)
     return region.complement(cutting.core_mesh, cutting.cut) if other_side else region

@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from . import mesh_data, polls
+from ..scene import mesh_data
+from . import polls
 from .long_solves import reporting
 
 ROLES = (
@@ -141,7 +142,7 @@ def _poll(cls, context) -> bool:
 
 def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
     """The weight of every vertex, (V,)."""
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     weights = np.zeros(len(mesh_object.data.vertices))
     if source == "PAINT":

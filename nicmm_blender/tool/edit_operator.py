@@ -7,12 +7,14 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from . import curve_record, designers, mesh_data, polls, settings
-from .curve_record import Asked
+from .. import settings
+from ..operators import polls
+from ..operators.long_solves import reporting
+from ..scene import curve_record, designers, mesh_data
+from ..scene.curve_record import Asked
 from .edit_overlay import Overlay
 from .edit_view import view_of
 from .edited_curve import chosen, keep, open_session
-from .long_solves import reporting
 
 INTERVAL = 1.0 / 60.0
 """Seconds between two steps of a curve that is coming to rest."""

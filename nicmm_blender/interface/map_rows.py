@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import maps
+from ..operators import maps
 
 
 def draw_row(layout, properties, role: str, context, mesh_object) -> None:

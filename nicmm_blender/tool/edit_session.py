@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .curve_record import Asked
-from .mesh_data import InputError, in_words
+from ..scene.curve_record import Asked
+from ..scene.mesh_data import InputError, in_words
 
 MOST_STEPS = 60
 """Steps from a change until the curve is taken as it is; most need fewer than five."""
@@ -68,7 +68,7 @@ class EditSession:
         points=None,
         curve=None,
     ) -> None:
-        from .. import nicmm_core as nicmm
+        from ... import nicmm_core as nicmm
 
         self._nicmm = nicmm
         self.surface, self.designer = surface, designer
@@ -142,7 +142,7 @@ class EditSession:
 
     def set_points(self, positions: np.ndarray) -> None:
         """Replace all points by places on the surface in the object's own space, (k, 3)."""
-        from ..nicmm_core.geometry.surface_points import locate_points
+        from ...nicmm_core.geometry.surface_points import locate_points
 
         solved = positions @ self.surface.linear.T
         points = locate_points(self.designer.mesh, solved, "points")
@@ -363,7 +363,7 @@ class EditSession:
 
 def _with_point(nicmm, mesh, curve, segment: int, share: float):
     """A curve with one more control point on a segment, and the number of that."""
-    from ..nicmm_core.geometry.surface_points import nearest_points
+    from ...nicmm_core.geometry.surface_points import nearest_points
 
     start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
     place = ((1.0 - share) * start + share * end)[None]

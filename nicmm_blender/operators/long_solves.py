@@ -12,7 +12,9 @@ from contextlib import contextmanager
 
 import bpy
 
-from . import design_request, mesh_data, preferences, turns
+from .. import preferences
+from ..scene import design_request, mesh_data
+from . import turns
 from .partial_curve import PartialCurve
 
 TURN = 0.03
@@ -127,7 +129,7 @@ def stop_all() -> None:
 
 def answer_all(requests: list, progress) -> list:
     """Answer requests one after another; touches no Blender data."""
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     answers: list = []
     for request in requests:
@@ -157,7 +159,7 @@ def _place(fraction: float, count: int) -> int:
 def reporting(operator, work):
     """Do an operator's work; what it cannot do becomes a report that says what would mend it."""
     try:
-        from .. import nicmm_core as nicmm
+        from ... import nicmm_core as nicmm
     except ImportError as error:
         return _cancelled(
             operator,

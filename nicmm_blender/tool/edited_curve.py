@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import curve_object, curve_record, designers, mesh_data, outputs
-from .curve_record import Asked
+from ..outputs import curve_object, writing
+from ..scene import curve_record, designers, mesh_data
+from ..scene.curve_record import Asked
+from ..scene.mesh_data import InputError
 from .edit_session import EditSession
-from .mesh_data import InputError
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,9 @@ def keep(context, opened: Opened, edited, settings):
     surface, curves = session.surface, [session.curve]
     made = edited
     if edited is None:
-        made = outputs.as_object(mesh_object, surface, curves, settings)
+        made = writing.as_object(mesh_object, surface, curves, settings)
     else:
-        outputs.redraw(edited, surface, curves)
+        writing.redraw(edited, surface, curves)
     curve_record.remember(made, mesh_object, surface, curves, session.asked, session.points)
     if edited is None:
         curve_object.place(context, mesh_object, made)

@@ -4,7 +4,10 @@
 import bpy
 from bpy.props import BoolProperty
 
-from . import curve_object, curve_record, mesh_data, outputs, polls, settings
+from .. import settings
+from ..outputs import curve_object, writing
+from ..scene import curve_record, mesh_data
+from . import polls
 from .long_solves import reporting
 
 
@@ -44,7 +47,7 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         surface = mesh_data.triangles(mesh_object)
         curves = curve_record.recall(original, surface)
         asked = curve_record.asked_of(original)
-        made = outputs.apply(context, mesh_object, surface, curves, self, asked)
+        made = writing.apply(context, mesh_object, surface, curves, self, asked)
         if not self.keep_original:
             curve_object.remove(original)
         if self.output not in {"CURVE", "STICKY"}:

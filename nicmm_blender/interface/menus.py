@@ -3,10 +3,11 @@
 
 import bpy
 
-from . import curve_record, icons
-from .convert_curve import NICMM_OT_convert_curve
-from .design_curve import NICMM_OT_design_curve
-from .edit_operator import NICMM_OT_edit_curve
+from ..operators.convert_curve import NICMM_OT_convert_curve
+from ..operators.design_curve import NICMM_OT_design_curve
+from ..scene import curve_record
+from ..tool.edit_operator import NICMM_OT_edit_curve
+from . import icons
 
 
 def draw_in_menu(menu, _context) -> None:

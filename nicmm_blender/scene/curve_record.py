@@ -177,7 +177,7 @@ def asked_of(curve_object) -> Asked:
 
 def recall(curve_object, surface) -> list:
     """The curves of the core that an object remembers, on the mesh as it is now."""
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
     faces, barycentric = _recalled(record, "corners", "barycentric", surface)
@@ -206,7 +206,7 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     Gives the points with the face -1 where the triangle is gone, and the positions in the object's
     own space where they were when the curve was drawn, (k, 3).
     """
-    from .. import nicmm_core as nicmm
+    from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
     if "control_corners" not in record:  # drawn before these were remembered
@@ -225,8 +225,8 @@ def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
     Those whose triangles are gone take the nearest place to where they were. `mesh` is the core's
     mesh of the surface, where there is one already.
     """
-    from .. import nicmm_core as nicmm
-    from ..nicmm_core.geometry.surface_points import nearest_points
+    from ... import nicmm_core as nicmm
+    from ...nicmm_core.geometry.surface_points import nearest_points
 
     points, positions = recall_controls(curve_object, surface)
     lost = points.faces < 0
