@@ -149,7 +149,6 @@ def outcome(item: Item) -> Outcome:
         return Outcome(DUE, "too few vertices")
     located = locate_points(mesh, points, "points")
     due = why_impossible(mesh, located)
-    designer.forget()
     try:
         design = designer.design(points, closed=closed, order="shortest")
     except nicmm.NicmmError as error:

@@ -81,7 +81,6 @@ def _in_another_order(mesh: nicmm.Mesh, points: IntArray, number: int) -> Surfac
 def _carried(mesh: nicmm.Mesh, curve: SurfaceCurve) -> nicmm.Design:
     """The design that goes on from the curve with the same faces and barycentrics."""
     start = curve_on_mesh(mesh, curve.closed, curve.faces, curve.barycentric, curve.control_index)
-    designer = nicmm.Designer(mesh)
-    designer.resume(start)
     index = np.asarray(curve.control_index)
-    return designer.design(nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index]))
+    points = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
+    return nicmm.Designer(mesh).design(points, start=start)

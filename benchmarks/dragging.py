@@ -1,4 +1,4 @@
-"""A control point is dragged: what the next curve of a Designer costs, and what it is worth."""
+"""A control point is dragged: what going on from the last curve costs, and what it is worth."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Drag:
     for _ in range(DRAGS):
         points = points.copy()
         points[0] = next(v for v in neighbours[points[0]] if v not in points)
-        designs.append(designer.design(points, order="shortest"))
+        designs.append(designer.design(points, order="shortest", start=designs[-1]))
         faults += len(judge(mesh, designs[-1], points, True, "shortest").faults)
     anew = nicmm.Designer(mesh).design(points, order="shortest")
     generator = np.random.default_rng(SEED)

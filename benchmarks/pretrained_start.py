@@ -178,7 +178,6 @@ def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> dict[str, Results]:
 def _rest(
     designer: nicmm.Designer, points: IntArray, closed: bool, order: str, field: Field
 ) -> Rest:
-    designer.forget()
     with _instead_of_the_network(field) as predicted:
         began = time.process_time()
         design = designer.design(points, closed=closed, order=order)

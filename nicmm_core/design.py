@@ -17,7 +17,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,28 +31,24 @@ from .arguments import (
     checked_map,
     checked_smoothness,
 )
-from .design_result import Design, cancelled_design
-from .errors import ArgumentError, CurveError, UnreachableError
+from .design_result import Design, Status, cancelled_design
+from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
-from .geometry.curve import SurfaceCurve, checked_curve
-from .geometry.mesh import Mesh
+from .geometry.curve import SurfaceCurve
+from .geometry.mesh import Mesh, same_mesh
 from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
-from .repaired_surface import RepairedSurface, design_on_original
-from .request import Request
+from .repaired_surface import RepairedSurface, design_on_original, start_on
+from .request import Request, same_request
 from .surface_designer import SurfaceDesigner
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that meet in single vertices only, "
     "which no curve crosses; join the parts along an edge, or choose points on one of them"
 )
-
-
-FOLLOWING = 3
-"""Iterations of `Designer.follow` by default: a frame or two of a live drawing."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +63,9 @@ class _Free:
 class Designer:
     """A surface that will be asked for many curves.
 
-    What depends on the mesh alone is found once. ``method="nicmm"`` also starts from the curve
-    before, if the request differs from the last one only in small moves of control points or in
-    smoothness: then the cost follows the curve and not the mesh, which is what
-    dragging a point needs. Such a curve keeps the course and the order of points that it has, so
-    it may differ from what `design_curve` finds from nothing; `forget` makes the next design
-    start anew. Threads may share a Designer: it draws one curve after the other.
+    What depends on the mesh alone is found once. Answers are not remembered: equal arguments give
+    equal curves, whatever was asked before, and those of `design_curve`. Threads may share a
+    Designer: it designs one curve after the other.
 
     Parameters
     ----------
@@ -90,13 +83,6 @@ class Designer:
         # A progress function may ask the same Designer for another curve.
         self._lock = threading.RLock()
 
-    def forget(self) -> None:
-        """Start the next design anew."""
-        with self._lock:
-            self._whole.forget()
-            if self._free is not None:
-                self._free.surface.forget()
-
     def design(
         self,
         control_points: ArrayLike | SurfacePoints,
@@ -109,12 +95,35 @@ class Designer:
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
         smoothness: float = 1.0,
+        start: Design | SurfaceCurve | None = None,
+        max_iterations: int | None = None,
         progress: Progress | None = None,
     ) -> Design:
-        """Design a curve; arguments, result and errors are those of `design_curve`."""
+        """Design a curve; arguments, result and errors are those of `design_curve`, and more.
+
+        Parameters
+        ----------
+        start : Design or SurfaceCurve, optional
+            A curve on this mesh to go on from; only with the method "nicmm". Its course and the
+            order of its points are kept, so the result may differ from that without a start, and
+            `via_points` have no effect. Obstacles, maps and smoothness may be others. Control
+            points may have moved by a tenth of the curve's length, come or gone. The cost follows
+            the curve and not the mesh: that is what dragging a point needs.
+        max_iterations : int, optional
+            Of the relaxation; only with the method "nicmm". The status is `ITERATION_LIMIT` until
+            the curve has converged: for live drawing, pass the last design as the next start until
+            it has.
+
+        Raises
+        ------
+        CurveError
+            If the start lies on another mesh, enters an obstacle, is too far from the control
+            points, or would cross itself on its way there.
+        """
         started = time.perf_counter()
         check_choices(order, method)
         check_closed(closed)
+        check_start(start, max_iterations, method)
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         if method == "nicmm-paper":
@@ -129,8 +138,12 @@ class Designer:
                     points=points, closed=closed, order=order, via_points=located, **maps
                 )
                 mapped, designer, there = self._on_manifold(request)
+                if isinstance(start, Design) and _answers(start, mapped, there):
+                    return replace(start, seconds=time.perf_counter() - started)
+                begin = None if start is None else start_on(mapped, start)
                 with displaced(mapped.origin):
-                    return design_on_original(mapped, designer.design(there, method, started))
+                    found = designer.design(there, method, started, begin, max_iterations)
+                    return design_on_original(mapped, found)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -143,106 +156,6 @@ class Designer:
             yield
         finally:
             self._lock.release()
-
-    def resume(
-        self,
-        curve: SurfaceCurve,
-        *,
-        obstacles: ArrayLike | None = None,
-        alignment: ArrayLike | None = None,
-        clearance: float = 0.0,
-        smoothness: float = 1.0,
-    ) -> bool:
-        """Go on from a curve that was designed before, here or in another session.
-
-        Its control points may be fewer or more than it was designed through: `control_index` says
-        which of its points they are. Other arguments are those of `design_curve`.
-
-        Parameters
-        ----------
-        curve : SurfaceCurve
-            Simple, and through its control points in their order.
-
-        Returns
-        -------
-        bool
-            False where the curve enters obstacles; then the next design starts anew.
-
-        Raises
-        ------
-        CurveError
-            If the curve does not lie on this mesh, or lacks control points.
-        """
-        faces, barycentric, _ = checked_curve(self.mesh, curve)
-        index = np.asarray(curve.control_index)
-        if len(index) == 0 or (index < 0).any():
-            raise CurveError(
-                f"curve has the control_index {index.tolist()}; pass a curve that passes all its "
-                "control points"
-            )
-        found = SurfacePoints(faces[index], barycentric[index])
-        request = Request(
-            points=locate_control_points(self.mesh, found, curve.closed, connected=False),
-            closed=curve.closed,
-            order="given",
-            via_points={},
-            **self._maps(obstacles, alignment, clearance, smoothness),
-        )
-        with self._its_turn():
-            self.forget()
-            mapped, designer, there = self._on_manifold(request)
-            carried = mapped.carried(curve)
-            return carried is not None and designer.resume(there, carried)
-
-    def follow(
-        self,
-        control_points: ArrayLike | SurfacePoints,
-        *,
-        closed: bool = True,
-        obstacles: ArrayLike | None = None,
-        alignment: ArrayLike | None = None,
-        clearance: float = 0.0,
-        smoothness: float = 1.0,
-        iterations: int = FOLLOWING,
-    ) -> Design | None:
-        """Move the last curve to control points nearby by a bounded amount of work.
-
-        For live drawing: every call takes a few hundredths of a second on a mesh of any size, and
-        the status is `ITERATION_LIMIT` until the curve has converged; call again with the same
-        arguments until it has. Arguments not listed here are those of `design_curve`; the order is
-        "given" and the method "nicmm".
-
-        Parameters
-        ----------
-        iterations : int
-            At most so many in this call.
-
-        Returns
-        -------
-        Design or None
-            None where the last curve cannot be led there, as after a jump of a point, or where
-            anything but control points and smoothness differs; then `forget` and `design`.
-
-        Raises
-        ------
-        NicmmError
-            As `design_curve`.
-        """
-        started = time.perf_counter()
-        check_closed(closed)
-        request = Request(
-            points=locate_control_points(self.mesh, control_points, closed, connected=False),
-            closed=closed,
-            order="given",
-            via_points={},
-            **self._maps(obstacles, alignment, clearance, smoothness),
-        )
-        if not isinstance(iterations, int) or iterations < 1:
-            raise ArgumentError(f"iterations is {iterations!r}; pass a positive whole number")
-        with self._its_turn():
-            mapped, designer, there = self._on_manifold(request)
-            found = designer.follow(there, iterations, started)
-            return None if found is None else design_on_original(mapped, found)
 
     def _maps(
         self,
@@ -284,6 +197,36 @@ class Designer:
             surface = self._whole if every else RepairedSurface(self.mesh, free)
             last = self._free = _Free(obstacles, clearance, surface)
         return last.surface
+
+
+def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
+    """Whether a design is already the answer to a request, on a mapped mesh."""
+    resumable = design.resumable
+    return (
+        resumable is not None
+        and design.status not in (Status.ITERATION_LIMIT, Status.CANCELLED)
+        and same_mesh(resumable.mesh, mapped.mesh)
+        and same_request(request, resumable.request)
+    )
+
+
+def check_start(start: object, max_iterations: object, method: str) -> None:
+    """Raise ArgumentError unless both can be used with the method."""
+    if start is not None and not isinstance(start, Design | SurfaceCurve):
+        raise ArgumentError(
+            f"start is a {type(start).__name__}; pass a Design, a SurfaceCurve or None"
+        )
+    if max_iterations is not None and (
+        isinstance(max_iterations, bool)
+        or not isinstance(max_iterations, int | np.integer)
+        or max_iterations < 1
+    ):
+        raise ArgumentError(
+            f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
+        )
+    for name, value in (("start", start), ("max_iterations", max_iterations)):
+        if value is not None and method != "nicmm":
+            raise ArgumentError(f'{name} needs the method "nicmm", not {method!r}; leave one out')
 
 
 def design_curve(

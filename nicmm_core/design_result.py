@@ -11,6 +11,7 @@ from functools import cached_property
 from .errors import CurveError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
+from .start import Resumable
 
 
 class Status(enum.Enum):
@@ -63,6 +64,8 @@ class Design:
         initial level set replaces the predicted one around them; 0 when it was one loop by itself.
     find_field : callable
         Finds `field` when it is first asked for.
+    resumable : Resumable or None
+        What another design goes on from by ``start=``; None where `curves` has to do.
     """
 
     status: Status
@@ -72,6 +75,7 @@ class Design:
     energy: dict[str, float]
     breaking_vertices: int
     find_field: Callable[[], FloatArray] = dataclass_field(repr=False, compare=False)
+    resumable: Resumable | None = dataclass_field(default=None, repr=False, compare=False)
 
     @cached_property
     def field(self) -> FloatArray:

@@ -9,12 +9,19 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from .design_result import Design
+from .errors import CurveError
+from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.mesh import Mesh
+from .geometry.curve import SurfaceCurve, checked_curve
+from .geometry.mesh import Mesh, same_mesh
+from .geometry.surface_points import SurfacePoints, in_faces
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import REPAIRS, repaired
 from .request import Request
+from .start import ANEW, Resumable
 from .surface_designer import SurfaceDesigner
 
 
@@ -57,12 +64,6 @@ class RepairedSurface:
                 return *found, there
         return None
 
-    def forget(self) -> None:
-        """Start the next design anew."""
-        for made in self._made:
-            if made is not None:
-                made[1].forget()
-
     def _repair(self, number: int) -> tuple[MappedMesh, SurfaceDesigner] | None:
         while len(self._made) <= number:
             mapped = repaired(self._mesh, len(self._made), self._usable)
@@ -88,6 +89,58 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
         obstacles=mapped.weights(request.obstacles),
         alignment=mapped.weights(request.alignment),
     )
+
+
+def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | SurfaceCurve:
+    """What a design on a mapped mesh goes on from.
+
+    Returns
+    -------
+    Resumable or SurfaceCurve
+        Each point of a SurfaceCurve in the face of the segment after it.
+
+    Raises
+    ------
+    CurveError
+        If the start is not one curve through its control points on the original, or not on what
+        obstacles leave of it.
+    """
+    if isinstance(start, Design):
+        resumable = start.resumable
+        if resumable is not None and same_mesh(resumable.mesh, mapped.mesh):
+            return resumable
+        if len(start.curves) != 1:
+            raise CurveError(
+                f"start has {len(start.curves)} curves ({start.status.name}); pass a design with "
+                "one"
+            )
+        start = start.curves[0]
+    original = mapped.original
+    faces, barycentric, segment_faces = checked_curve(original, start)
+    index = np.asarray(start.control_index)
+    if len(index) == 0 or (index < 0).any() or (index >= len(faces)).any():
+        raise CurveError(
+            f"start has the control_index {index.tolist()}; pass a curve that passes all its "
+            "control points"
+        )
+    points = SurfacePoints(faces, barycentric)
+    away = np.abs(points.positions(original) - np.asarray(start.points)).max(initial=0.0)
+    if not away <= tolerances.SAME_CURVE * original.diagonal:
+        raise CurveError(
+            f"start lies on another mesh: its points are up to {away:g} from where their faces and "
+            "coordinates are on this one; pass the mesh that it was designed on"
+        )
+    if not start.closed:
+        segment_faces[-1] = faces[-1]
+    points = in_faces(original, points, segment_faces)
+    curve = replace(start, faces=points.faces, barycentric=points.barycentric)
+    carried = mapped.carried(curve)
+    if carried is None:
+        raise CurveError(
+            "start enters faces that obstacles of weight 1 or the clearance from them close to "
+            f"curves, or passes a non-manifold edge on its way{ANEW}"
+        )
+    return carried
 
 
 def design_on_original(mapped: MappedMesh, design: Design) -> Design:

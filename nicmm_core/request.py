@@ -50,27 +50,18 @@ class Request:
         return {"control_points": self.points, **via}
 
 
-def same_course(one: Request, other: Request) -> bool:
-    """Whether requests differ at most in where the control points are, and in smoothness."""
-    return (
-        len(one.points) == len(other.points)
-        and one.closed == other.closed
-        and one.order == other.order
-        and one.via_points.keys() == other.via_points.keys()
-        and all(_same_points(one.via_points[key], other.via_points[key]) for key in one.via_points)
-        # The path goes round obstacles from the start.
-        and _same_map(one.obstacles, other.obstacles)
-        and _same_map(one.alignment, other.alignment)
-        and one.clearance == other.clearance
-    )
-
-
 def same_request(one: Request, other: Request) -> bool:
     """Whether requests do not differ at all."""
     return (
-        same_course(one, other)
-        and _same_points(one.points, other.points)
+        one.closed == other.closed
+        and one.order == other.order
+        and one.clearance == other.clearance
         and one.smoothness == other.smoothness
+        and _same_points(one.points, other.points)
+        and one.via_points.keys() == other.via_points.keys()
+        and all(_same_points(one.via_points[key], other.via_points[key]) for key in one.via_points)
+        and _same_map(one.obstacles, other.obstacles)
+        and _same_map(one.alignment, other.alignment)
     )
 
 

@@ -1,4 +1,4 @@
-"""Curves on a sound mesh: from the last curve, a coarse mesh or the network, then relaxed.
+"""Curves on a manifold: from an earlier curve, a coarse mesh or the network, then relaxed.
 
 The main path for one checked request; `design` is the front of it.
 """
@@ -29,10 +29,11 @@ from .progress import CancelledError, checkpoint, part
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface
 from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.noded_curve import NodedCurve, noded_curve
+from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
-from .relaxation.warm_start import LONGEST_MOVE, LONGEST_MOVE_OF_A_FRAME, WARM, moved_along
-from .request import Request, same_course, same_request
+from .relaxation.warm_start import WARM
+from .request import Request
+from .start import Resumable, moved_start
 
 STARTED = 0.6
 """About how much of the time is over when relaxation begins."""
@@ -40,8 +41,8 @@ STARTED = 0.6
 SOON_DONE = 10
 """The cap of a relaxation, in numbers of iterations that most need."""
 
-CROWDED = 3
-"""Frames for which strands that collided are assumed to collide still."""
+COLLISIONS = 3
+"""Designs for which strands that collided are assumed to collide still."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,7 @@ class _Start:
     surface: CurveSurface
     unit: float  # square root of the surface's area
     breaking: int = 0
-
-
-@dataclass(frozen=True)
-class _Remembered:
-    """The last relaxed curve."""
-
-    request: Request
-    start: _Start
-    exact: NodedCurve  # the design's curve with its nodes
-    design: Design | None  # None where the curve has not converged yet
-    crowded: int = 0  # frames in which it is better drawn after every step
+    collisions: int = 0
 
 
 class SurfaceDesigner:
@@ -77,13 +68,15 @@ class SurfaceDesigner:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self._last: _Remembered | None = None
 
-    def forget(self) -> None:
-        """Start the next design anew."""
-        self._last = None
-
-    def design(self, request: Request, method: str, started: float) -> Design:
+    def design(
+        self,
+        request: Request,
+        method: str,
+        started: float,
+        start: Resumable | SurfaceCurve | None = None,
+        max_iterations: int | None = None,
+    ) -> Design:
         """Design a curve.
 
         Parameters
@@ -92,14 +85,22 @@ class SurfaceDesigner:
         method : {"nicmm", "nicmm-paper", "variational"}
         started : float
             When the design began, by `time.perf_counter`.
+        start : Resumable or SurfaceCurve, optional
+            A curve on this mesh that the method "nicmm" goes on from.
+        max_iterations : int, optional
+            Of the relaxation, in all.
 
         Raises
         ------
         UnreachableError
             If no simple curve passes the points in this order.
+        CurveError
+            If the start cannot be used.
         """
         if method == "nicmm":
-            return self._designed(request, started)
+            if start is not None:
+                return self._resumed(request, start, max_iterations, started)
+            return self._designed(request, max_iterations, started)
         with part(0.0, 0.3):
             problem = requested_problem(self.mesh, request)
         watch = _FieldWatch(self.mesh, problem)
@@ -114,82 +115,45 @@ class SurfaceDesigner:
             return replace(design, iterations=watch.shown_after)
         return self._level_set_design(problem, solution, zeros, started)
 
-    def follow(self, request: Request, iterations: int, started: float) -> Design | None:
-        """Relax the last curve by few iterations; None where it cannot be moved there.
+    def _resumed(
+        self,
+        request: Request,
+        start: Resumable | SurfaceCurve,
+        max_iterations: int | None,
+        started: float,
+    ) -> Design:
+        """A start that is moved to the control points and relaxed from there."""
+        surface = self._curve_surface(request)
+        curve, visited = moved_start(surface, start, request)
+        collisions = start.collisions if isinstance(start, Resumable) else 0
+        # Without tracing every iteration the first attempt would be in vain.
+        config = replace(WARM, defer_tracing=not collisions)
+        begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
+        return self._relaxed(request, begin, config, max_iterations, started)
 
-        Parameters
-        ----------
-        request : Request
-        iterations : int
-            At most so many.
-        started : float
-            When this began, by `time.perf_counter`.
-        """
-        last = self._last
-        if last is not None and last.design is not None and same_request(request, last.request):
-            return replace(last.design, seconds=time.perf_counter() - started)
-        config = replace(WARM, iterations=iterations, drawn_iterations=1)
-        if last is not None and last.crowded:
-            # Without would fail once more.
-            config = replace(config, defer_tracing=False)
-        start = self._start_from_last(request, LONGEST_MOVE_OF_A_FRAME)
-        return None if start is None else self._relaxed(request, start, config, started)
-
-    def resume(self, request: Request, curve: SurfaceCurve) -> bool:
-        """Go on from a curve as if it were the last one, or forget where it is not on this surface.
-
-        Parameters
-        ----------
-        request : Request
-            That the curve answers.
-        curve : SurfaceCurve
-            Through all its points, in their order.
-        """
-        self.forget()
-        surface, unit = self._curve_surface(request), self._unit(request)
-        start = _Start(curve, np.arange(len(request.points)), surface, unit)
-        exact = noded_curve(surface, curve, WARM.levels[-1])
-        self._last = _Remembered(request, start, exact, None)
-        return True
-
-    def _designed(self, request: Request, started: float) -> Design:
-        """A relaxed curve that starts from the last one, a coarse mesh or the network."""
-        last = self._last
-        if last is not None and last.design is not None and same_request(request, last.request):
-            return replace(last.design, seconds=time.perf_counter() - started)
-        start = self._start_from_last(request)
-        if start is not None:
-            return self._relaxed(request, start, WARM, started)
+    def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
+        """A relaxed curve that starts from a coarse mesh or the network."""
         with part(0.0, STARTED):
             start = self._start_from_coarse(request)
             if start is None:
-                found = predicted(self.mesh, request)
-                problem, zeros = found.problem, found.zeros
-                one = zeros.is_simple_curve(self.mesh, request.closed)
-                start = _Start(
-                    # A level set may touch itself where the mesh is too coarse; the path does not.
-                    curve=zeros.curves[0]
-                    if one
-                    else path_curve(self.mesh, problem.working, problem.loop),
-                    visited=problem.loop.order,
-                    surface=self._curve_surface(request),
-                    unit=problem.unit,
-                    breaking=zeros.breaking_vertices,
-                )
+                start = self._start_from_network(request)
         with part(STARTED, 1.0):
             config = RelaxationConfig() if request.alignment is None else GUIDED
-            return self._relaxed(request, start, config, started)
+            return self._relaxed(request, start, config, max_iterations, started)
 
-    def _start_from_last(self, request: Request, longest: float = LONGEST_MOVE) -> _Start | None:
-        """The last curve with its control points moved; None where the request is too different."""
-        last = self._last
-        if last is None or not same_course(request, last.request):
-            return None
-        points = request.points[last.start.visited]
-        curve = moved_along(last.start.surface, last.exact, points, longest)
-        if curve is None:
-            return None
-        return replace(last.start, curve=curve, breaking=0)
+    def _start_from_network(self, request: Request) -> _Start:
+        """The zero set of the network's level set, or the path where that is not one curve."""
+        found = predicted(self.mesh, request)
+        problem, zeros = found.problem, found.zeros
+        # A level set may touch itself where the mesh is too coarse; the path does not.
+        one = zeros.is_simple_curve(self.mesh, request.closed)
+        return _Start(
+            curve=zeros.curves[0] if one else path_curve(self.mesh, problem.working, problem.loop),
+            visited=problem.loop.order,
+            surface=self._curve_surface(request),
+            unit=problem.unit,
+            breaking=zeros.breaking_vertices,
+        )
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
         """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
@@ -209,9 +173,12 @@ class SurfaceDesigner:
         request: Request,
         start: _Start,
         config: RelaxationConfig,
+        max_iterations: int | None,
         started: float,
     ) -> Design:
-        """The design that relaxation makes of a curve; it is kept for the next request."""
+        """The design that relaxation makes of a curve."""
+        if max_iterations is not None:
+            config = replace(config, most_iterations=max_iterations)
 
         def watch(done: float, points: FloatArray) -> bool:
             checkpoint(1.0 - (1.0 - done) ** SOON_DONE, lambda: points)
@@ -222,7 +189,8 @@ class SurfaceDesigner:
         feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
         # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
         energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
-        design = Design(
+        collisions = COLLISIONS if relaxed.collided else max(start.collisions - 1, 0)
+        return Design(
             status=STATUS[relaxed.stopped],
             curves=[relaxed.curve],
             iterations=relaxed.iterations,
@@ -230,15 +198,8 @@ class SurfaceDesigner:
             energy=energy,
             breaking_vertices=start.breaking,
             find_field=partial(curve_field, self.mesh, relaxed.curve),
+            resumable=Resumable(self.mesh, request, relaxed.noded_curve, start.visited, collisions),
         )
-        if design.status is not Status.CANCELLED:
-            at_rest = design.status is not Status.ITERATION_LIMIT
-            before = 0 if self._last is None else self._last.crowded
-            failed = config.defer_tracing and relaxed.iterations > config.iterations
-            crowded = CROWDED if failed else max(before - 1, 0)
-            kept = design if at_rest else None
-            self._last = _Remembered(request, start, relaxed.exact, kept, crowded)
-        return design
 
     def _level_set_design(
         self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float

@@ -85,8 +85,6 @@ def answer(request: DesignRequest, progress):
 
     asked = request.asked
     with designers.lent(request.surface.solved, request.surface.faces) as designer:
-        # The same settings give the same curve, whatever was designed before.
-        designer.forget()
         try:
             return designer.design(
                 request.points,

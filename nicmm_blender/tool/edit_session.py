@@ -2,10 +2,10 @@
 """A curve while it is edited: its control points, what it is asked for, and what can be taken back.
 
 Nothing here knows of windows and events. Every change is answered by a bounded amount of work:
-the last curve is led on by a few iterations, and `step` goes on until it is at rest. Where it
-cannot be led, as after a long jump of a point, `waiting` says that the curve has to be designed
-anew, which takes longer; `step` does that too. A request that cannot be met leaves the last curve
-that could, and `problem` says why.
+a few iterations from the last curve, and `step` goes on until it has converged. Where the last
+curve cannot be used, as after a long jump of a point, `waiting` says that the curve has to be
+designed anew, which takes longer; `step` does that too. A request that cannot be met leaves the
+last curve that could, and `problem` says why.
 """
 
 from collections.abc import Callable
@@ -15,6 +15,9 @@ import numpy as np
 
 from ..scene.curve_record import Asked
 from ..scene.mesh_data import InputError, in_words
+
+ITERATIONS = 3
+"""Of a step: a frame or two of live drawing."""
 
 MOST_STEPS = 60
 """Steps from a change until the curve is taken as it is; most need fewer than five."""
@@ -31,17 +34,17 @@ FEWEST_CLOSED, FEWEST_OPEN = 3, 2
 class State:
     """What one step of undo brings back.
 
-    `points` are the core's SurfacePoints, `curve` is the last curve that could be drawn, or None,
-    and `problem` says in words why it is not the one that was asked for; `notice` is what else is
-    to be said of it. `rested` says whether the curve is the final one for these points.
+    `points` are the core's SurfacePoints. `found` is the last Design, a SurfaceCurve that was
+    opened, or None, and `problem` says why it does not answer the request; `notice` is a remark on
+    it. `converged` says whether it is the final one for these points.
     """
 
     points: object
     asked: Asked
-    curve: object = None
+    found: object = None
     problem: str = ""
     notice: str = ""
-    rested: bool = False
+    converged: bool = False
 
 
 class EditSession:
@@ -83,10 +86,10 @@ class EditSession:
         self._undone: list[State] = []
         self._before_drag: State | None = None
         self._dragging = False
-        if curve is None or not self._resume(curve):
+        if curve is None:
             self._ask()
         else:
-            self.state = replace(self.state, curve=curve, rested=True)
+            self.state = replace(self.state, found=curve, converged=True)
 
     @property
     def points(self):
@@ -100,7 +103,8 @@ class EditSession:
     @property
     def curve(self):
         """The curve as it is now, the core's SurfaceCurve, or None before there is one."""
-        return self.state.curve
+        found = self.state.found
+        return found.curves[0] if isinstance(found, self._nicmm.Design) else found
 
     @property
     def problem(self) -> str:
@@ -153,29 +157,20 @@ class EditSession:
     def insert(self, segment: int, share: float) -> int:
         """Put a point on the curve, between two of its points; return the new one's number.
 
-        The curve stays as it is. Parameters: which segment of `polyline`, and how far along it.
+        Parameters: which segment of `polyline`, and how far along it.
         """
+        from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
+
         self._keep()
-        curve, number = _with_point(self._nicmm, self.designer.mesh, self.curve, segment, share)
-        at = int(curve.control_index[number])
-        self._insert(number, curve.faces[at], curve.barycentric[at], ask=False)
-        if self._resume(curve):
-            self.state = replace(self.state, curve=curve, problem="", rested=True)
-        else:
-            self._ask()
-        return number
+        place = point_on_segment(self.designer.mesh, self.curve, segment, share)
+        number = leg_of_segment(self.curve, segment) + 1
+        return self._insert(number, place.faces[0], place.barycentric[0])
 
     def remove(self, number: int) -> None:
         """Take a point away."""
         self._keep()
         left = np.delete(np.arange(len(self.points)), number)
         self.state = replace(self.state, points=self.points[left])
-        curve = self.curve
-        fits = curve is not None and len(curve.control_index) == len(left) + 1
-        if fits and self.closed == curve.closed and (self.closed or 0 < number < len(left)):
-            curve = replace(curve, control_index=curve.control_index[left])
-            if self._resume(curve):
-                self.state = replace(self.state, curve=curve)
         self._ask()
 
     def grab(self) -> None:
@@ -211,7 +206,8 @@ class EditSession:
         if asked != self.asked:
             self._keep()
             self.state = replace(self.state, asked=asked)
-            self._ask()
+            # Other maps may lead to another course.
+            self._ask(anew=changes.keys() != {"smoothness"})
 
     def smoother(self, steps: int) -> None:
         """Raise the smoothness by some steps, or lower it by a negative number of them."""
@@ -235,11 +231,11 @@ class EditSession:
         if self.waiting:
             self._design()
         else:
-            self._follow()
+            self._go_on()
         return True
 
     def settle(self) -> None:
-        """Work until the curve rests."""
+        """Work until the curve has converged."""
         while self.step():
             pass
 
@@ -261,41 +257,46 @@ class EditSession:
         target.append(self.state)
         self.state = source.pop()
         self.drop()
-        resumed = self.curve is not None and self._resume(self.curve)
-        if not (self.problem or (self.state.rested and resumed)):
+        self._rest()
+        if not (self.problem or self.state.converged):
             self._ask()
         return True
 
-    def _insert(self, number: int, face: int, barycentric, ask: bool = True) -> int:
+    def _insert(self, number: int, face: int, barycentric) -> int:
         points = self._nicmm.SurfacePoints(
             np.insert(self.points.faces, number, face),
             np.insert(self.points.barycentric, number, barycentric, axis=0),
         )
         self.state = replace(self.state, points=points)
-        if ask:
-            self._ask()
+        self._ask()
         return number
 
     def _rest(self) -> None:
         self.waiting, self._steps_left = False, 0
 
-    def _ask(self) -> None:
-        """Answer a change: at once as far as bounded work goes."""
+    def _ask(self, anew: bool = False) -> None:
+        """Answer a change: at once as far as bounded work goes, or later where `anew`."""
         self._rest()
         if len(self.points) < FEWEST_OPEN:
-            self.state = replace(self.state, curve=None, problem="", notice="", rested=True)
+            self.state = replace(self.state, found=None, problem="", notice="", converged=True)
             return
-        self.state = replace(self.state, rested=False)
+        self.state = replace(self.state, converged=False, problem="")
+        if anew or self.state.found is None:
+            self.waiting = True
+            return
         self._steps_left = MOST_STEPS
-        self._follow()
+        self._go_on()
 
-    def _follow(self) -> None:
+    def _go_on(self) -> None:
         self._steps_left -= 1
-        design = self._answer(self.designer.follow)
-        if design is None:
-            # There is nothing to follow, unless it has a problem.
+        try:
+            design = self._answer(start=self.state.found, max_iterations=ITERATIONS)
+        except self._nicmm.CurveError:
             self._rest()
-            self.waiting = not self.problem
+            self.waiting = True
+            return
+        if design is None:
+            self._rest()
         elif design.status is not self._nicmm.Status.ITERATION_LIMIT:
             self._steps_left = 0
         elif not self._steps_left:
@@ -304,14 +305,15 @@ class EditSession:
 
     def _design(self) -> None:
         self._rest()
-        self.designer.forget()
-        self._take(self._answer(self.designer.design))
+        self._take(self._answer())
 
-    def _answer(self, ask: Callable):
-        """The core's design, or None where it has none; `problem` says why if it knows."""
+    def _answer(self, **bounds):
+        """The core's design, or None where it has none; `problem` says why."""
         self.state = replace(self.state, problem="")
         try:
-            return ask(self.points, closed=self.closed, **self._maps())
+            return self.designer.design(self.points, closed=self.closed, **self._maps(), **bounds)
+        except self._nicmm.CurveError:
+            raise
         except (self._nicmm.NicmmError, InputError) as error:
             self.state = replace(self.state, problem=self._in_words(error))
             return None
@@ -321,26 +323,13 @@ class EditSession:
         nicmm = self._nicmm
         if design is None:
             return
-        if len(design.curves) != 1 or (design.curves[0].control_index < 0).any():
-            self._rest()
-            self.state = replace(self.state, problem=str(design.status))
-            return
         good = (nicmm.Status.CONVERGED, nicmm.Status.ITERATION_LIMIT)
         self.state = replace(
             self.state,
-            curve=design.curves[0],
+            found=design,
             notice="" if design.status in good else str(design.status),
-            rested=self.resting,
+            converged=self.resting,
         )
-
-    def _resume(self, curve) -> bool:
-        """Whether the designer can go on from a curve, which it then does."""
-        self._rest()
-        try:
-            return self.designer.resume(curve, **self._maps())
-        except (self._nicmm.NicmmError, InputError):
-            # What is wrong is said by the design that has to follow.
-            return False
 
     def _maps(self) -> dict:
         obstacles = self._weights_of(self.asked.obstacle_group)
@@ -359,33 +348,3 @@ class EditSession:
     def _in_words(self, error: Exception) -> str:
         """The core's message, with its points numbered as the user counts them."""
         return in_words(error, self.asked.obstacle_group)
-
-
-def _with_point(nicmm, mesh, curve, segment: int, share: float):
-    """A curve with one more control point on a segment, and the number of that."""
-    from ...nicmm_core.geometry.surface_points import nearest_points
-
-    start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
-    place = ((1.0 - share) * start + share * end)[None]
-    # In the face of the segment, which both of its ends have in common.
-    corners = [
-        set(mesh.faces[curve.faces[at]][curve.barycentric[at] > 0.0].tolist())
-        for at in (segment, (segment + 1) % len(curve.points))
-    ]
-    around = mesh.vertex_faces[sorted(corners[0] | corners[1])].indices
-    candidates = np.unique(np.concatenate([curve.faces[[segment]], around]))
-    needed = list(corners[0] | corners[1])
-    common = [face for face in candidates if np.isin(needed, mesh.faces[face]).all()]
-    found, _ = nearest_points(mesh, place, np.array(common, dtype=np.int64))
-    at = segment + 1
-    longer = replace(
-        curve,
-        faces=np.insert(curve.faces, at, found.faces[0]),
-        barycentric=np.insert(curve.barycentric, at, found.barycentric[0], axis=0),
-        points=np.insert(curve.points, at, found.positions(mesh)[0], axis=0),
-    )
-    index = curve.control_index + (curve.control_index >= at)
-    # Legs begin at control points; the one that runs over the end of the list is the last.
-    before = int(np.searchsorted(np.sort(index), at)) - 1
-    number = int(np.argsort(index, kind="stable")[before]) + 1
-    return replace(longer, control_index=np.insert(index, number, at)), number

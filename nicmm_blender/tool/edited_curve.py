@@ -49,7 +49,6 @@ def open_session(context, edited, asked: Asked) -> Opened:
     if not len(surface.faces):
         raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
     designer = designers.designer_for(surface.solved, surface.faces)
-    designer.forget()
     remarks = []
     if shown := mesh_data.shown_beyond_the_mesh(mesh_object):
         remarks.append(f"on the mesh without its {shown}")

@@ -17,7 +17,7 @@ from scipy.sparse import csgraph
 from ..geometry.array_types import IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh, unique_edges
-from ..geometry.surface_points import SurfacePoints, nearest_points
+from ..geometry.surface_points import SurfacePoints, joined, nearest_points
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
@@ -193,8 +193,4 @@ def _with_bridges(
         for node in range(len(node_place))
     ]
     lengths = np.array([len(part) for part in parts])
-    joined = SurfacePoints(
-        np.concatenate([part.faces for part in parts]),
-        np.concatenate([part.barycentric for part in parts]),
-    )
-    return NodedCurve(nodes, curve.control_nodes, joined, np.cumsum(lengths) - lengths)
+    return NodedCurve(nodes, curve.control_nodes, joined(parts), np.cumsum(lengths) - lengths)

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
+from .surface_points import SurfacePoints, in_faces
 from .tolerances import BARYCENTRIC_SUM
 
 ROUNDING = 1e-12
@@ -61,6 +62,22 @@ def curve_on_mesh(
     corners = mesh.vertices[mesh.faces[faces]]
     points = (barycentric[:, :, None] * corners).sum(axis=1)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
+
+
+def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
+    """The point some share of the way from one point of a curve to the next, in a face of both."""
+    faces, barycentric, segment_faces = checked_curve(mesh, curve)
+    ends = np.array([segment, (segment + 1) % len(faces)])
+    there = segment_faces[[segment, segment]]
+    both = in_faces(mesh, SurfacePoints(faces[ends], barycentric[ends]), there).barycentric
+    return SurfacePoints(there[:1], (1.0 - share) * both[:1] + share * both[1:])
+
+
+def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
+    """The index of the control point that begins the leg of a segment."""
+    order = np.argsort(curve.control_index)
+    # A segment before all control points belongs to the leg that passes the end of the list.
+    return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
 def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray, IntArray]:

@@ -319,3 +319,10 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"({repeated.sum()} such faces); remove degenerate faces"
         )
     return checked
+
+
+def same_mesh(one: Mesh, other: Mesh) -> bool:
+    """Whether two meshes have the same vertices and faces."""
+    return one is other or (
+        np.array_equal(one.vertices, other.vertices) and np.array_equal(one.faces, other.faces)
+    )

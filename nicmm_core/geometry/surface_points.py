@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -348,6 +349,14 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[str]) -> 
             "components of the mesh, so no curve joins them; join the components, or merge "
             "vertices by distance where only hair-thin gaps part them"
         )
+
+
+def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
+    """Sets of points as one."""
+    return SurfacePoints(
+        np.concatenate([part.faces for part in parts]),
+        np.concatenate([part.barycentric for part in parts]),
+    )
 
 
 def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:

@@ -30,6 +30,9 @@ Cotangents are found from lengths of edges, with which no sine below 1e-8 can be
 a bending energy with cotangents of a millionth degree is no energy of the surface any more.
 """
 
+SAME_CURVE = 1e-6
+"""Distance, in bounding-box diagonals, up to which points are those of the same curve."""
+
 AT_ONE_PLACE = 1e-12
 """Length of an edge, in bounding-box diagonals, up to which its ends are at one place."""
 

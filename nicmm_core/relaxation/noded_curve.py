@@ -19,7 +19,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, in_faces
+from ..geometry.surface_points import SurfacePoints, in_faces, joined
 from ..geometry.tracing import strictly_inside, trace_between, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
@@ -63,6 +63,11 @@ class NodedCurve:
     def closed(self) -> bool:
         """Whether the last point joins the first."""
         return self.nodes.closed
+
+    @property
+    def length(self) -> float:
+        """From node to node, in mesh units."""
+        return float(self.nodes.lengths.sum())
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
         """The polyline as a result."""
@@ -322,10 +327,7 @@ def _with_nodes(
     segment[control_nodes] = control_place
     before = np.concatenate([segment, old])
     order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
-    merged = SurfacePoints(
-        np.concatenate([faces, polyline.faces[old]])[order],
-        np.concatenate([barycentric, polyline.barycentric[old]])[order],
-    )
+    merged = joined([places, polyline[old]])[order]
     node_place = np.flatnonzero(order < len(at))
     nodes = nodes_at(surface, places, closed)
     return NodedCurve(nodes, control_nodes, merged, node_place)
@@ -373,10 +375,7 @@ def _drawn(
         parts.append((np.array([n - 1]), places[np.array([n - 1])]))
     owner = np.concatenate([part[0] for part in parts])
     order = np.argsort(owner, kind="stable")
-    polyline = SurfacePoints(
-        np.concatenate([part[1].faces for part in parts])[order],
-        np.concatenate([part[1].barycentric for part in parts])[order],
-    )
+    polyline = joined([part[1] for part in parts])[order]
     return polyline, np.searchsorted(owner[order], np.arange(n)), lost
 
 
@@ -411,7 +410,7 @@ def _drawn_stretches(
     if not backwards:
         owner = np.concatenate([nodes, nodes[ways.pair]])
         order = np.argsort(owner, kind="stable")
-        points = _joined(first, crossings)
+        points = joined([first, crossings])
         return (owner[order], points[order]), ways.reached
     # In reverse, a crossing belongs to the face that the way came from, and the node before all
     # of them to the face where it ended.
@@ -428,11 +427,4 @@ def _drawn_stretches(
     node_points = in_faces(mesh, places[end], last_face)
     owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
     order = np.argsort(owner, kind="stable")
-    return (owner[order], _joined(node_points, crossings)[order]), ways.reached
-
-
-def _joined(first: SurfacePoints, second: SurfacePoints) -> SurfacePoints:
-    return SurfacePoints(
-        np.concatenate([first.faces, second.faces]),
-        np.concatenate([first.barycentric, second.barycentric]),
-    )
+    return (owner[order], joined([node_points, crossings])[order]), ways.reached

@@ -84,8 +84,8 @@ class RelaxationConfig:
         takes many of them.
     defer_tracing : bool
         Whether to try first without drawing the curve after every iteration.
-    drawn_iterations : int
-        The cap where it is drawn after every iteration, if that is lower.
+    most_iterations : int
+        The cap over all attempts.
     taut : float
         Factor of the tension in a pass with the fewest nodes before all others, which there is
         where this is above 1.
@@ -102,7 +102,7 @@ class RelaxationConfig:
     iterations: int = 100
     work: float = 800.0
     defer_tracing: bool = False
-    drawn_iterations: int = 100
+    most_iterations: int = 200
     taut: float = 1.0
 
 
@@ -159,25 +159,28 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         Simple.
-    exact : NodedCurve
+    noded_curve : NodedCurve
         The same with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
     feature : float
         ∮ φ_fea² ds, in units of length.
     iterations : int
-        Of all attempts, each of which has its own cap.
+        Of all attempts.
     stopped : str
         "converged", "cap" or "cancelled"; "unrelaxed" where strands of the start are so close to
         one another that nodes on it would touch.
+    collided : bool
+        Whether the curve crossed itself where it was not traced after every iteration.
     """
 
     curve: SurfaceCurve
-    exact: NodedCurve
+    noded_curve: NodedCurve
     bending: float
     feature: float
     iterations: int
     stopped: str
+    collided: bool = False
 
 
 Watch = Callable[[float, FloatArray], bool]
@@ -211,11 +214,13 @@ def relax(
     else:
         first = noded_curve(surface, start, config.levels[0])
     relaxation.drawn = first
+    collided = False
     try:
         for simple in (False, True) if config.defer_tracing else (True,):
             curve = relaxation.run(first, simple)
             if relaxation.stopped == "cancelled" or _is_simple(surface, curve):
                 break
+            collided = not simple
     except CancelledError:
         curve, relaxation.stopped = relaxation.drawn, "cancelled"
     if curve is not None and _is_simple(surface, curve):
@@ -231,6 +236,7 @@ def relax(
         feature_energy(nodes),
         relaxation.iterations,
         stopped,
+        collided,
     )
 
 
@@ -309,8 +315,7 @@ class _Relaxation:
     def run(self, curve: NodedCurve, simple: bool) -> NodedCurve | None:
         """Relax a curve level by level; None where it could not be traced."""
         config = self.config
-        cap = min(config.iterations, config.drawn_iterations) if simple else config.iterations
-        last_iteration = self.iterations + cap
+        last_iteration = min(self.iterations + config.iterations, config.most_iterations)
         self.work, self.stopped = 0.0, "converged"
         passes = [(level, 1.0) for level in config.levels]
         if config.taut > 1.0:

@@ -26,18 +26,12 @@ Nothing is traced on the way, so that an iteration is one step.
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
 
-LONGEST_MOVE_OF_A_FRAME = 0.03
-"""The same while it is dragged: over a fold of the surface a longer one would leave a loop."""
-
 TAKEN_ALONG = 4.0
 """Distance along the curve up to which nodes move with a control point, in moves."""
 
 
 def moved_along(
-    surface: CurveSurface,
-    curve: NodedCurve,
-    controls: SurfacePoints,
-    longest: float = LONGEST_MOVE,
+    surface: CurveSurface, curve: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
     """A curve with its control points at new places nearby.
 
@@ -48,8 +42,6 @@ def moved_along(
         Simple, and through its control points in order.
     controls : SurfacePoints
         The new places, in the order visited.
-    longest : float
-        Farthest that one of them may have moved, relative to the curve's length.
 
     Returns
     -------
@@ -59,10 +51,7 @@ def moved_along(
     mesh = surface.mesh
     nodes, at_controls = curve.nodes, curve.control_nodes
     move = controls.positions(mesh) - nodes.positions[at_controls]
-    away = np.linalg.norm(move, axis=1)
-    if away.max() > longest * float(nodes.lengths.sum()):
-        return None
-    moves = away > 0.0
+    moves = move.any(axis=1)
     shift = _shifts(nodes, at_controls, move)
     shift -= (shift * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(shift, axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, weights_at
 
 REACH = 0.05
 """Greatest distance from a vertex at which a strand passes beside it, in lengths of edges."""
@@ -202,8 +202,7 @@ def _into_face(
     n, face = len(polyline), int(polyline.faces[point])
     following = (point + 1) % n
     corners = mesh.faces[polyline.faces[following]]
-    same = corners[:, None] == mesh.faces[face][None]
-    end = (polyline.barycentric[following][:, None] * same).sum(axis=0)
+    end = weights_at(corners[None], polyline.barycentric[[following]], mesh.faces[[face]])[0]
     middle = 0.5 * (polyline.barycentric[point] + end)
     reach = share * REACH
     middle = (1.0 - reach) * middle + reach * (middle == 0.0)

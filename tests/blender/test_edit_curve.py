@@ -173,7 +173,7 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     edited_curve = module(empty_scene, "tool.edited_curve")
     record = module(empty_scene, "scene.curve_record")
     opened = edited_curve.open_session(bpy.context, curve, record.asked_of(curve))
-    assert opened.session.resting and opened.session.state.rested
+    assert opened.session.resting and opened.session.state.converged
     assert not opened.session.asked.closed and opened.session.asked.smoothness == 2.0
     np.testing.assert_allclose(opened.session.positions(), places, atol=ROUNDING)
     np.testing.assert_allclose(opened.session.polyline(), before, atol=ROUNDING)
@@ -490,7 +490,7 @@ def test_enter_in_the_middle_of_things(tool):
     tool.send("C")
     assert not tool.session.resting
     assert tool.send("RET") == {"FINISHED"}
-    assert tool.session.state.rested and not tool.session.curve.closed
+    assert tool.session.state.converged and not tool.session.curve.closed
 
 
 def test_a_long_design_waits_while_the_mouse_moves(tool):

@@ -72,7 +72,6 @@ def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
     )
     designer = nicmm.Designer(large)
     for seed in range(3):
-        designer.forget()
         assert_valid_design(large, designer.design(chosen_on(large, 4, seed), order="shortest"))
     assert len(made) == 1
 

@@ -140,7 +140,7 @@ def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     designer = nicmm.Designer(mesh)
     points = np.array([3, 100, 400, 500])
     first = designer.design(points, order="shortest")
-    again = designer.design(points, order="shortest", smoothness=2.0)
+    again = designer.design(points, order="shortest", smoothness=2.0, start=first)
     for design in (first, again):
         assert not judge(mesh, design, points, True, "shortest").faults
         assert design.field.shape == (len(mesh.vertices),)

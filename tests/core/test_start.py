@@ -1,0 +1,396 @@
+"""`Designer.design(start=…)`: an earlier curve goes on through control points that may differ."""
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes, surface_designer
+from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.surface_points import nearest_points
+from tests.core.checks import (
+    apart,
+    assert_valid_curve,
+    assert_valid_design,
+    circle,
+    nearest_vertices,
+)
+
+ANGLES = np.array([0.0, 1.3, 2.5, 3.6, 5.0])
+HEIGHTS = np.array([0.1, -0.2, 0.15, 0.0, -0.1])
+CHOSEN = [12, 80, 41, 150]
+MOST_CALLS = 40
+
+
+def on_ball(ball, raised=0.0, index=1):
+    """Points inside faces near the equator, one of them raised."""
+    heights = HEIGHTS.copy()
+    heights[index] += raised
+    positions = circle(ANGLES) + np.outer(heights, [0.0, 0.0, 1.0])
+    positions /= np.linalg.norm(positions, axis=1, keepdims=True)
+    return nearest_points(ball, positions)[0]
+
+
+def beside(mesh, vertex, taken):
+    """A neighbour of a vertex that is not taken."""
+    return next(v for v in igl.adjacency_list(mesh.faces)[vertex] if v not in taken)
+
+
+def converged(designer, points, start, iterations=3, **arguments):
+    """Go on until the curve has converged; return the last design and how many calls it took."""
+    for calls in range(1, MOST_CALLS):
+        start = designer.design(points, start=start, max_iterations=iterations, **arguments)
+        if start.status is not nicmm.Status.ITERATION_LIMIT:
+            return start, calls
+    raise AssertionError(f"not converged after {MOST_CALLS} calls")
+
+
+@pytest.fixture
+def from_nothing(monkeypatch):
+    """How often a curve has been designed from nothing."""
+    found = []
+    predicted = surface_designer.predicted
+
+    def counted(*arguments):
+        found.append(arguments)
+        return predicted(*arguments)
+
+    monkeypatch.setattr(surface_designer, "predicted", counted)
+    return found
+
+
+@pytest.mark.parametrize("order", ["given", "shortest"])
+def test_a_designer_remembers_no_answer(body, order):
+    """Whatever was asked before, and also by a start, without one the answer is design_curve's."""
+    designer = nicmm.Designer(body)
+    first = designer.design(CHOSEN, order=order)
+    moved = [beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]]
+    designer.design(moved, order=order, start=first)
+    designer.design(CHOSEN, order=order, smoothness=0.1, closed=False)
+    again = designer.design(CHOSEN, order=order)
+    anew = nicmm.design_curve(body, CHOSEN, order=order)
+    for other in (first, again):
+        np.testing.assert_array_equal(other.curves[0].points, anew.curves[0].points)
+
+
+def test_equal_starts_give_equal_curves(ball):
+    """In this Designer and in another one, on a mesh with the same arrays."""
+    designer = nicmm.Designer(ball)
+    other = nicmm.Designer(nicmm.Mesh(ball.vertices, ball.faces))
+    start = designer.design(on_ball(ball))
+    one, two, three = (
+        each.design(on_ball(ball, 0.1), start=start) for each in (designer, designer, other)
+    )
+    np.testing.assert_array_equal(one.curves[0].points, two.curves[0].points)
+    np.testing.assert_array_equal(one.curves[0].points, three.curves[0].points)
+
+
+def test_nothing_is_done_where_nothing_differs(ball):
+    designer = nicmm.Designer(ball)
+    design = designer.design(on_ball(ball))
+    again = designer.design(on_ball(ball), start=design)
+    assert again.curves[0] is design.curves[0]
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_dragged_points_on_every_surface(surface, closed, from_nothing):
+    designer = nicmm.Designer(surface)
+    rim = np.zeros(len(surface.vertices), dtype=bool)
+    for loop in igl.boundary_loop_all(surface.faces):
+        rim[loop] = True
+    inner = np.flatnonzero(surface.referenced & ~rim)
+    chosen = np.random.default_rng(3).choice(inner, size=4, replace=False).tolist()
+    design = designer.design(chosen, closed=closed, order="shortest")
+    for place in range(4):
+        chosen[place] = beside(surface, chosen[place], {*chosen, *np.flatnonzero(rim)})
+        design = designer.design(chosen, closed=closed, order="shortest", start=design)
+        assert_valid_design(surface, design, closed=closed)
+        passed = design.curves[0].points[design.curves[0].control_index]
+        gap = np.linalg.norm(passed[:, None] - surface.vertices[chosen], axis=2)
+        assert gap.min(axis=0).max() <= 1e-12 * surface.diagonal
+    assert len(from_nothing) == 1
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_every_frame_is_a_curve_by_bounded_work(ball, closed):
+    designer = nicmm.Designer(ball)
+    design = designer.design(on_ball(ball), closed=closed)
+    for step in range(1, 9):
+        points = on_ball(ball, 0.04 * step)
+        design = designer.design(points, closed=closed, start=design, max_iterations=3)
+        assert_valid_curve(ball, design.curves[0], points.positions(ball), closed)
+        assert design.iterations <= 3
+    assert converged(designer, points, design, closed=closed)[0].status is nicmm.Status.CONVERGED
+
+
+def test_it_converges_to_the_curve_from_nothing(ball):
+    designer, far = nicmm.Designer(ball), on_ball(ball, 0.15)
+    start = designer.design(on_ball(ball))
+    one = designer.design(far, start=start, max_iterations=1)
+    assert one.status is nicmm.Status.ITERATION_LIMIT and one.iterations == 1
+    last, calls = converged(designer, far, one, iterations=1)
+    assert calls > 1
+    anew = nicmm.design_curve(ball, far).curves[0]
+    assert last.curves[0].length == pytest.approx(anew.length, rel=2e-3)
+
+
+def test_iterations_from_nothing_are_bounded_too(body):
+    design = nicmm.Designer(body).design(CHOSEN, order="shortest", max_iterations=1)
+    assert design.status is nicmm.Status.ITERATION_LIMIT and design.iterations == 1
+    assert_valid_curve(body, design.curves[0])
+
+
+def test_back_again_is_the_first_curve(ball):
+    designer = nicmm.Designer(ball)
+    first = designer.design(CHOSEN, order="shortest")
+    away = [beside(ball, CHOSEN[0], CHOSEN), *CHOSEN[1:]]
+    moved = designer.design(away, order="shortest", start=first)
+    back = designer.design(CHOSEN, order="shortest", start=moved)
+    gap = apart(first.curves[0].points, back.curves[0].points)
+    assert gap < 0.2 * apart(first.curves[0].points, moved.curves[0].points)
+    assert back.energy["smooth"] == pytest.approx(first.energy["smooth"], rel=0.02)
+
+
+def test_a_great_circle_from_points_beside_it(ball):
+    equator = circle(np.radians([0.0, 130.0, 230.0]))
+    designer = nicmm.Designer(ball)
+    start = designer.design(nearest_vertices(ball, equator + [0.0, 0.0, 0.1]))
+    on_surface = igl.point_mesh_squared_distance(equator, ball.vertices, ball.faces)[2]
+    moved = designer.design(on_surface, start=start)
+    assert np.abs(moved.curves[0].points[:, 2]).max() < 5e-3
+
+
+def test_smoothness_and_maps_may_differ(ball, from_nothing):
+    designer = nicmm.Designer(ball)
+    start = designer.design(on_ball(ball))
+    tight = designer.design(on_ball(ball), smoothness=0.1, start=start)
+    assert tight.curves[0].length < start.curves[0].length
+    pole = (np.linalg.norm(ball.vertices - [0.0, 0.0, 1.0], axis=1) < 0.3).astype(float)
+    for name in ("alignment", "obstacles"):
+        far = designer.design(on_ball(ball), start=start, **{name: pole})
+        assert apart(far.curves[0].points, start.curves[0].points) < 5e-3
+        assert_valid_curve(ball, far.curves[0], on_ball(ball).positions(ball))
+    assert len(from_nothing) == 1
+
+
+@pytest.mark.parametrize("as_curve", [False, True])
+@pytest.mark.parametrize("closed", [True, False])
+def test_control_points_go(ball, closed, as_curve):
+    """Also the ends of an open curve, which is shorter then."""
+    designer, points = nicmm.Designer(ball), on_ball(ball)
+    design = designer.design(points, closed=closed)
+    start = design.curves[0] if as_curve else design
+    for gone in range(5):
+        left = points[np.delete(np.arange(5), gone)]
+        now = designer.design(left, closed=closed, start=start)
+        assert_valid_curve(ball, now.curves[0], left.positions(ball), closed)
+        if not closed and gone in (0, 4):
+            assert now.curves[0].length < 0.9 * design.curves[0].length
+
+
+@pytest.mark.parametrize("order", ["given", "shortest"])
+@pytest.mark.parametrize("closed", [True, False])
+def test_control_points_come(ball, closed, order):
+    """On the curve, where it stays, and beside it."""
+    designer, points = nicmm.Designer(ball), on_ball(ball)
+    start = designer.design(points, closed=closed)
+    curve = start.curves[0]
+    for leg in range(5 if closed else 4):
+        bounds = [*curve.control_index, len(curve.faces)]
+        at = (bounds[leg] + bounds[leg + 1]) // 2
+        faces = np.insert(points.faces, leg + 1, curve.faces[at])
+        weights = np.insert(points.barycentric, leg + 1, curve.barycentric[at], axis=0)
+        more = nicmm.SurfacePoints(faces, weights)
+        now = designer.design(more, closed=closed, order=order, start=start)
+        assert_valid_curve(ball, now.curves[0], more.positions(ball), closed)
+        assert apart(now.curves[0].points, curve.points) < 0.02
+        position = more.positions(ball)
+        position[leg + 1] += [0.0, 0.0, 0.1]
+        raised = nearest_points(ball, position / np.linalg.norm(position, axis=1)[:, None])[0]
+        beside_it = nicmm.SurfacePoints(
+            np.where(np.arange(6) == leg + 1, raised.faces, faces),
+            np.where(np.arange(6)[:, None] == leg + 1, raised.barycentric, weights),
+        )
+        now = designer.design(beside_it, closed=closed, order=order, start=start)
+        assert_valid_curve(ball, now.curves[0], beside_it.positions(ball), closed)
+
+
+def test_several_come_and_go_at_once(ball):
+    designer, points = nicmm.Designer(ball), on_ball(ball)
+    start = designer.design(points)
+    curve = start.curves[0]
+    new = [int(curve.control_index[0]) + 20, int(curve.control_index[0]) + 40]
+    faces = np.concatenate([points.faces[:1], curve.faces[new], points.faces[[2, 3, 4]]])
+    weights = [points.barycentric[:1], curve.barycentric[new], points.barycentric[[2, 3, 4]]]
+    asked = nicmm.SurfacePoints(faces, np.concatenate(weights))
+    now = designer.design(asked, start=start)
+    assert_valid_curve(ball, now.curves[0], asked.positions(ball))
+
+
+def test_a_curve_of_an_earlier_session(ball):
+    """In a new Designer, as after a file was opened again; its points may move too."""
+    points = on_ball(ball)
+    curve = nicmm.design_curve(ball, points).curves[0]
+    designer = nicmm.Designer(ball)
+    again = designer.design(points, start=curve).curves[0]
+    assert again.length == pytest.approx(curve.length, rel=1e-3)
+    moved = on_ball(ball, 0.02)
+    design, _ = converged(designer, moved, curve)
+    assert_valid_curve(ball, design.curves[0], moved.positions(ball))
+
+
+def test_points_of_a_shortest_curve_in_the_order_visited(body):
+    """As an editor keeps them: the start is a Design whose points were named in another order."""
+    designer = nicmm.Designer(body)
+    start = designer.design(CHOSEN, order="shortest")
+    curve = start.curves[0]
+    visited = nicmm.SurfacePoints(
+        curve.faces[curve.control_index], curve.barycentric[curve.control_index]
+    )
+    now = designer.design(visited, start=start)
+    assert_valid_curve(body, now.curves[0], visited.positions(body))
+    assert apart(now.curves[0].points, curve.points) < 0.01 * body.diagonal
+
+
+def test_a_bare_curve_may_be_named_in_any_order(body):
+    designer = nicmm.Designer(body)
+    curve = designer.design(CHOSEN, order="shortest").curves[0]
+    now = designer.design(CHOSEN[::-1], order="shortest", start=curve)
+    assert apart(now.curves[0].points, curve.points) < 0.01 * body.diagonal
+
+
+def test_other_methods_can_be_gone_on_from(ball):
+    designer = nicmm.Designer(ball)
+    level_set = designer.design(on_ball(ball), method="variational")
+    now = designer.design(on_ball(ball, 0.05), start=level_set)
+    assert_valid_curve(ball, now.curves[0], on_ball(ball, 0.05).positions(ball))
+
+
+def test_beside_obstacles(ball):
+    """Beside them it goes on; a curve that enters them is refused."""
+    points, designer = on_ball(ball), nicmm.Designer(ball)
+    north = (ball.vertices[:, 2] > 0.5).astype(float)
+    start = designer.design(points)
+    now = designer.design(points, obstacles=north, start=start)
+    assert_valid_curve(ball, now.curves[0], points.positions(ball))
+    between = circle([0.65])[0]  # the first two points
+    island = (np.linalg.norm(ball.vertices - between, axis=1) < 0.3).astype(float)
+    with pytest.raises(nicmm.CurveError, match="obstacles of weight 1"):
+        designer.design(points, obstacles=island, start=start)
+    assert designer.design(points, obstacles=island).curves[0].length > 1.01 * now.curves[0].length
+
+
+def test_moves_by_less_than_a_tenth_are_followed_on_limbs():
+    """Whatever the surface is like there, all but a few of them."""
+    asked = refused = 0
+    for seed in range(4):
+        mesh = shapes.creature(seed, resolution=32, faces=1000)
+        generator = np.random.default_rng(seed)
+        designer = nicmm.Designer(mesh)
+        chosen = generator.choice(len(mesh.vertices), 4, replace=False)
+        start = designer.design(chosen, order="shortest")
+        length = start.curves[0].length
+        for _ in range(8):
+            moved, place = chosen.copy(), generator.integers(4)
+            away = np.linalg.norm(mesh.vertices - mesh.vertices[chosen[place]], axis=1)
+            near = np.setdiff1d(np.flatnonzero(away < 0.06 * length), chosen)
+            moved[place] = generator.choice(near)
+            asked += 1
+            try:
+                now = designer.design(moved, order="shortest", start=start)
+            except nicmm.CurveError:
+                refused += 1
+            else:
+                assert_valid_design(mesh, now)
+    assert refused <= 0.1 * asked
+
+
+class TestRefusals:
+    """A start that cannot be used is a typed error that says why."""
+
+    def refused(self, mesh, points, match, error=nicmm.CurveError, **arguments):
+        with pytest.raises(error, match=match):
+            nicmm.Designer(mesh).design(points, **arguments)
+
+    def test_another_mesh(self, ball, small_ball, ring):
+        points = on_ball(ball)
+        start = nicmm.design_curve(ball, points)
+        on_ring = nearest_vertices(ring, 1.4 * circle(ANGLES))
+        for given in (start, start.curves[0]):
+            self.refused(small_ball, [3, 60, 100], "not on this mesh", start=given)
+            self.refused(ring, on_ring, "mesh", start=given)
+            larger = nicmm.Mesh(1.01 * ball.vertices, ball.faces)
+            self.refused(larger, points, "another mesh", start=given)
+
+    def test_a_jump(self, ball):
+        start = nicmm.design_curve(ball, on_ball(ball))
+        self.refused(ball, on_ball(ball, 0.8), r"control_points\[1\] is .* from where", start=start)
+        more = nicmm.SurfacePoints(
+            np.append(on_ball(ball).faces, on_ball(ball, 3.0).faces[1]),
+            np.append(on_ball(ball).barycentric, on_ball(ball, 3.0).barycentric[1:2], axis=0),
+        )
+        self.refused(ball, more, r"control_points\[5\]", start=start)
+
+    def test_another_kind_or_order(self, ball):
+        start = nicmm.design_curve(ball, on_ball(ball))
+        self.refused(ball, on_ball(ball), "closed curve and an open one", start=start, closed=False)
+        other_order = on_ball(ball)[np.array([0, 2, 1, 3])]
+        self.refused(ball, other_order, "another order", start=start)
+        elsewhere = [int(v) for v in nearest_vertices(ball, circle(ANGLES[:3] + 0.3))]
+        self.refused(ball, elsewhere, "none of them is where it was", start=start)
+
+    def test_what_is_no_curve(self, ball):
+        points = on_ball(ball)
+        start = nicmm.design_curve(ball, points).curves[0]
+        lost = replace(start, control_index=np.array([0, -1, 5]))
+        self.refused(ball, points, "control_index", start=lost)
+        twice = np.concatenate([np.arange(len(start.faces))] * 2)
+        wound = curve_on_mesh(
+            ball, True, start.faces[twice], start.barycentric[twice], start.control_index
+        )
+        self.refused(ball, points, "crosses or touches itself", start=wound)
+        cancelled = nicmm.design_curve(ball, points, progress=lambda *_: False)
+        if not cancelled.curves:
+            self.refused(ball, points, "has 0 curves", start=cancelled)
+
+    @pytest.mark.parametrize("bad", [0, -1, 2.5, True, "3"])
+    def test_iterations(self, ball, bad):
+        self.refused(ball, CHOSEN, "max_iterations is", nicmm.ArgumentError, max_iterations=bad)
+
+    @pytest.mark.parametrize("method", ["variational", "nicmm-paper"])
+    def test_methods_that_start_from_nothing(self, ball, method):
+        start = nicmm.design_curve(ball, CHOSEN, order="shortest")
+        for arguments in ({"start": start}, {"max_iterations": 3}):
+            self.refused(
+                ball, CHOSEN, "needs the method", nicmm.ArgumentError, method=method, **arguments
+            )
+
+    def test_things_that_are_no_start(self, ball):
+        for bad in ("curve", 3, [1, 2], object()):
+            self.refused(ball, CHOSEN, "start is a", nicmm.ArgumentError, start=bad)
+
+
+@pytest.mark.slow
+def test_iterations_are_few_from_afar_and_fewer_from_a_start():
+    """Medians over random points of generated creatures, with every attempt counted.
+
+    From afar they depend on the initial curve too; that bound only keeps them from growing.
+    """
+    from_afar, dragged = [], []
+    for seed in range(6):
+        mesh = shapes.creature(seed, resolution=32, faces=2000)
+        generator = np.random.default_rng(seed)
+        for closed in (True, False):
+            chosen = generator.choice(len(mesh.vertices), 4, replace=False).tolist()
+            designer = nicmm.Designer(mesh)
+            design = designer.design(chosen, closed=closed, order="shortest")
+            from_afar.append(design.iterations)
+            for _ in range(3):
+                chosen[0] = beside(mesh, chosen[0], chosen)
+                design = designer.design(chosen, closed=closed, order="shortest", start=design)
+                assert_valid_design(mesh, design, closed=closed)
+                dragged.append(design.iterations)
+    assert np.median(from_afar) <= 10
+    assert np.median(dragged) <= 3
