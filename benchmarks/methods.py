@@ -1,5 +1,5 @@
 """The methods that are compared."""
 
-from nicmm_core import arguments
+from nicmm_core.options import option
 
-METHODS = arguments.METHODS
+METHODS = option("method").names

@@ -1,59 +1,96 @@
 """NICMM: smooth curves on triangle meshes by a physics-informed network.
 
-The main path is `design.design_curve`; `design.py` names the stages in order.
+The main path is `design.design_curve`; `design.py` names the stages in order. Names are loaded when
+they are first used: `options` can be imported without the libraries that the others need.
 """
 
-from .design import Designer, design_curve
-from .design_result import Design, Status
-from .errors import (
-    ArgumentError,
-    ControlPointError,
-    CurveError,
-    MeshError,
-    MissingPackageError,
-    NicmmError,
-    UnreachableError,
-)
-from .geometry.curve import SurfaceCurve
-from .geometry.mesh import Mesh
-from .geometry.surface_points import SurfacePoints
-from .maps.feature_maps import (
-    curvature_map,
-    edge_map,
-    principal_curvatures,
-    sharp_edge_map,
-    sharp_edges,
-    value_map,
-)
-from .outputs.cut import CutMesh, cut_mesh
-from .outputs.parts import PartedMesh, part_mesh
-from .outputs.region import Region, enclosed_region
+import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "ArgumentError",
-    "ControlPointError",
-    "CurveError",
-    "CutMesh",
-    "Design",
-    "Designer",
-    "Mesh",
-    "MeshError",
-    "MissingPackageError",
-    "NicmmError",
-    "PartedMesh",
-    "Region",
-    "Status",
-    "SurfaceCurve",
-    "SurfacePoints",
-    "UnreachableError",
-    "curvature_map",
-    "cut_mesh",
-    "design_curve",
-    "edge_map",
-    "enclosed_region",
-    "part_mesh",
-    "principal_curvatures",
-    "sharp_edge_map",
-    "sharp_edges",
-    "value_map",
-]
+if TYPE_CHECKING:
+    from .design import Designer as Designer
+    from .design import design_curve as design_curve
+    from .design_result import Design as Design
+    from .design_result import Status as Status
+    from .errors import ArgumentError as ArgumentError
+    from .errors import ControlPointError as ControlPointError
+    from .errors import CurveError as CurveError
+    from .errors import MeshError as MeshError
+    from .errors import MissingPackageError as MissingPackageError
+    from .errors import NicmmError as NicmmError
+    from .errors import UnreachableError as UnreachableError
+    from .geometry.curve import SurfaceCurve as SurfaceCurve
+    from .geometry.mesh import Mesh as Mesh
+    from .geometry.surface_points import SurfacePoints as SurfacePoints
+    from .maps.feature_maps import curvature_map as curvature_map
+    from .maps.feature_maps import edge_map as edge_map
+    from .maps.feature_maps import principal_curvatures as principal_curvatures
+    from .maps.feature_maps import sharp_edge_map as sharp_edge_map
+    from .maps.feature_maps import sharp_edges as sharp_edges
+    from .maps.feature_maps import value_map as value_map
+    from .outputs.cut import CutMesh as CutMesh
+    from .outputs.cut import cut_mesh as cut_mesh
+    from .outputs.parts import PartedMesh as PartedMesh
+    from .outputs.parts import part_mesh as part_mesh
+    from .outputs.region import Region as Region
+    from .outputs.region import enclosed_region as enclosed_region
+
+_NAMES = {
+    "design": (
+        "Designer",
+        "design_curve",
+    ),
+    "design_result": (
+        "Design",
+        "Status",
+    ),
+    "errors": (
+        "ArgumentError",
+        "ControlPointError",
+        "CurveError",
+        "MeshError",
+        "MissingPackageError",
+        "NicmmError",
+        "UnreachableError",
+    ),
+    "geometry.curve": ("SurfaceCurve",),
+    "geometry.mesh": ("Mesh",),
+    "geometry.surface_points": ("SurfacePoints",),
+    "maps.feature_maps": (
+        "curvature_map",
+        "edge_map",
+        "principal_curvatures",
+        "sharp_edge_map",
+        "sharp_edges",
+        "value_map",
+    ),
+    "outputs.cut": (
+        "CutMesh",
+        "cut_mesh",
+    ),
+    "outputs.parts": (
+        "PartedMesh",
+        "part_mesh",
+    ),
+    "outputs.region": (
+        "Region",
+        "enclosed_region",
+    ),
+}
+"""What each module gives to the package."""
+
+_MODULE = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = sorted(_MODULE)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -6,15 +6,15 @@ import argparse
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
-from . import Status, design_curve
-from .arguments import METHODS
+from . import Status, design_curve, options
 from .errors import ArgumentError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
 from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
 from .maps.feature_maps import SHARP_ANGLE, curvature_map, sharp_edge_map
-from .path.initial_loop import ORDERS
+from .options import Kind, Option
 from .path.via_points import parse_via_points
 
 AUTOMATIC = ("sharp", "curvature")
@@ -23,9 +23,9 @@ AUTOMATIC = ("sharp", "curvature")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; 0 when it succeeded, 2 with a message on standard error when it did not."""
-    options = _parser().parse_args(arguments)
+    given = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        given.run(given)
     except NicmmError as error:
         print(f"nicmm: {error}", file=sys.stderr)
         return 2
@@ -42,21 +42,8 @@ def _parser() -> argparse.ArgumentParser:
     design.add_argument("mesh", metavar="MESH", help="OBJ, OFF, PLY or STL")
     design.add_argument("--points", required=True, metavar="A,B,C", help="vertex indices, from 0")
     design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
-    design.add_argument("--open", action="store_true", help="end at the last point")
-    design.add_argument("--order", choices=ORDERS, default="given")
-    design.add_argument(
-        "--via",
-        action="append",
-        default=[],
-        metavar="I:A,B",
-        help="vertices that the curve is led by after the I-th of the points, from 0; repeatable",
-    )
-    design.add_argument("--method", choices=METHODS, default="nicmm")
-    design.add_argument("--smoothness", type=float, default=1.0)
-    for option, what in (("--align", "follow"), ("--avoid", "keep off")):
-        design.add_argument(
-            option, choices=AUTOMATIC, help=f"{what} sharp edges, or where the surface bends most"
-        )
+    for option in options.OPTIONS:
+        design.add_argument(f"--{option.flag or option.name}", dest=option.name, **_flag(option))
     design.add_argument("--angle", type=float, help="degrees from which edges are sharp, 30")
     design.set_defaults(run=_design)
 
@@ -80,29 +67,59 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _design(options: argparse.Namespace) -> None:
-    check_curve_path(options.output)
-    mesh = read_mesh(options.mesh)
+def _design(given: argparse.Namespace) -> None:
+    check_curve_path(given.output)
+    mesh = read_mesh(given.mesh)
     try:
-        points = [int(index) for index in options.points.split(",")]
+        points = [int(index) for index in given.points.split(",")]
     except ValueError as error:
         raise ArgumentError(
-            f"--points is {options.points!r}; give vertex indices with commas, such as 12,80,41"
+            f"--points is {given.points!r}; give vertex indices with commas, such as 12,80,41"
         ) from error
     design = design_curve(
         mesh,
         points,
-        closed=not options.open,
-        order=options.order,
-        via_points=parse_via_points(options.via) or None,
-        method=options.method,
-        smoothness=options.smoothness,
-        alignment=_automatic_map(mesh, options.align, options.angle),
-        obstacles=_automatic_map(mesh, options.avoid, options.angle),
+        **{option.name: _value(option, given, mesh) for option in options.OPTIONS},
     )
     if design.status is Status.NOT_ONE_CURVE:
         raise NicmmError(str(design.status))
-    write_curve(options.output, design.curves[0])
+    (curve,) = design.curves
+    write_curve(given.output, curve)
+    print(
+        f"{len(points)} points, length {curve.length:g}, {design.status.name.lower()}: "
+        f"{given.output}",
+        file=sys.stderr,
+    )
+
+
+def _flag(option: Option) -> dict[str, Any]:
+    """How argparse takes an option."""
+    words = f"{option.description[:1].lower()}{option.description[1:]}"
+    if option.kind is Kind.SWITCH:
+        return {"action": f"store_{str(not option.default).lower()}", "help": f"do not {words}"}
+    if option.kind is Kind.CHOICE:
+        return {"choices": option.names, "default": option.default, "help": words}
+    if option.kind is Kind.WEIGHTS:
+        return {"choices": AUTOMATIC, "help": f"sharp edges, or high curvature: {words}"}
+    if option.kind is Kind.POINTS:
+        return {
+            "action": "append",
+            "default": [],
+            "metavar": "I:A,B",
+            "help": "vertices that the initial path passes after the I-th of the points, from 0; "
+            "repeatable",
+        }
+    return {"type": float, "default": option.default, "help": words}
+
+
+def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
+    """The value of an option, as `design_curve` takes it."""
+    value = getattr(given, option.name)
+    if option.kind is Kind.POINTS:
+        return parse_via_points(value) or None
+    if option.kind is Kind.WEIGHTS:
+        return _automatic_map(mesh, value, given.angle)
+    return value
 
 
 def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> FloatArray | None:
@@ -111,7 +128,7 @@ def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> Float
     return None if kind is None else curvature_map(mesh)
 
 
-def _pretrain(options: argparse.Namespace) -> None:
+def _pretrain(given: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     from .network.forward_pass import NetworkConfig
@@ -130,22 +147,22 @@ def _pretrain(options: argparse.Namespace) -> None:
             bar.close()
 
     pretrain(
-        [read_mesh(path) for path in options.meshes],
-        options.output,
-        NetworkConfig(attention=not options.no_attention, gating=not options.no_gating),
+        [read_mesh(path) for path in given.meshes],
+        given.output,
+        NetworkConfig(attention=not given.no_attention, gating=not given.no_gating),
         PretrainingConfig(
-            sets=options.sets, epochs=options.epochs, map_share=options.maps, seed=options.seed
+            sets=given.sets, epochs=given.epochs, map_share=given.maps, seed=given.seed
         ),
         progress=report,
     )
 
 
-def _shapes(options: argparse.Namespace) -> None:
+def _shapes(given: argparse.Namespace) -> None:
     from .shapes import creature
 
-    folder = Path(options.folder)
+    folder = Path(given.folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for seed in range(options.count):
+    for seed in range(given.count):
         write_mesh(folder / f"creature-{seed:03d}.obj", creature(seed))
 
 

@@ -1,32 +1,82 @@
-"""Arguments of `design_curve` that need no mesh stage to be checked."""
+"""Arguments that need no mesh stage to be checked: the table of options, and a start's bounds."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import options
 from .errors import ArgumentError, MissingPackageError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh, real_array
-from .path.initial_loop import ORDERS
-
-METHODS = ("nicmm", "nicmm-paper", "variational")
-
-SMOOTHNESS_RANGE = (1e-3, 1e3)
+from .options import Kind, Option
 
 
-def check_choices(order: str, method: str) -> None:
-    """Raise ArgumentError unless both are known."""
-    if not isinstance(method, str) or method not in METHODS:
-        raise ArgumentError(f"method is {method!r}; choose one of {', '.join(map(repr, METHODS))}")
-    if not isinstance(order, str) or order not in ORDERS:
-        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
+def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a curve, each checked by its kind.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    given : mapping
+        A value for every option in `options.OPTIONS`.
+
+    Returns
+    -------
+    dict
+        By name, with weights as (V,) float arrays. Points are left to `path.via_points`.
+
+    Raises
+    ------
+    ArgumentError
+        If one cannot be used.
+    """
+    checked = {each.name: _checked(mesh, each, given[each.name]) for each in options.OPTIONS}
+    for each in options.OPTIONS:
+        value = checked[each.name]
+        if each.needs and value != each.default and checked[each.needs] is None:
+            raise ArgumentError(f"{each.name} is {value!r} without {each.needs}; pass both")
+    return checked
 
 
-def check_closed(closed: bool) -> None:
-    """Raise ArgumentError unless it says yes or no."""
-    if not isinstance(closed, bool | np.bool_):
-        raise ArgumentError(f"closed is {closed!r}; pass True or False")
+def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
+    name = option.name
+    if option.kind is Kind.SWITCH and not isinstance(value, bool | np.bool_):
+        raise ArgumentError(f"{name} is {value!r}; pass True or False")
+    if option.kind is Kind.CHOICE and not (isinstance(value, str) and value in option.names):
+        words = ", ".join(map(repr, option.names))
+        raise ArgumentError(f"{name} is {value!r}; choose one of {words}")
+    if option.kind is Kind.WEIGHTS:
+        return checked_map(name, value, mesh)
+    if option.kind in (Kind.NUMBER, Kind.LENGTH):
+        return _checked_number(option, value)
+    return value
+
+
+def _checked_number(option: Option, value: Any) -> float:
+    """A finite number within the limits of an option."""
+    low, high = option.limits
+    what = "a length" if option.kind is Kind.LENGTH else "a number"
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(f"{option.name} is {value!r}; pass {what}") from error
+    if not (low <= number <= high and np.isfinite(number)):
+        limits = f"of at least {low:g}" if np.isinf(high) else f"in {low:g} … {high:g}"
+        raise ArgumentError(f"{option.name} is {value!r}; pass {what} {limits}")
+    return number
+
+
+def check_iterations(max_iterations: Any) -> None:
+    """Raise ArgumentError unless it is a positive whole number, or None."""
+    whole = isinstance(max_iterations, int | np.integer) and not isinstance(max_iterations, bool)
+    if max_iterations is not None and not (whole and max_iterations >= 1):
+        raise ArgumentError(
+            f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
+        )
 
 
 def check_torch() -> None:
@@ -63,28 +113,3 @@ def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray 
         first = int(bad.argmax())
         raise ArgumentError(f"{name}[{first}] is {checked[first]}; weights must lie in 0 … 1")
     return checked
-
-
-def checked_clearance(clearance: float, obstacles: FloatArray | None) -> float:
-    """A length that is not negative, or an ArgumentError."""
-    try:
-        value = float(clearance)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(f"clearance is {clearance!r}; pass a length") from error
-    if not 0.0 <= value < np.inf:
-        raise ArgumentError(f"clearance is {clearance!r}; pass a length that is not negative")
-    if value > 0.0 and obstacles is None:
-        raise ArgumentError(f"clearance is {clearance!r} without obstacles to keep it from")
-    return value
-
-
-def checked_smoothness(smoothness: float) -> float:
-    """A number in `SMOOTHNESS_RANGE`, or an ArgumentError."""
-    try:
-        value = float(smoothness)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(f"smoothness is {smoothness!r}; pass a positive number") from error
-    low, high = SMOOTHNESS_RANGE
-    if not low <= value <= high:
-        raise ArgumentError(f"smoothness is {smoothness!r}; pass a number in {low:g} … {high:g}")
-    return value

@@ -18,19 +18,11 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import (
-    check_choices,
-    check_closed,
-    check_torch,
-    checked_clearance,
-    checked_map,
-    checked_smoothness,
-)
+from .arguments import check_iterations, check_torch, checked_options
 from .design_result import Design, Status, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -121,28 +113,35 @@ class Designer:
             points, or would cross itself on its way there.
         """
         started = time.perf_counter()
-        check_choices(order, method)
-        check_closed(closed)
-        check_start(start, max_iterations, method)
+        given = {
+            "closed": closed,
+            "order": order,
+            "via_points": via_points,
+            "method": method,
+            "smoothness": smoothness,
+            "obstacles": obstacles,
+            "clearance": clearance,
+            "alignment": alignment,
+        }
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
-        if method == "nicmm-paper":
-            check_torch()
         try:
             with watched(progress), self._its_turn():
-                maps = self._maps(obstacles, alignment, clearance, smoothness)
+                options = checked_options(self.mesh, given)
+                _check_start(start, method, max_iterations)
+                if method == "nicmm-paper":
+                    check_torch()
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)
-                via = {} if via_points is None else via_points
-                located = located_via_points(self.mesh, points, via, order, closed)
-                request = Request(
-                    points=points, closed=closed, order=order, via_points=located, **maps
+                options["via_points"] = located_via_points(
+                    self.mesh, points, options["via_points"] or {}, order, closed
                 )
+                request = Request(points=points, **options)
                 mapped, designer, there = self._on_manifold(request)
                 if isinstance(start, Design) and _answers(start, mapped, there):
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(mapped, start)
                 with displaced(mapped.origin):
-                    found = designer.design(there, method, started, begin, max_iterations)
+                    found = designer.design(there, started, begin, max_iterations)
                     return design_on_original(mapped, found)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
@@ -156,22 +155,6 @@ class Designer:
             yield
         finally:
             self._lock.release()
-
-    def _maps(
-        self,
-        obstacles: ArrayLike | None,
-        alignment: ArrayLike | None,
-        clearance: float,
-        smoothness: float,
-    ) -> dict[str, Any]:
-        """The checked arguments that are the same for every way of asking."""
-        avoided = checked_map("obstacles", obstacles, self.mesh)
-        return {
-            "obstacles": avoided,
-            "alignment": checked_map("alignment", alignment, self.mesh),
-            "clearance": checked_clearance(clearance, avoided),
-            "smoothness": checked_smoothness(smoothness),
-        }
 
     def _on_manifold(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request]:
         """The first manifold on which the points are connected, and the request there."""
@@ -210,19 +193,12 @@ def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
     )
 
 
-def check_start(start: object, max_iterations: object, method: str) -> None:
-    """Raise ArgumentError unless both can be used with the method."""
+def _check_start(start: object, method: str, max_iterations: int | None) -> None:
+    """Raise ArgumentError unless a start and a bound can be used with the method."""
+    check_iterations(max_iterations)
     if start is not None and not isinstance(start, Design | SurfaceCurve):
         raise ArgumentError(
             f"start is a {type(start).__name__}; pass a Design, a SurfaceCurve or None"
-        )
-    if max_iterations is not None and (
-        isinstance(max_iterations, bool)
-        or not isinstance(max_iterations, int | np.integer)
-        or max_iterations < 1
-    ):
-        raise ArgumentError(
-            f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
         )
     for name, value in (("start", start), ("max_iterations", max_iterations)):
         if value is not None and method != "nicmm":

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -23,20 +24,23 @@ class Request:
     order : {"given", "shortest"}
     via_points : dict
         From the index of a control point to points on the way to the next one.
-    obstacles, alignment : (V,) float array or None
+    method : {"nicmm", "nicmm-paper", "variational"}
+    smoothness : float
+    obstacles : (V,) float array or None
     clearance : float
         Distance from obstacles of weight 1.
-    smoothness : float
+    alignment : (V,) float array or None
     """
 
     points: SurfacePoints
     closed: bool
     order: str
     via_points: LocatedViaPoints
-    obstacles: FloatArray | None
-    alignment: FloatArray | None
-    clearance: float
+    method: str
     smoothness: float
+    obstacles: FloatArray | None
+    clearance: float
+    alignment: FloatArray | None
 
     @property
     def has_maps(self) -> bool:
@@ -52,25 +56,14 @@ class Request:
 
 def same_request(one: Request, other: Request) -> bool:
     """Whether requests do not differ at all."""
-    return (
-        one.closed == other.closed
-        and one.order == other.order
-        and one.clearance == other.clearance
-        and one.smoothness == other.smoothness
-        and _same_points(one.points, other.points)
-        and one.via_points.keys() == other.via_points.keys()
-        and all(_same_points(one.via_points[key], other.via_points[key]) for key in one.via_points)
-        and _same_map(one.obstacles, other.obstacles)
-        and _same_map(one.alignment, other.alignment)
+    return all(
+        _same(getattr(one, field.name), getattr(other, field.name)) for field in fields(Request)
     )
 
 
-def _same_points(one: SurfacePoints, other: SurfacePoints) -> bool:
-    faces = np.array_equal(one.faces, other.faces)
-    return faces and np.array_equal(one.barycentric, other.barycentric)
-
-
-def _same_map(one: FloatArray | None, other: FloatArray | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other)
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
+        return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    return np.array_equal(one, other) if isinstance(one, np.ndarray) else bool(one == other)

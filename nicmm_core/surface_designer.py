@@ -72,7 +72,6 @@ class SurfaceDesigner:
     def design(
         self,
         request: Request,
-        method: str,
         started: float,
         start: Resumable | SurfaceCurve | None = None,
         max_iterations: int | None = None,
@@ -82,7 +81,6 @@ class SurfaceDesigner:
         Parameters
         ----------
         request : Request
-        method : {"nicmm", "nicmm-paper", "variational"}
         started : float
             When the design began, by `time.perf_counter`.
         start : Resumable or SurfaceCurve, optional
@@ -97,7 +95,7 @@ class SurfaceDesigner:
         CurveError
             If the start cannot be used.
         """
-        if method == "nicmm":
+        if request.method == "nicmm":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
             return self._designed(request, max_iterations, started)
@@ -106,7 +104,7 @@ class SurfaceDesigner:
         watch = _FieldWatch(self.mesh, problem)
         try:
             with part(0.3, 0.9):
-                solution = self._solution(problem, request, method, watch)
+                solution = self._solution(problem, request, watch)
             zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
         except CancelledError:
             if watch.shown is None:
@@ -216,12 +214,10 @@ class SurfaceDesigner:
             find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
         )
 
-    def _solution(
-        self, problem: Problem, request: Request, method: str, watch: _FieldWatch
-    ) -> Solution:
+    def _solution(self, problem: Problem, request: Request, watch: _FieldWatch) -> Solution:
         """The level set that a method other than "nicmm" finds."""
         weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        if method == "variational":
+        if request.method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
         pretrained = shipped_weights(problem.features.shape[1])
         # These import PyTorch, which nothing else needs.

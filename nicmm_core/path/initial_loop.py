@@ -15,7 +15,7 @@ import igl
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..errors import ArgumentError, UnreachableError
+from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
@@ -26,8 +26,6 @@ from .simple_path import lay_path
 from .via_points import ViaPoints, Waypoints, names_of, with_via_points
 from .virtual_splits import SplitMesh, WorkingMesh
 from .visiting_order import order_along_boundaries, shortest_order
-
-ORDERS = ("given", "shortest")
 
 
 @dataclass(frozen=True)
@@ -105,12 +103,10 @@ def build_initial_loop(
         If no simple path visits the points in this order, or only one that winds round itself too
         often. The message names an order that works, if one is found.
     ArgumentError
-        If ``order`` is neither of the two, or via points name no leg.
+        If via points name no leg.
     ControlPointError
         If a via point cannot be used.
     """
-    if order not in ORDERS:
-        raise ArgumentError(f"order is {order!r}; choose one of {', '.join(map(repr, ORDERS))}")
     tours = _Tours(mesh, points, closed)
     path, failure = None, None
     for visit in tours.of(order):

@@ -1,0 +1,159 @@
+"""The options of a curve besides its control points, each defined once.
+
+`design_curve`, the command line and Blender's properties take names, defaults, limits and
+descriptions from here. This module imports nothing of the package, so that Blender can read it
+without loading the core.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Kind(Enum):
+    """What the value of an option is."""
+
+    SWITCH = "True or False"
+    CHOICE = "one of several names"
+    NUMBER = "a number without a unit"
+    LENGTH = "a length in mesh units"
+    WEIGHTS = "a weight for each vertex, or None"
+    POINTS = "a mapping from indices of control points to points, or None"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several names: as scripts pass it, as users see it, and what it does."""
+
+    name: str
+    label: str
+    description: str
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a curve.
+
+    Attributes
+    ----------
+    name : str
+        Of the keyword argument.
+    kind : Kind
+    default : object
+    label : str
+        What users see.
+    description : str
+        A sentence without its full stop.
+    choices : tuple of Choice
+    limits : (float, float)
+        Of a number or a length, both included.
+    usual : (float, float)
+        Limits of a slider.
+    needs : str
+        The option without which this one has no effect.
+    flag : str
+        Of the command line, where it is not the name; for a switch, what turns it off.
+    """
+
+    name: str
+    kind: Kind
+    default: object
+    label: str
+    description: str
+    choices: tuple[Choice, ...] = ()
+    limits: tuple[float, float] = (0.0, float("inf"))
+    usual: tuple[float, float] = (0.0, float("inf"))
+    needs: str = ""
+    flag: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those that can be chosen."""
+        return tuple(choice.name for choice in self.choices)
+
+
+OPTIONS: tuple[Option, ...] = (
+    Option(
+        "closed",
+        Kind.SWITCH,
+        True,
+        "Closed",
+        "Join the last control point to the first. Otherwise the curve ends there",
+        flag="open",
+    ),
+    Option(
+        "order",
+        Kind.CHOICE,
+        "given",
+        "Order",
+        "The order in which the curve visits the control points",
+        choices=(
+            Choice("given", "As Given", "In the order in which they are given"),
+            Choice("shortest", "Shortest", "In the shortest order, cyclic for a closed curve"),
+        ),
+    ),
+    Option(
+        "via_points",
+        Kind.POINTS,
+        None,
+        "Via Points",
+        "Points that the initial path passes on its way from one control point to the next",
+        flag="via",
+    ),
+    Option(
+        "method",
+        Kind.CHOICE,
+        "nicmm",
+        "Method",
+        "How the curve is computed",
+        choices=(
+            Choice("nicmm", "NICMM", "The default method"),
+            Choice(
+                "nicmm-paper",
+                "NICMM (Paper)",
+                "The method exactly as the paper describes it. Needs PyTorch",
+            ),
+            Choice("variational", "Variational", "The same energy without a network"),
+        ),
+    ),
+    Option(
+        "smoothness",
+        Kind.NUMBER,
+        1.0,
+        "Smoothness",
+        "Weight of a fair curve against a short one, relative to the usual balance",
+        limits=(1e-3, 1e3),
+        usual=(0.1, 10.0),
+    ),
+    Option(
+        "obstacles",
+        Kind.WEIGHTS,
+        None,
+        "Obstacles",
+        "Weights that keep the curve away. It never enters faces where all weights are 1",
+        flag="avoid",
+    ),
+    Option(
+        "clearance",
+        Kind.LENGTH,
+        0.0,
+        "Clearance",
+        "Distance along the surface that the curve keeps from obstacles of weight 1",
+        needs="obstacles",
+    ),
+    Option(
+        "alignment",
+        Kind.WEIGHTS,
+        None,
+        "Alignment",
+        "Weights that attract the curve",
+        flag="align",
+    ),
+)
+"""In the order in which users see them."""
+
+
+def option(name: str) -> Option:
+    """The option with a name."""
+    return next(each for each in OPTIONS if each.name == name)
