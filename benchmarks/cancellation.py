@@ -14,9 +14,9 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
 from nicmm_core.geometry.array_types import FloatArray, IntArray
+from tests.oracles.defects import defective_meshes
 
 from . import report
-from .defects import defective_meshes
 from .scale import Scale
 
 SEED = 0

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import igl
 
 from nicmm_core import shapes
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.io.files import MESH_FORMATS, read_mesh
+from nicmm_core.io.files import read_mesh
+from tests.oracles.mesh_files import mesh_files, spread
 
 from .scale import Scale
 
-COLLECTIONS = Path(__file__).resolve().parents[2] / "shared" / "meshes"
-"""Third-party meshes are no part of the project; each has its own licence."""
-
 PAPER_SUBDIVISIONS = 2
 """Loop subdivisions that bring a mesh of SHREC16 to the paper's "about 4,000" vertices."""
-
-
-def mesh_files(folder: str) -> list[Path]:
-    """Mesh files of a collection, sorted; stops with a word where there is none."""
-    root = COLLECTIONS / folder
-    files = sorted(path for path in root.rglob("*") if path.suffix.lower() in MESH_FORMATS)
-    if not files:
-        raise SystemExit(f"There are no meshes in {root}; put the collection there")
-    return files
 
 
 def surfaces(scale: Scale, count: int) -> Iterator[tuple[str, Mesh]]:
@@ -41,7 +29,7 @@ def label(scale: Scale) -> str:
 
 def shrec16(count: int, subdivisions: int = PAPER_SUBDIVISIONS) -> Iterator[tuple[str, Mesh]]:
     """Meshes of SHREC16, spread over its classes, after Loop subdivisions."""
-    for path in _spread(mesh_files("shrec16"), count):
+    for path in spread(mesh_files("shrec16"), count):
         mesh = read_mesh(path)
         yield path.stem, Mesh(*igl.loop(mesh.vertices, mesh.faces, subdivisions))
 
@@ -55,13 +43,13 @@ def shrec16_class(name: str) -> Iterator[tuple[str, Mesh]]:
 
 def clean(count: int) -> Iterator[tuple[str, Mesh]]:
     """Closed manifold meshes, as they are."""
-    for path in _spread(mesh_files("clean"), count):
+    for path in spread(mesh_files("clean"), count):
         yield path.stem, read_mesh(path)
 
 
 def bodies(count: int) -> Iterator[tuple[str, Mesh]]:
     """People, animals and a cortex, in the sizes that shape correspondence uses, as they are."""
-    for path in _spread(mesh_files("shapes"), count):
+    for path in spread(mesh_files("shapes"), count):
         yield path.stem, read_mesh(path)
 
 
@@ -69,7 +57,3 @@ def creatures(count: int) -> Iterator[tuple[str, Mesh]]:
     """Generated shapes with limbs, small."""
     for seed in range(count):
         yield f"creature {seed}", shapes.creature(seed, resolution=32, faces=200)
-
-
-def _spread(files: list[Path], count: int) -> list[Path]:
-    return files[:: max(1, len(files) // count)][:count]

@@ -15,10 +15,10 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, curve_on_mesh
+from tests.oracles.distances import distances
+from tests.oracles.perturbation import perturbed
 
 from . import collections, report
-from .measures import distances
-from .perturbation import perturbed
 from .samples import random_sets
 from .scale import Scale
 

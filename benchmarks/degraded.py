@@ -12,11 +12,18 @@ from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
+from tests.oracles.distances import distances
+from tests.oracles.perturbation import (
+    GREATEST_FRACTION,
+    LEAST_ANGLE,
+    LEAST_FRACTION,
+    angles,
+    perturbed,
+)
 
 from . import collections, plots, renders, report
-from .measures import bending, distances
+from .measures import bending
 from .methods import METHODS
-from .perturbation import GREATEST_FRACTION, LEAST_ANGLE, LEAST_FRACTION, angles, perturbed
 from .resolution import REMARKABLE
 from .samples import random_sets
 from .scale import Scale

@@ -13,9 +13,9 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
+from tests.oracles.checker import judge
 
 from . import collections, report
-from .checker import judge
 from .measures import bending
 from .peer_systems import later_signed_heat
 from .peers import task_on

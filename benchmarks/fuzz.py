@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections import Counter
 
+from tests.oracles.hostile_input import SEED, Answer, answer
+from tests.oracles.isolation import Isolated, isolated
+
 from . import report
-from .hostile_input import SEED, Answer, answer
-from .isolation import Isolated, isolated
 from .scale import Scale
 
 SLOW = 10.0
@@ -50,9 +51,9 @@ def run(scale: Scale) -> None:
         of_kind = [f"{o} {n}" for (k, o), n in sorted(outcomes.items()) if k == kind]
         rows.append((kind, count, report.listed(of_kind)))
     body = (
-        f"Seed {SEED}, {cases} cases of hostile input, see `hostile_input.py`. A finding is an "
-        "error not the package's own, anything printed, a curve that `checker.py` faults, a "
-        f"changed mesh, a crash, or more than {SLOW:g} s of CPU time; the slowest took "
+        f"Seed {SEED}, {cases} cases of hostile input, see `tests/oracles/hostile_input.py`. A "
+        "finding is an error not the package's own, anything printed, a curve that `checker.py` "
+        f"faults, a changed mesh, a crash, or more than {SLOW:g} s of CPU time; the slowest took "
         f"{slowest:.1f} s.\n\n**{len(findings)} findings.**\n\n"
         + "".join(f"- {finding}\n" for finding in findings[:LISTED])
         + "\n"

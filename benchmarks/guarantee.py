@@ -17,12 +17,12 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
+from tests.oracles.checker import Verdict, judge
+from tests.oracles.named_curves import named_curves
 
 from . import collections, plots, report
-from .checker import Verdict, judge
 from .elastic_curve import NODES, elastic_curve
 from .measures import SAMPLES, bending, squared_curvature
-from .named_curves import named_curves
 from .samples import point_sets
 from .scale import Scale
 
@@ -124,7 +124,7 @@ def run(scale: Scale) -> None:
     body = (
         f"Seed {SEED}; {SETS} sets of 3–5 random vertices a mesh, each closed and open, shortest "
         f"order; named curves as `named_curves.py` asks for them; `{METHOD}`. The judge is "
-        "`checker.py`, which knows only the public interface.\n\n"
+        "`tests/oracles/checker.py`, which knows only the public interface.\n\n"
         f"{_table(outcomes)}\n\n{_faults(outcomes)}\n\n{_fairness(outcomes, scale)}\n\n"
         f"{_figure(outcomes, scale)}"
     )

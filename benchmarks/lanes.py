@@ -18,9 +18,9 @@ from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.noded_curve import shifted
+from tests.oracles.checker import judge
 
 from . import collections, report
-from .checker import judge
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale

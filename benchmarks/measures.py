@@ -1,9 +1,8 @@
-"""What is measured of curves: bending, geodesic curvature and distances between them."""
+"""What is measured of curves: bending and geodesic curvature."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve, geodesic_curvature, resample
@@ -43,11 +42,3 @@ def squared_curvature(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -
 def bending(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> float:
     """Scale-free bending L ∫ κ_g² ds; a circle in the plane has 4 π²."""
     return curve.length * squared_curvature(mesh, curve, samples)
-
-
-def distances(first: SurfaceCurve, second: SurfaceCurve) -> tuple[float, float]:
-    """Mean and greatest distance between two closed curves, both ways, in the mesh's unit."""
-    here, _ = resample(first.points, 1000)
-    there, _ = resample(second.points, 1000)
-    both = np.concatenate([cKDTree(here).query(there)[0], cKDTree(there).query(here)[0]])
-    return float(both.mean()), float(both.max())

@@ -11,9 +11,9 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
+from tests.oracles.checker import judge
 
 from . import collections, report
-from .checker import judge
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale

@@ -15,9 +15,10 @@ from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
+from tests.oracles.distances import distances
 
 from . import collections, plots, renders, report
-from .measures import bending, distances
+from .measures import bending
 from .methods import METHODS
 from .polylines import NearestPoints
 from .samples import random_sets

@@ -16,10 +16,10 @@ from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.geometry.tracing import trace_from
 from nicmm_core.level_set.redistancing import distance_to_segments
+from tests.oracles.checker import judge_curve
 
 from . import collections, report
 from .cad_shapes import cad_shapes
-from .checker import judge_curve
 from .scale import Scale
 
 SEEDS = (6, 7, 8, 9)

@@ -25,9 +25,10 @@ from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.path.band_refinement import PIECES
+from tests.oracles.distances import distances
 
 from . import plots, report
-from .measures import diagonal, distances
+from .measures import diagonal
 from .samples import random_sets
 from .scale import Scale
 

@@ -1,16 +1,15 @@
 """What every curve must fulfil, as assertions, and helpers that several tests share.
 
-`benchmarks.checker` is the one definition of what is right.
+`tests.oracles.checker` is the one definition of what is right.
 """
 
 import igl
 import numpy as np
 
 import nicmm_core as nicmm
-from benchmarks.checker import judge_curve
-from benchmarks.named_curves import nearest_vertices  # noqa: F401 - several tests take it from here
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import strictly_inside, trace_between
+from tests.oracles.checker import judge_curve
 
 
 def assert_valid_curve(mesh, curve, control_positions=None, closed=True):

@@ -3,10 +3,10 @@
 import numpy as np
 
 import nicmm_core as nicmm
-from benchmarks.checker import judge
 from nicmm_core import shapes
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import noded_curve, relaxing
+from tests.oracles.checker import judge
 
 WORK = relaxing.RelaxationConfig().work
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import collections, corpus
 from nicmm_core.io.files import MESH_FORMATS
+from tests.oracles import corpus
+from tests.oracles.mesh_files import COLLECTIONS
 
 SHARE = 10
 
@@ -19,7 +20,7 @@ def some_files():
     generator = np.random.default_rng(corpus.SEED)
     chosen = []
     for folder in corpus.FOLDERS:
-        root = collections.COLLECTIONS / folder
+        root = COLLECTIONS / folder
         files = sorted(
             path
             for path in root.rglob("*")
@@ -37,6 +38,6 @@ def some_files():
     ids=lambda part: part.stem if isinstance(part, Path) else str(part),
 )
 def test_a_good_curve_or_the_error_that_is_due(folder, path, request_number):
-    name = str(path.relative_to(collections.COLLECTIONS / folder))
+    name = str(path.relative_to(COLLECTIONS / folder))
     outcome = corpus.outcome(corpus.Item(folder, name, path, request_number))
     assert outcome.verdict in (corpus.GOOD, corpus.DUE), outcome.words

@@ -22,9 +22,9 @@ from tests.core.checks import (
     circle,
     joined,
     mean_edge_length,
-    nearest_vertices,
     random_surface_points,
 )
+from tests.oracles.named_curves import nearest_vertices
 
 ROOT = Path(__file__).parents[2]
 CHOSEN = [3, 50, 200, 333]

@@ -12,8 +12,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
-from benchmarks.checker import judge
 from nicmm_core import shapes
+from tests.oracles.checker import judge
 
 MOST_NOISE = 0.25
 """Standard deviation of the vertices' displacements, in mean edge lengths."""

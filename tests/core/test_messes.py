@@ -4,7 +4,7 @@ import warnings
 
 import pytest
 
-from benchmarks import messes
+from tests.oracles import messes
 
 PARTS = 10
 """Of the seeded messes, so that several processes may share them."""

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks.checker import judge_curve
-from benchmarks.defects import defective_meshes
 from nicmm_core import progress, shapes
 from nicmm_core.progress import CancelledError, checkpoint, displaced, part, watched
+from tests.oracles.checker import judge_curve
+from tests.oracles.defects import defective_meshes
 
 MESHES = dict(defective_meshes())
 LARGE = shapes.sphere(5)

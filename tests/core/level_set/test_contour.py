@@ -14,8 +14,8 @@ from tests.core.checks import (
     circle,
     euler_characteristic,
     mean_edge_length,
-    nearest_vertices,
 )
+from tests.oracles.named_curves import nearest_vertices
 
 NONE = np.zeros(0, dtype=np.int64)
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks.named_curves import handle_points, torus_points
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.finite_elements import build_finite_elements
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.sign_bundle import SignBundle
-from tests.core.checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
+from tests.core.checks import assert_valid_curve, assert_valid_design, circle
+from tests.oracles.named_curves import handle_points, nearest_vertices, torus_points
 
 METHODS = ("variational", "nicmm-paper")
 

@@ -11,7 +11,8 @@ from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.topology import keep_topology
 from nicmm_core.path.initial_loop import InitialLoop
 from nicmm_core.path.virtual_splits import SplitMesh
-from tests.core.checks import assert_valid_curve, circle, nearest_vertices, random_surface_points
+from tests.core.checks import assert_valid_curve, circle, random_surface_points
+from tests.oracles.named_curves import nearest_vertices
 
 
 def keep(working, start, wanted, controls):

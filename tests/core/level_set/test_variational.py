@@ -11,7 +11,8 @@ from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.topology import breaking_vertices
 from nicmm_core.level_set.variational import VariationalConfig, solve
 from nicmm_core.level_set.vertex_links import VertexLinks
-from tests.core.checks import assert_valid_curve, assert_valid_design, circle, nearest_vertices
+from tests.core.checks import assert_valid_curve, assert_valid_design, circle
+from tests.oracles.named_curves import nearest_vertices
 
 SAME_CURVE = 0.08
 """Farthest that the network's curve lies from the variational one in easy cases, in radii."""

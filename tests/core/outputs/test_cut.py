@@ -2,20 +2,22 @@
 
 from collections import Counter
 
+import igl
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
-from benchmarks import collections
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.io.files import read_mesh
 from nicmm_core.outputs.cut import cut_mesh
 from nicmm_core.outputs.polygons import cut_polygons
 from tests.core.checks import flipped, grid, renumbered, scaled
 from tests.core.outputs.checks import assert_valid_cut, edges_with_counts, longest_edge
 from tests.core.outputs.curves import KINDS, designed
+from tests.oracles.mesh_files import COLLECTIONS, mesh_files, spread
 
 NO_CONTROLS = np.zeros(0, dtype=np.int64)
 
@@ -51,11 +53,11 @@ def test_curve_of_the_papers_method(closed):
     assert_valid_cut(ball, cut_mesh(ball, design.curves[0]), design.curves[0])
 
 
-@pytest.mark.skipif(
-    not collections.COLLECTIONS.exists(), reason="the meshes are not beside this folder"
-)
+@pytest.mark.skipif(not COLLECTIONS.exists(), reason="the meshes are not beside this folder")
 def test_scans():
-    for number, (_, mesh) in enumerate(collections.shrec16(6, subdivisions=1)):
+    for number, path in enumerate(spread(mesh_files("shrec16"), 6)):
+        coarse = read_mesh(path)
+        mesh = nicmm.Mesh(*igl.loop(coarse.vertices, coarse.faces))
         chosen = np.random.default_rng(number).choice(len(mesh.vertices), 4, replace=False)
         for closed in (True, False):
             curve = nicmm.design_curve(mesh, chosen, order="shortest", closed=closed).curves[0]

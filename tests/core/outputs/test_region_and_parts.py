@@ -6,7 +6,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
-from benchmarks.named_curves import named_curves
 from nicmm_core import shapes
 from nicmm_core.outputs.cut import cut_mesh
 from nicmm_core.outputs.parts import part_mesh
@@ -15,6 +14,7 @@ from tests.core.checks import euler_characteristic, grid, joined
 from tests.core.outputs.checks import components_without, edges_with_counts
 from tests.core.outputs.curves import designed
 from tests.core.outputs.test_cut import curve_at
+from tests.oracles.named_curves import named_curves
 
 
 @pytest.fixture(scope="module")

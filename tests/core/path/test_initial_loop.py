@@ -14,13 +14,8 @@ from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.path import legs
 from nicmm_core.path.initial_loop import boundary_loops, build_initial_loop, path_curve
 from nicmm_core.path.visiting_order import shortest_order
-from tests.core.checks import (
-    assert_valid_curve,
-    circle,
-    flipped,
-    nearest_vertices,
-    random_surface_points,
-)
+from tests.core.checks import assert_valid_curve, circle, flipped, random_surface_points
+from tests.oracles.named_curves import nearest_vertices
 
 BALL = shapes.sphere(1)
 

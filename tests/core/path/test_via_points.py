@@ -9,7 +9,8 @@ from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.path import legs
 from nicmm_core.path.initial_loop import build_initial_loop
-from tests.core.checks import assert_valid_design, circle, joined, nearest_vertices
+from tests.core.checks import assert_valid_design, circle, joined
+from tests.oracles.named_curves import nearest_vertices
 
 
 def design(mesh, points, **settings):

@@ -4,22 +4,16 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks.measures import distances
-from benchmarks.perturbation import perturbed
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import trace_between, trace_from
 from nicmm_core.relaxation.curve_nodes import curve_surface, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.noded_curve import drawn, moved_along_conormals, noded_curve
-from tests.core.checks import (
-    assert_valid_curve,
-    curve_through,
-    flipped,
-    grid,
-    nearest_vertices,
-    points_near,
-)
+from tests.core.checks import assert_valid_curve, curve_through, flipped, grid, points_near
+from tests.oracles.distances import distances
+from tests.oracles.named_curves import nearest_vertices
+from tests.oracles.perturbation import perturbed
 
 CELLS = 16
 STEP = 1.0 / CELLS

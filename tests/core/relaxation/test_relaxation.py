@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
-from benchmarks import messes
 from nicmm_core import shapes
 from nicmm_core.geometry.crossings import crossing_segments
 from nicmm_core.geometry.curve import geodesic_curvature, resample
@@ -32,6 +31,7 @@ from tests.core.checks import (
     renumbered,
     scaled,
 )
+from tests.oracles import messes
 
 ANGLES = np.arange(60) * 2 * np.pi / 60
 CONTROLS = np.arange(0, 60, 12)

@@ -6,7 +6,8 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
 from nicmm_core.level_set.redistancing import build_distance_surface, spread
-from tests.core.checks import assert_valid_design, nearest_vertices
+from tests.core.checks import assert_valid_design
+from tests.oracles.named_curves import nearest_vertices
 
 
 def length_inside(mesh, curve, weights):

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks import corpus
-from benchmarks.checker import judge
-from benchmarks.defects import defective_meshes
 from nicmm_core import shapes, surface_designer
 from nicmm_core.geometry import tolerances
 from nicmm_core.geometry.mesh import unique_edges
@@ -14,6 +11,9 @@ from nicmm_core.geometry.surface_points import locate_points
 from nicmm_core.path.leg_graph import nonmanifold_vertices
 from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
 from tests.core.checks import grid, joined
+from tests.oracles import corpus
+from tests.oracles.checker import judge
+from tests.oracles.defects import defective_meshes
 
 MESHES = dict(defective_meshes())
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.checker import judge_curve
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.repair.strand_separation import separated
 from tests.core.checks import grid
+from tests.oracles.checker import judge_curve
 
 SIZE = 4
 MESH = grid(SIZE)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks.defects import defective_meshes
-from benchmarks.feasibility import (
+from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import locate_points
+from tests.oracles.defects import defective_meshes
+from tests.oracles.feasibility import (
     edge_connected_parts,
     every_order_possible,
     usable_faces,
     why_impossible,
 )
-from nicmm_core import shapes
-from nicmm_core.geometry.surface_points import locate_points
 
 MESHES = dict(defective_meshes())
 

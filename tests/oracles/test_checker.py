@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from benchmarks.checker import judge, judge_curve
 from nicmm_core import shapes
+from tests.oracles.checker import judge, judge_curve
 
 # Two triangles that share the edge 0-2.
 SQUARE = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from benchmarks.perturbation import LEAST_ANGLE, angles, perturbed
 from nicmm_core import shapes
+from tests.oracles.perturbation import LEAST_ANGLE, angles, perturbed
 
 
 def test_angles_of_a_known_triangle():
