@@ -1,7 +1,6 @@
 """Small generated surfaces that the tests of the core share."""
 
 import pytest
-import torch
 from hypothesis import HealthCheck, settings
 
 import nicmm_core as nicmm
@@ -18,9 +17,6 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("core")
-
-# The matrices here are so small that a second thread costs more time than it saves.
-torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
