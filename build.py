@@ -285,6 +285,7 @@ def command_test(arguments: argparse.Namespace) -> int:
         "mypy": ["mypy"],
         "pytest": [
             *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
+            *(("-m", "not slow") if arguments.quick else ()),
             *arguments.pytest_arguments,
         ],
     }
@@ -320,6 +321,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     demo.set_defaults(command=command_demo)
 
     test = commands.add_parser("test", help="run every check")
+    test.add_argument(
+        "--quick", action="store_true", help="leave out the slow tests: an answer in 90 s"
+    )
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
     )

@@ -12,6 +12,8 @@ from benchmarks.__main__ import MEASUREMENTS
 from benchmarks.scale import Scale
 from nicmm_core.network.prediction import PredictionConfig
 
+pytestmark = pytest.mark.slow
+
 FEW_ITERATIONS = 40
 
 

@@ -39,6 +39,7 @@ def drawn(path):
     return bpy.data.objects["Körper Curve"]
 
 
+@pytest.mark.slow
 def test_group_points_and_places_give_the_same(command, file, tmp_path, extension):
     path, vertices, mesh = file
     before = path.read_bytes()
@@ -139,6 +140,7 @@ os._exit(code)  # disabling would take the wheels away from the other process
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bpy_module")
 def test_in_a_process_of_its_own(extension, file, tmp_path):
     path, vertices, _mesh = file

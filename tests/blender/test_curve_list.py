@@ -53,6 +53,7 @@ def pull(mesh_object, share=0.2):
     bpy.context.view_layer.update()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("closed", [True, False])
 def test_update_is_designing_again(sphere, output, closed):
@@ -93,6 +94,7 @@ def test_update_in_edit_mode_takes_what_is_being_edited(sphere):
     assert bpy.context.mode == "EDIT_MESH"
 
 
+@pytest.mark.slow
 def test_settings_of_the_panel(sphere):
     curve = draw(sphere)
     bpy.context.scene.nicmm_curves.closed = False
@@ -216,6 +218,7 @@ def test_live_update_is_off_at_first(empty_scene, sphere):
     np.testing.assert_array_equal(places(curve), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 def test_live_update_follows_the_mesh(live, sphere, output):
     curve = draw(sphere, output=output)
@@ -226,6 +229,7 @@ def test_live_update_follows_the_mesh(live, sphere, output):
     np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_live_update_follows_weights_and_edit_mode(live, sphere):
     walls = sphere.vertex_groups.new(name="Walls")
     curve = draw(sphere, obstacle_group="Walls")
@@ -244,6 +248,7 @@ def test_live_update_follows_weights_and_edit_mode(live, sphere):
     assert places(curve)[:, 2].min() > 0.5
 
 
+@pytest.mark.slow
 def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch):
     curve = draw(sphere)
     settle(live)
@@ -260,6 +265,7 @@ def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch
     assert places(curve) is not None
 
 
+@pytest.mark.slow
 def test_live_update_survives_undo(live, sphere):
     name, mesh_name = draw(sphere).name, sphere.name
     bpy.ops.ed.undo_push(message="Curve")
@@ -276,6 +282,7 @@ def test_live_update_survives_undo(live, sphere):
     assert np.abs(pulled.max(axis=0) - expected.max(axis=0)).max() > 0.01
 
 
+@pytest.mark.slow
 def test_change_during_work_starts_it_again(live, sphere):
     curve = draw(sphere)
     settle(live)
@@ -306,6 +313,7 @@ def test_what_cannot_be_updated_is_said_once(live, sphere):
     assert not live.messages(sphere)
 
 
+@pytest.mark.slow
 def test_live_update_in_a_reopened_file(live, sphere, tmp_path):
     name = draw(sphere).name
     settle(live)

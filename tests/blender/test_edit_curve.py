@@ -66,6 +66,7 @@ def test_points_inside_faces(empty_scene, sphere, places):
     np.testing.assert_allclose(scenes.points(curve), expected.points, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings", [{"closed": False}, {"smoothness": 4.0}, {"smoothness": 0.25, "closed": True}]
 )
@@ -80,6 +81,7 @@ def test_settings_reach_the_core(empty_scene, sphere, places, settings):
     np.testing.assert_allclose(scenes.points(other), expected.points, atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_groups_reach_the_core(empty_scene, sphere, places):
     middle = ring()[:2].mean(axis=0)
     away = np.linalg.norm(scenes.positions(sphere) - middle / np.linalg.norm(middle), axis=1)
@@ -158,6 +160,7 @@ def controls(curve):
     return np.array(curve["nicmm_curve"]["control_positions"]).reshape(-1, 3)
 
 
+@pytest.mark.slow
 def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     """The same object, with its points, its settings, its material and its thickness."""
     curve = edit(points=as_points(places), closed=False, smoothness=2.0)
@@ -202,6 +205,7 @@ def test_a_curve_through_vertices_can_be_edited(empty_scene, sphere):
     np.testing.assert_allclose(controls(curve), on_surface(sphere, ring()), atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_sticky_curves_are_edited_in_place(sphere, places):
     curve = edit(points=as_points(places), output="STICKY", thickness=0.01)
     radius = curve.data.attributes["radius"].data[0].value
@@ -217,6 +221,7 @@ def test_sticky_curves_are_edited_in_place(sphere, places):
     np.testing.assert_allclose(placed, written, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_converted_curves_can_be_edited(sphere, places):
     edit(points=as_points(places), smoothness=2.0)
     bpy.ops.nicmm.convert_curve(output="STICKY")
@@ -376,6 +381,7 @@ def tool(empty_scene):
     return made
 
 
+@pytest.mark.slow
 def test_clicks_add_points(empty_scene):
     tool = Tool(empty_scene, scenes.sphere(4))
     for pixel in CLICKS:

@@ -67,6 +67,7 @@ def assert_passes(session):
     np.testing.assert_allclose(passed, session.positions(), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_curve_grows_with_the_points(parts):
     session = start(parts, scenes.sphere())
     assert session.untouched
@@ -110,6 +111,7 @@ def test_insert_on_the_curve(parts, leg):
     assert scenes.distances_to(session.polyline(), before).max() < 0.01
 
 
+@pytest.mark.slow
 def test_inserted_point_is_dragged_from_there(parts):
     session = filled(parts, scenes.sphere())
     number = session.insert(30, 0.5)
@@ -134,6 +136,7 @@ def test_remove(parts, number, closed):
     assert_passes(session)
 
 
+@pytest.mark.slow
 def test_remove_all(parts):
     session = filled(parts, scenes.sphere(), ring()[:3])
     for count in (2, 1, 0):
@@ -182,6 +185,7 @@ def test_after_a_jump_the_curve_is_designed_anew(parts):
     np.testing.assert_array_equal(session.curve.points, expected.points)
 
 
+@pytest.mark.slow
 def test_undo_and_redo(parts):
     """Each change is one step, a drag with all its moves too; the same curves come back."""
     session = filled(parts, scenes.sphere())
@@ -231,6 +235,7 @@ def test_a_click_that_moves_nothing_is_no_step(parts):
     assert len(session.points) == len(before.points) - 1
 
 
+@pytest.mark.slow
 def test_drag_goes_on_after_undo(parts):
     session = filled(parts, scenes.sphere())
     session.remove(4)
@@ -289,6 +294,7 @@ def test_walls_and_missing_groups_are_named(parts):
     assert_passes(session)
 
 
+@pytest.mark.slow
 def test_groups_reach_the_curve(parts):
     sphere = scenes.sphere(4)
     island = sphere.vertex_groups.new(name="Island")
@@ -310,6 +316,7 @@ def test_groups_reach_the_curve(parts):
     assert np.linalg.norm(session.polyline() - middle, axis=1).min() < 0.2
 
 
+@pytest.mark.slow
 def test_smoothness_has_limits(parts):
     session = filled(parts, scenes.sphere(), ring()[:3])
     session.smoother(1)
@@ -324,6 +331,7 @@ def test_smoothness_has_limits(parts):
     assert session.asked.smoothness == 0.01
 
 
+@pytest.mark.slow
 def test_lengths_are_those_of_the_scaled_object(parts):
     sphere = scenes.sphere()
     sphere.scale = (1, 1, 3)

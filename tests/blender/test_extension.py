@@ -58,6 +58,7 @@ def test_runs_from_the_installed_zip(extension):
     assert not (libraries / "numpy").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "loaded"), [("", []), (DESIGN, ["igl", "scipy", "core"])])
 @pytest.mark.usefixtures("bpy_module")
 def test_libraries_are_loaded_late_and_torch_not_at_all(tmp_path, steps, loaded):
@@ -129,6 +130,7 @@ def test_panel_hands_its_settings_to_the_operator(extension):
     assert set(settings) - {"rna_type", "name"} == set(operator) - {"rna_type"} - of_scripts
 
 
+@pytest.mark.slow
 def test_disabling_removes_everything(extension):
     addon_utils.disable(extension.name, default_set=True)
     try:

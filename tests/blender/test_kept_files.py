@@ -69,6 +69,7 @@ def test_what_curves_were_asked_for(kept):
     assert (panel.smoothness, panel.obstacle_group) == (3.0, "Wall")
 
 
+@pytest.mark.slow
 def test_curves_are_updated_on_the_mesh_as_it_is_now(kept):
     body = bpy.data.objects["Body"]
     scenes.activate(body)

@@ -53,8 +53,8 @@ def test_equals_the_core(empty_scene, mode):
         ({"order": "SHORTEST"}, {"order": "shortest"}),
         ({"order": "GIVEN"}, {"order": "given"}),
         ({"smoothness": 3.0}, {"smoothness": 3.0}),
-        ({"method": "NICMM_PAPER"}, {"method": "nicmm-paper"}),
-        ({"method": "VARIATIONAL"}, {"method": "variational"}),
+        pytest.param({"method": "NICMM_PAPER"}, {"method": "nicmm-paper"}, marks=pytest.mark.slow),
+        pytest.param({"method": "VARIATIONAL"}, {"method": "variational"}, marks=pytest.mark.slow),
     ],
 )
 def test_settings_reach_the_core(empty_scene, settings, arguments):
@@ -69,6 +69,7 @@ def test_settings_reach_the_core(empty_scene, settings, arguments):
     np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_vertex_groups_are_maps(empty_scene):
     sphere = scenes.sphere()
     vertices = scenes.ring(sphere, 4)
@@ -105,6 +106,7 @@ def test_complete_history_gives_the_order(empty_scene):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("remembered", [0, 3])
 def test_incomplete_history_leaves_the_shortest_order(empty_scene, remembered):
     sphere = scenes.sphere()
@@ -304,6 +306,7 @@ def test_separate_parts_are_reported(empty_scene):
     assert f"P{first} and p{other} lie on different components" in report
 
 
+@pytest.mark.slow
 def test_open_curve_is_not_cyclic(empty_scene):
     """From the first vertex selected to the last; two are enough."""
     sphere = scenes.sphere()
@@ -355,6 +358,7 @@ def test_the_same_mesh_is_factorised_once(empty_scene):
     assert len(kept[0]) == 1
 
 
+@pytest.mark.slow
 def test_modifiers_are_mentioned(empty_scene, capfd):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))

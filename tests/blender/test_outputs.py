@@ -149,6 +149,7 @@ def with_everything(mesh_object):
     return maps
 
 
+@pytest.mark.slow
 @MODES
 @pytest.mark.parametrize("cut_faces", ["POLYGONS", "TRIANGLES"])
 def test_everything_on_the_mesh_comes_along(monkey, mode, cut_faces):
@@ -202,6 +203,7 @@ def test_custom_normals_come_along(monkey):
     assert cosine.min() > 0.995  # normals are interpolated along chords
 
 
+@pytest.mark.slow
 @MODES
 def test_region_is_selected(monkey, mode):
     before = len(monkey.data.polygons)
@@ -241,6 +243,7 @@ def same_component(monkey):
     return found
 
 
+@pytest.mark.slow
 @MODES
 def test_region_that_is_cut_ends_at_the_curve(monkey, mode):
     whole = area(monkey)
@@ -279,6 +282,7 @@ def test_region_is_a_vertex_group(monkey, mode, region_cut):
     assert (max(weights) >= 507) == region_cut  # new vertices along the curve
 
 
+@pytest.mark.slow
 @MODES
 def test_region_is_a_face_set(monkey, mode):
     expected = inside_faces(monkey)
@@ -332,6 +336,7 @@ def components(mesh_object):
     return int(mesh.face_component.max()) + 1
 
 
+@pytest.mark.slow
 def test_parts_of_a_tube_need_no_region(empty_scene):
     bpy.ops.mesh.primitive_torus_add(major_segments=32, minor_segments=12)
     torus = bpy.context.active_object

@@ -61,6 +61,7 @@ def test_zip_holds_the_wheels_of_every_blender(archive):
     assert {"__init__.py", "nicmm_core/__init__.py", "nicmm_blender/__init__.py"} <= set(names)
 
 
+@pytest.mark.slow
 def test_zip_is_small_enough_for_the_platform(archive, monkeypatch, tmp_path):
     assert archive.stat().st_size <= build.LARGEST_ZIP == 120e6
     monkeypatch.setattr(build, "LARGEST_ZIP", 1e6)
@@ -68,6 +69,7 @@ def test_zip_is_small_enough_for_the_platform(archive, monkeypatch, tmp_path):
         build.package(build.this_platform(), output=tmp_path)
 
 
+@pytest.mark.slow
 def test_missing_wheel_says_what_to_do(capfd):
     with pytest.raises(build.BuildError, match=r"no wheel of scipy==0\.0\.1 .*--platform"):
         build.download("scipy==0.0.1", "linux-x64", "3.11")

@@ -12,6 +12,8 @@ import pytest
 import build
 from tests.blender import scenes
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = build.ROOT / "docs" / "examples" / "design_curve.py"
 
 # What `blender -b FILE --python SCRIPT -- ARGUMENTS` does, for the bpy module.

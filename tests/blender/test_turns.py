@@ -77,6 +77,7 @@ def test_errors_come_to_the_caller(turns):
         failing.result()
 
 
+@pytest.mark.slow
 def test_disabling_ends_what_is_parked(empty_scene, turns):
     before = threading.active_count()
     parked = [turns.Work(counting(9, [])) for _ in range(3)]

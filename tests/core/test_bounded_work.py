@@ -1,12 +1,15 @@
 """Work is bounded by counts, so that the same request always ends the same way."""
 
 import numpy as np
+import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import noded_curve, relaxing
 from tests.oracles.checker import judge
+
+pytestmark = pytest.mark.slow
 
 WORK = relaxing.RelaxationConfig().work
 

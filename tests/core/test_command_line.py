@@ -39,6 +39,7 @@ def as_program(*arguments, folder):
     )
 
 
+@pytest.mark.slow
 def test_program_writes_the_curve_that_the_function_gives(mesh_file, tmp_path):
     result = as_program(
         "design", mesh_file, "--points", CHOSEN, "-o", "curve.json", folder=tmp_path
@@ -54,6 +55,7 @@ def test_program_writes_the_curve_that_the_function_gives(mesh_file, tmp_path):
     np.testing.assert_allclose(arrays["points"], expected.points, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_program_ends_with_2_and_the_message(mesh_file, tmp_path):
     result = as_program(
         "design", mesh_file, "--points", "3,60,999", "-o", "curve.obj", folder=tmp_path
@@ -79,6 +81,7 @@ def test_formats_go_by_their_endings(small_ball, tmp_path, mesh_ending, ending):
     assert first.startswith("v ") if ending == ".obj" else first.startswith("face,")
 
 
+@pytest.mark.slow
 def test_options_reach_the_design(mesh_file, tmp_path):
     outputs = []
     for number, options in enumerate(

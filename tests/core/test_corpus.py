@@ -9,6 +9,8 @@ from nicmm_core.io.files import MESH_FORMATS
 from tests.oracles import corpus
 from tests.oracles.mesh_files import COLLECTIONS
 
+pytestmark = pytest.mark.slow
+
 SHARE = 10
 
 LARGEST_FILE = 400_000

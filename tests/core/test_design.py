@@ -148,6 +148,7 @@ class TestResult:
         elsewhere[shift:-1] = False
         assert (design.field[elsewhere] == design.field.max()).all()
 
+    @pytest.mark.slow
     def test_neighbouring_control_points_are_kept_apart(self, ball):
         """Two inside one face and two of its corners."""
         points = nicmm.SurfacePoints(
@@ -174,6 +175,7 @@ class TestResult:
         # ½ (|∇φ|² - 1)² over an area of 1: a field with no slope at all has 0.5.
         assert design.energy["sdf"] < 0.35
 
+    @pytest.mark.slow
     def test_all_methods_are_available(self, small_ball):
         for method in ("nicmm", "nicmm-paper", "variational"):
             design = nicmm.design_curve(small_ball, [3, 60, 100], method=method)
@@ -564,11 +566,13 @@ for method in ("nicmm", "variational"):
 """
 
 
+@pytest.mark.slow
 def test_import_and_default_method_do_not_load_torch():
     result = python(f"{DESIGN}\nassert 'torch' not in sys.modules")
     assert result.returncode == 0, result.stderr + result.stdout
 
 
+@pytest.mark.slow
 def test_without_torch_only_the_method_of_the_paper_says_what_to_install():
     result = python(
         "import sys\n"
@@ -585,6 +589,7 @@ def test_without_torch_only_the_method_of_the_paper_says_what_to_install():
     assert (result.stdout, result.stderr) == ("", "")
 
 
+@pytest.mark.slow
 def test_a_changed_map_gives_the_curve_that_a_new_designer_finds(ball, parallel):
     """The path may have to go elsewhere, so the last curve is no start; the same map goes on."""
     designer = nicmm.Designer(ball)
@@ -598,7 +603,12 @@ def test_a_changed_map_gives_the_curve_that_a_new_designer_finds(ball, parallel)
 
 
 @pytest.mark.parametrize(
-    ("method", "finer", "most"), [("nicmm", 0, 0.03), ("nicmm", 1, 0.03), ("variational", 0, 0.06)]
+    ("method", "finer", "most"),
+    [
+        ("nicmm", 0, 0.03),
+        ("nicmm", 1, 0.03),
+        pytest.param("variational", 0, 0.06, marks=pytest.mark.slow),
+    ],
 )
 def test_a_lane_beside_a_straight_way_is_followed(flat_disc, method, finer, most):
     """Over its middle, on the disc and on one twice as fine."""

@@ -8,12 +8,15 @@ import re
 from functools import cache
 
 import numpy as np
+import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from tests.oracles.checker import judge
+
+pytestmark = pytest.mark.slow
 
 MOST_NOISE = 0.25
 """Standard deviation of the vertices' displacements, in mean edge lengths."""

@@ -80,6 +80,7 @@ def test_the_callers_own_error_passes_and_the_designer_goes_on():
     assert not judge(BALL, designer.design(POINTS), POINTS).faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(10))
 def test_a_seeded_part_of_the_fuzzing(part):
     for number in range(105 * part, 105 * (part + 1)):

@@ -6,6 +6,8 @@ import pytest
 
 from tests.oracles import messes
 
+pytestmark = pytest.mark.slow
+
 PARTS = 10
 """Of the seeded messes, so that several processes may share them."""
 

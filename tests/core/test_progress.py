@@ -78,6 +78,7 @@ def test_every_stage_asks_and_fractions_only_grow(at_every_checkpoint, name):
     assert len(set(fractions)) > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     at_every_checkpoint, name
@@ -167,6 +168,7 @@ class TestWatched:
 
 
 class TestThreads:
+    @pytest.mark.slow
     def test_threads_share_a_designer(self):
         mesh, points = MESHES["fins"], [[3, 100, 400], [7, 200, 300, 500], [20, 90, 450]]
         alone = [nicmm.design_curve(mesh, chosen, order="shortest") for chosen in points]

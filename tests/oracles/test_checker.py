@@ -251,6 +251,7 @@ class TestControlPoints:
         assert self.judged(self.corners[:3], [0, 1, 2], curves=0).faults
 
 
+@pytest.mark.slow
 def test_a_curve_on_a_large_mesh():
     """Along a parallel of a torus through vertices, and across it half an edge beside."""
     mesh = shapes.torus(around=500, across=120)

@@ -1,6 +1,10 @@
 """Work in processes of its own: what became of each item is known, whatever happened."""
 
+import pytest
+
 from tests.oracles.isolation import isolated
+
+pytestmark = pytest.mark.slow
 
 
 def fate(item):

@@ -37,6 +37,7 @@ def chosen_on(mesh, count, seed=0):
     return np.random.default_rng(seed).choice(len(mesh.vertices), size=count, replace=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, closed):
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
@@ -53,6 +54,7 @@ def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns):
     assert max(unknowns) < len(square.vertices)
 
 
+@pytest.mark.slow
 def test_memory_follows_the_vertices():
     mesh = shapes.sphere(7)
     tracemalloc.start()
@@ -64,6 +66,7 @@ def test_memory_follows_the_vertices():
     assert peak < 1_000 * len(mesh.vertices)
 
 
+@pytest.mark.slow
 def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
     made = []
     build = coarse_start.build_coarse_mesh
@@ -76,6 +79,7 @@ def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
     assert len(made) == 1
 
 
+@pytest.mark.slow
 def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
     mesh = shapes.sphere(6)
     chosen = chosen_on(mesh, 4)
@@ -87,6 +91,7 @@ def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
     assert by_cells.length == pytest.approx(directly.length, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_points_in_one_cell_are_told_apart(large):
     # A vertex and its neighbours: the cells are far larger than that.
     around = np.unique(large.faces[large.vertex_faces[[1000]].indices])
@@ -94,6 +99,7 @@ def test_points_in_one_cell_are_told_apart(large):
     assert_valid_design(large, design)
 
 
+@pytest.mark.slow
 def test_given_order_and_via_points_hold_on_large_meshes():
     ring = shapes.torus(around=240, across=120)
     # Three points on the outside, joined the long way round the axis by via points or the short.
@@ -107,6 +113,7 @@ def test_given_order_and_via_points_hold_on_large_meshes():
     assert long.curves[0].length > 2.0 * short.curves[0].length
 
 
+@pytest.mark.slow
 def test_maps_reach_the_coarse_mesh(large):
     chosen = chosen_on(large, 4, seed=3)
     free = nicmm.design_curve(large, chosen, order="shortest")

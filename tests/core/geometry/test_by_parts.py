@@ -32,6 +32,7 @@ def some_keys(seed):
     return keys if generator.random() < 0.5 else keys * generator.choice([0.0, -0.5, np.pi])
 
 
+@pytest.mark.slow
 @given(SEEDS)
 def test_order_and_groups(seed):
     keys = some_keys(seed)
@@ -98,6 +99,7 @@ def bumpy():
     return ball.vertices * generator.uniform(0.97, 1.03, (len(ball.vertices), 1)), ball.faces
 
 
+@pytest.mark.slow
 def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
     """All that a design does by parts on a large mesh, here on one of 5,120 faces."""
     points = [3, 700, 1500, 2400]

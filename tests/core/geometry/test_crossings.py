@@ -51,6 +51,7 @@ def test_random_polylines_in_one_face_against_brute_force(seed, count, closed):
     assert pairs(TRIANGLE, in_triangle(points), closed) == pairs_by_solving(points, closed)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 100_000))
 def test_random_polylines_over_many_faces_against_brute_force(flat_disc, seed):
     """Pieces of a straight way cross where the whole ways do."""

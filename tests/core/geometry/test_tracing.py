@@ -124,6 +124,7 @@ def test_on_a_sphere_ways_are_arcs_of_great_circles(subdivisions):
         assert_lies_on_surface(mesh, way)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_ways_on_a_random_body_stay_on_it_and_in_their_plane(body, seed):
     generator = np.random.default_rng(seed)

@@ -87,6 +87,7 @@ def test_normals_are_finite_where_they_cancel():
     assert np.isfinite(vertex_normals(vertices, np.array([[0, 1, 2], [0, 2, 1]]))).all()
 
 
+@pytest.mark.slow
 def test_turned_and_moved_surface_has_the_same_positions_and_normals(body):
     """At the input's vertices; but for a ball and its like, whose axes are undetermined."""
     points = locate_control_points(body, [3, 50, 200, 333], closed=True)

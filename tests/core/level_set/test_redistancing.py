@@ -73,6 +73,7 @@ def test_scaling_the_mesh_scales_the_distance(body):
     np.testing.assert_allclose(redistanced(scaled, field, NOTHING), 1e3 * small, rtol=1e-6)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_distance_never_rises_faster_than_edges_are_long(ball, seed):
     """|d(a) - d(b)| ≤ |ab|, as for every distance."""

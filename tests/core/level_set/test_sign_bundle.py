@@ -25,6 +25,7 @@ def assert_one_curve(mesh, result, points, closed=True):
     assert_valid_curve(mesh, result.curves[0], positions, closed=closed)
 
 
+@pytest.mark.slow
 class TestLoopsThatBoundNothing:
     @pytest.mark.parametrize("method", METHODS)
     def test_meridian_of_a_torus(self, ring, method):
@@ -78,6 +79,7 @@ class TestLoopsThatBoundNothing:
         assert result.curves[0].length == pytest.approx(2 * np.pi, rel=0.03)
 
 
+@pytest.mark.slow
 class TestOpenCurves:
     @pytest.mark.parametrize("method", METHODS)
     def test_arc_of_a_great_circle(self, ball, method):

@@ -113,6 +113,7 @@ def test_other_components_do_not_matter():
     np.testing.assert_allclose(distance_to(both, index[3]), distance_to(mesh, index[3]))
 
 
+@pytest.mark.slow
 def test_loop_round_the_tube_of_a_torus_bounds_nothing(ring):
     """Three vertices of a meridian; likewise of a parallel, round the hole."""
     meridian = [0, 6, 12]

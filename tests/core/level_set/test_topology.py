@@ -144,6 +144,7 @@ def problem_on(name, seed):
     return PROBLEMS[name, seed]
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     name=st.sampled_from(sorted(MESHES)),

@@ -22,6 +22,7 @@ def design(mesh, points, **settings):
     return nicmm.design_curve(mesh, points, method="variational", **settings)
 
 
+@pytest.mark.slow
 def test_points_of_a_great_circle_give_a_great_circle():
     """No geodesic curvature; the error falls with the mesh."""
     farthest = []
@@ -33,6 +34,7 @@ def test_points_of_a_great_circle_give_a_great_circle():
     assert max(farthest) < 0.01
 
 
+@pytest.mark.slow
 def test_points_of_a_circle_in_a_disc_give_that_circle():
     """The closed elastic curve of the plane."""
     mesh = shapes.disc(24)
@@ -42,6 +44,7 @@ def test_points_of_a_circle_in_a_disc_give_that_circle():
     assert np.abs(radii - 0.55).max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nicmm-paper", "nicmm"])
 def test_network_and_variational_method_reach_the_same_curve(method):
     """On easy cases, within the distance that is stated above."""
@@ -53,6 +56,7 @@ def test_network_and_variational_method_reach_the_same_curve(method):
     assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < SAME_CURVE
 
 
+@pytest.mark.slow
 def test_curves_are_valid_on_every_surface(surface):
     """One simple loop on the surface, exactly through the points."""
     points = np.random.default_rng(4).choice(len(surface.vertices), 4, replace=False)
@@ -62,6 +66,7 @@ def test_curves_are_valid_on_every_surface(surface):
     assert_valid_curve(surface, result.curves[0])
 
 
+@pytest.mark.slow
 def test_loss_falls_far_and_the_loop_stays_one(body):
     """From the smoothed edge path to rest, without ever leaving its isotopy class."""
     points = locate_control_points(body, [5, 150, 300, 400], closed=True)
@@ -76,6 +81,7 @@ def test_loss_falls_far_and_the_loop_stays_one(body):
     assert not len(breaking_vertices(links, problem.initial_distance, solution.field, controls))
 
 
+@pytest.mark.slow
 def test_stops_by_the_papers_rule(ball):
     """Change of the least loss below 1e-5 over ten iterations; the cap otherwise."""
     points = locate_control_points(ball, [3, 200, 400, 600], closed=True)
@@ -103,6 +109,7 @@ def test_can_be_watched_and_cancelled(ball):
     assert seen == pytest.approx([0.01, 0.02, 0.03, 0.04])
 
 
+@pytest.mark.slow
 def test_obstacle_is_avoided_and_alignment_followed():
     mesh = shapes.sphere(4)
     points = nearest_vertices(mesh, circle([0.0, np.pi / 2, np.pi, 3 * np.pi / 2]))
@@ -123,6 +130,7 @@ def distance_to(curve, place):
     return np.linalg.norm(curve.points - place, axis=1).min()
 
 
+@pytest.mark.slow
 def test_needs_no_pytorch(monkeypatch, small_ball):
     """The energy is arrays; a missing PyTorch does not matter."""
     import sys
@@ -131,11 +139,13 @@ def test_needs_no_pytorch(monkeypatch, small_ball):
     assert len(design(small_ball, [3, 60, 100]).curves) == 1
 
 
+@pytest.mark.slow
 def test_same_input_gives_the_same_curve(body):
     first, second = (design(body, [5, 150, 300], order="shortest") for _ in range(2))
     np.testing.assert_array_equal(first.curves[0].points, second.curves[0].points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_size_of_the_model_does_not_matter(body, scale):
     plain = design(body, [5, 150, 300], order="shortest").curves[0]

@@ -80,6 +80,7 @@ def test_stops_at_once_when_the_energy_is_low_enough(network, problem):
     assert (result.stopped, result.iterations) == ("converged", 1)
 
 
+@pytest.mark.slow
 def test_looser_fluctuation_stops_no_later(network, problem):
     counts = [
         run(network, problem, fluctuation=fluctuation, threshold=-1.0).iterations

@@ -50,6 +50,7 @@ def finished(meshes, tmp_path_factory):
     return path, train(meshes, path)
 
 
+@pytest.mark.slow
 def test_loss_falls(meshes, tmp_path):
     losses = train(
         meshes, tmp_path / "weights.npz", PretrainingConfig(sets=4, batch=1, epochs=8, seed=7)
@@ -70,6 +71,7 @@ def test_training_changes_the_network(finished):
     assert np.abs(weights_in(finished[0])["head.weight"]).max() > 0.0
 
 
+@pytest.mark.slow
 def test_same_seed_gives_identical_weights(meshes, finished, tmp_path):
     torch.manual_seed(123)
     np.random.seed(123)
@@ -78,6 +80,7 @@ def test_same_seed_gives_identical_weights(meshes, finished, tmp_path):
     assert_same_weights(weights_in(tmp_path / "again.npz"), weights_in(finished[0]))
 
 
+@pytest.mark.slow
 def test_other_seed_gives_other_weights(meshes, finished, tmp_path):
     train(meshes, tmp_path / "other.npz", PretrainingConfig(sets=4, batch=2, epochs=3, seed=8))
     other, first = weights_in(tmp_path / "other.npz"), weights_in(finished[0])
@@ -98,6 +101,7 @@ def interrupt_in_epoch(number, settings=SETTINGS):
     return progress
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("epoch", [1, 2, 3])
 def test_interrupted_run_ends_with_the_weights_of_an_uninterrupted_one(
     meshes, finished, tmp_path, epoch
@@ -118,6 +122,7 @@ def test_interrupted_run_ends_with_the_weights_of_an_uninterrupted_one(
     assert_same_weights(weights_in(path), weights_in(finished[0]))
 
 
+@pytest.mark.slow
 def test_checkpoint_of_other_settings_is_refused(meshes, tmp_path):
     path = tmp_path / "weights.npz"
     with pytest.raises(StopError):
@@ -132,6 +137,7 @@ def test_checkpoint_of_other_settings_is_refused(meshes, tmp_path):
             train(meshes, path, **change)
 
 
+@pytest.mark.slow
 def test_checkpoint_of_other_meshes_is_refused(meshes, tmp_path):
     """Going on with other meshes would give weights that no command made."""
     path = tmp_path / "weights.npz"
@@ -141,6 +147,7 @@ def test_checkpoint_of_other_meshes_is_refused(meshes, tmp_path):
         train(meshes[:1], path)
 
 
+@pytest.mark.slow
 def test_unreadable_checkpoint_is_refused_by_name(meshes, tmp_path):
     """As a run leaves it that is stopped while it writes."""
     path = tmp_path / "weights.npz"
@@ -152,6 +159,7 @@ def test_unreadable_checkpoint_is_refused_by_name(meshes, tmp_path):
         train(meshes, path)
 
 
+@pytest.mark.slow
 def test_progress_counts_up_to_all_steps(meshes, tmp_path):
     calls = []
     train(meshes, tmp_path / "weights.npz", progress=lambda *call: calls.append(call))
@@ -194,6 +202,7 @@ def prepared(monkeypatch):
     return asked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("open_share", "given_share", "expected"),
     [
@@ -210,6 +219,7 @@ def test_sets_are_of_the_kinds_asked_for(
     assert {(closed, order) for closed, order, _ in prepared} == expected
 
 
+@pytest.mark.slow
 def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
     settings = replace(SETTINGS, sets=20, epochs=1, open_share=0.4, given_share=0.3)
     train(meshes, tmp_path / "weights.npz", settings)
@@ -219,6 +229,7 @@ def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
     assert 2 <= given <= 11
 
 
+@pytest.mark.slow
 def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared):
     """An untrained network returns φ₀, or -φ₀ where a set is turned: the same energy."""
     settings = replace(SETTINGS, learning_rate=0.0)
@@ -233,6 +244,7 @@ def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared)
     np.testing.assert_allclose(losses, np.mean(expected), rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_loss_weights_are_lowered_set_by_set(prepared, meshes, tmp_path):
     settings = replace(SETTINGS, epochs=1, learning_rate=0.0)
     stiff = LossWeights(smooth=100.0)
@@ -246,6 +258,7 @@ def test_loss_weights_are_lowered_set_by_set(prepared, meshes, tmp_path):
     assert loss < 0.01 * flat
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channels", [8, 9])
 def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
     generator = np.random.default_rng(3)
@@ -287,6 +300,7 @@ def test_impossible_settings_are_refused_by_name(meshes, tmp_path, change, named
         train(meshes, tmp_path / "weights.npz", replace(SETTINGS, **change))
 
 
+@pytest.mark.slow
 def test_sets_with_maps_train_the_ninth_channel(meshes, tmp_path, prepared):
     """Also in sets without one, where φ_fea is neutral."""
     settings = replace(SETTINGS, sets=12, epochs=1, map_share=0.5)

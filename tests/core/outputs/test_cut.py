@@ -29,6 +29,7 @@ def curve_at(mesh, points, closed):
     return curve_on_mesh(mesh, closed, np.array(faces), barycentric, NO_CONTROLS)
 
 
+@pytest.mark.slow
 @settings(max_examples=16)
 @given(
     kind=st.sampled_from(KINDS),
@@ -46,6 +47,7 @@ def test_designed_curves(kind, seed, noisy, closed, method, snap, deviation):
     assert_valid_cut(mesh, cut, curve if snap <= 1e-3 else None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_curve_of_the_papers_method(closed):
     ball = shapes.sphere(1)
@@ -53,6 +55,7 @@ def test_curve_of_the_papers_method(closed):
     assert_valid_cut(ball, cut_mesh(ball, design.curves[0]), design.curves[0])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COLLECTIONS.exists(), reason="the meshes are not beside this folder")
 def test_scans():
     for number, path in enumerate(spread(mesh_files("shrec16"), 6)):
@@ -76,6 +79,7 @@ def test_edge_of_three_faces_is_cut_in_all_of_them():
     np.testing.assert_array_equal(np.bincount(cut.source_face)[2], 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_turned_and_renumbered_faces(body, seed):
     for mesh in (flipped(body, seed), renumbered(body, seed)):
@@ -201,6 +205,7 @@ def test_strands_that_snapping_would_join_stay_apart():
     assert 4 not in cut.chain
 
 
+@pytest.mark.slow
 def test_quads_stay_whole_polygons_where_they_can():
     """A curve through a row of quads leaves two polygons of each."""
     mesh = grid(4)
@@ -238,6 +243,7 @@ def test_curve_along_the_diagonal_of_a_quad_parts_it():
     assert sorted(len(corners) for corners in polygons.corners) == [3, 3]
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(seed=st.integers(0, 4), closed=st.booleans(), kind=st.sampled_from(["torus", "annulus"]))
 def test_polygons_of_random_pairs_of_triangles(seed, closed, kind):
@@ -315,6 +321,7 @@ def test_arguments_out_of_range(name, value):
         cut_mesh(mesh, curve, **{name: value})
 
 
+@pytest.mark.slow
 def test_large_mesh_is_cut_in_little_time():
     mesh = shapes.sphere(6)
     curve = nicmm.design_curve(mesh, [12, 80, 41]).curves[0]

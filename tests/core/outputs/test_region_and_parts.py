@@ -54,6 +54,7 @@ def test_sides_are_those_of_the_level_set(cap):
     np.testing.assert_array_equal(region.vertices(mesh)[clear], design.field[clear] < 0.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(
     kind=st.sampled_from(["sphere", "creature", "torus", "disc", "annulus", "Möbius strip"]),

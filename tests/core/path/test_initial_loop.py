@@ -84,6 +84,7 @@ PLACES = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(places=PLACES, order=st.sampled_from(["given", "shortest"]))
 @example(places=[(0, (1, 0, 0)), (0, (0.5, 0.5, 0)), (0, (0.2, 0.3, 0.5))], order="given")
@@ -128,6 +129,7 @@ SURFACES = {
 }
 
 
+@pytest.mark.slow
 class TestEveryOrder:
     """Arcs that are apart separate no surface without boundary, so every order has a path."""
 
@@ -173,6 +175,7 @@ class TestEveryOrder:
 
 
 class TestBoundary:
+    @pytest.mark.slow
     @settings(max_examples=15)
     @given(count=st.integers(4, 8), seed=st.integers(0, 10**6), closed=st.booleans())
     def test_an_order_along_the_rim_works_and_any_other_names_one(
@@ -267,6 +270,7 @@ class TestNoManifold:
         assert not set(working.input_vertex[loop.vertices]) & {22, 23, 24}
 
 
+@pytest.mark.slow
 def test_a_path_that_winds_too_often_names_an_order(ball, monkeypatch):
     monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
     chosen = np.random.default_rng(0).choice(len(ball.vertices), 24, replace=False)

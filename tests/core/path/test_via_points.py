@@ -26,6 +26,7 @@ def windings(curve):
 
 
 class TestWhichWay:
+    @pytest.mark.slow
     def test_open_curve_goes_round_the_other_side_of_a_sphere(self, ball):
         """Nothing but the initial path tells the shorter arc of a great circle from the longer."""
         points = nearest_vertices(ball, circle([0.0, 2.0]))
@@ -40,6 +41,7 @@ class TestWhichWay:
             # Open curves are free near their ends and somewhat longer than they need be.
             assert abs(angle) * 0.98 < result.curves[0].length < abs(angle) * 1.2
 
+    @pytest.mark.slow
     def test_loop_goes_through_the_hole_of_a_torus_or_not(self, ring):
         points = nearest_vertices(ring, circle([-0.4, 0.0, 0.4], radius=1.4))
         inside = nearest_vertices(ring, circle([2.0, 3.5, 5.0], radius=1.4))
@@ -50,6 +52,7 @@ class TestWhichWay:
         assert windings(beside.curves[0]) == (0, 0)
         assert tuple(map(abs, windings(round_it.curves[0]))) == (1, 0)
 
+    @pytest.mark.slow
     def test_curve_does_not_interpolate_them(self, ball):
         points = nearest_vertices(ball, circle([0.0, 2.0]))
         via = nearest_vertices(ball, [[-0.3, -0.8, 0.5]])
@@ -68,6 +71,7 @@ class TestWhichWay:
         assert (np.diff([place[int(vertex)] for vertex in expected]) > 0).all()
         np.testing.assert_array_equal(working.input_vertex[loop.control_vertices], chosen[:4])
 
+    @pytest.mark.slow
     def test_no_via_points_change_nothing(self, small_ball):
         points = locate_control_points(small_ball, [3, 60, 100], closed=True)
         plain = build_initial_loop(small_ball, points, "given")[1]
@@ -75,6 +79,7 @@ class TestWhichWay:
             loop = build_initial_loop(small_ball, points, "given", via_points=nothing)[1]
             np.testing.assert_array_equal(loop.vertices, plain.vertices)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("closed", [True, False])
     def test_on_the_boundary_they_steer_and_the_curve_keeps_off_it(self, flat_disc, closed):
         """The via point is beyond the line that joins the other two points of the rim."""
@@ -84,6 +89,7 @@ class TestWhichWay:
         plain = design(flat_disc, rim[[0, 2, 4]], closed=closed)
         assert found.curves[0].length > (1.0 if closed else 1.2) * plain.curves[0].length
 
+    @pytest.mark.slow
     def test_impossible_ones_are_named_and_left_out_in_the_advice(self, ball, monkeypatch):
         """Through many points to and fro the path winds more often than it may."""
         monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
@@ -142,6 +148,7 @@ class TestCommandLine:
         write_mesh(path, small_ball)
         return path
 
+    @pytest.mark.slow
     def test_option_reaches_the_design(self, mesh_file, tmp_path):
         output = tmp_path / "curve.csv"
         arguments = ["design", str(mesh_file), "--points", "3,60,100", "-o", str(output)]

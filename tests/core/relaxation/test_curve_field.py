@@ -98,6 +98,7 @@ def parts_by_cutting(mesh, curve):
     return part, np.unique(mesh.faces[free])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [None, 1])
 def test_parts_of_a_body_that_the_curve_cuts_apart_have_different_signs(body, seed):
     mesh = body if seed is None else flipped(body, seed)
@@ -166,6 +167,7 @@ def test_an_open_curve_has_no_inside(flat_disc, closed):
     )
 
 
+@pytest.mark.slow
 def test_a_curve_through_a_vertex_is_zero_there(ball):
     corners = [ball.faces[0, 0], *np.argsort(ball.vertices @ [1.0, 0.5, 0.2])[[100, 400]]]
     curve = nicmm.design_curve(ball, corners, order="shortest", method="variational").curves[0]
@@ -185,6 +187,7 @@ def test_another_component_is_outside_and_farthest(small_ball, ring):
     np.testing.assert_array_equal(field[len(alone) :], np.abs(field[: len(alone)]).max())
 
 
+@pytest.mark.slow
 def test_numbers_of_vertices_and_faces_do_not_matter(body):
     points = random_surface_points(body, 4, seed=3)
     design = nicmm.design_curve(body, points, order="shortest", method="variational")

@@ -131,6 +131,7 @@ def test_a_move_to_and_fro_over_a_fold_comes_back(square, surface):
     np.testing.assert_allclose(back.positions[2:-2], nodes.positions[2:-2], atol=1e-3 * STEP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rings", [16, 32])
 @pytest.mark.parametrize("seed", range(4))
 def test_on_a_degraded_disc_it_is_the_curve_of_the_clean_one(rings, seed):

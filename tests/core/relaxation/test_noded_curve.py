@@ -85,6 +85,7 @@ def test_the_first_control_point_is_the_first_node(ball):
     )
 
 
+@pytest.mark.slow
 def test_control_points_at_vertices_are_there_once(ball):
     curve = nicmm.design_curve(ball, [12, 80, 41], method="variational").curves[0]
     exact = noded_curve(surface_of(ball), curve, 64)
@@ -138,6 +139,7 @@ def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
     assert np.linalg.norm(outwards.positions, axis=1).max() < factor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", [None, 3])
 def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed):
@@ -182,6 +184,7 @@ def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
     assert again.surface_curve(ball).length == pytest.approx(length, rel=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(st.integers(0, 10_000))
 def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_disc, seed):

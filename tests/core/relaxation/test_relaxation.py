@@ -202,6 +202,7 @@ def test_an_open_curve_through_three_points_ends_without_curvature(flat_disc):
     assert curvature[38:43].max() < 2.0 * curvature[30]
 
 
+@pytest.mark.slow
 def test_legs_along_edges_and_through_vertices_are_no_trouble():
     """A square whose corners are vertices of a grid."""
     mesh = grid(8)
@@ -278,6 +279,7 @@ def test_obstacles_are_avoided(flat_disc):
     assert np.abs(straight.curve.points[:, 1]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_a_flat_map_is_a_tension(flat_disc):
     """Of (φ_fea² - 1) τ_fea, so φ_fea = 1 is none; 3 times a weight is 3/4 of four times that."""
     start = star(flat_disc, controls=[0, 13, 22, 41])
@@ -422,6 +424,7 @@ def test_more_levels_end_at_the_same_curve(flat_disc):
     assert coarse.bending == pytest.approx(fine.bending, rel=0.02)
 
 
+@pytest.mark.slow
 def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
     """Exactly, each as it was given."""
     near = points_near(ball, [[0.2, 0.1, 1.0]])
@@ -442,6 +445,7 @@ def test_work_is_bounded_by_moves(flat_disc, work):
     assert result.stopped == "cap"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [41, 197])
 def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
     """Its nodes are spaced anew again and again, and steps over folds gain less than that costs."""

@@ -33,6 +33,7 @@ def some_vertices(mesh, count, seed):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nicmm", "nicmm-paper", "variational"])
 def test_every_method_goes_round(method):
     ball = shapes.sphere(4)
@@ -46,7 +47,7 @@ def test_every_method_goes_round(method):
 
 
 @pytest.mark.parametrize("closed", [True, False])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
 def test_no_length_inside_on_any_surface(surface, closed, seed):
     chosen = some_vertices(surface, 4, seed)
     free = nicmm.design_curve(surface, chosen, closed=closed, order="shortest").curves[0]
@@ -64,6 +65,7 @@ def test_no_length_inside_on_any_surface(surface, closed, seed):
     assert length_inside(surface, design.curves[0], weights) == 0.0
 
 
+@pytest.mark.slow
 def test_lower_weights_may_be_crossed():
     ball = shapes.sphere(4)
     # A belt round the equator that the curve has to cross twice.
@@ -84,6 +86,7 @@ def test_a_point_inside_is_named():
         nicmm.design_curve(ball, chosen, obstacles=np.ones(len(ball.vertices)))
 
 
+@pytest.mark.slow
 def test_clearance_keeps_the_curve_away():
     ball = shapes.sphere(4)
     chosen = nearest_vertices(ball, [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
@@ -104,6 +107,7 @@ def test_clearance_keeps_the_curve_away():
             nicmm.design_curve(ball, chosen, obstacles=weights, clearance=wrong)
 
 
+@pytest.mark.slow
 def test_dragging_beside_an_obstacle_goes_on_from_the_last_curve(monkeypatch):
     predictions = []
     predicted = surface_designer.predicted

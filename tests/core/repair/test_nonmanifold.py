@@ -32,7 +32,7 @@ def first_repair(mesh):
     return repairs_of(mesh)[0]
 
 
-@pytest.mark.parametrize("request_number", [0, 3])
+@pytest.mark.parametrize("request_number", [0, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", MESHES)
 def test_a_good_curve_unless_an_error_is_due(name, request_number):
     outcome = corpus.outcome(corpus.Item(corpus.GENERATED, name, None, request_number))
@@ -151,6 +151,7 @@ def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     np.testing.assert_array_equal(mesh.faces, before[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fins", "caps"])
 def test_maps_and_via_points_reach_the_copy(name):
     mesh = MESHES[name]
@@ -225,7 +226,9 @@ class TestOpenEdgesAtOnePlace:
             ball.vertices[ball.faces].reshape(-1, 3), np.arange(ball.faces.size).reshape(-1, 3)
         )
 
-    @pytest.mark.parametrize("method", ["nicmm", "variational"])
+    @pytest.mark.parametrize(
+        "method", ["nicmm", pytest.param("variational", marks=pytest.mark.slow)]
+    )
     def test_a_soup_has_the_curve_of_the_surface_that_it_is(self, ball, soup, method):
         faces = np.array([3, 100, 400, 900])
         points = nicmm.SurfacePoints(faces, np.tile([0.2, 0.3, 0.5], (4, 1)))
@@ -302,6 +305,7 @@ class TestEdgesOfManyFaces:
         design = nicmm.design_curve(mesh, chosen, order="shortest", closed=False)
         assert not judge(mesh, design, chosen, closed=False, order="shortest").faults
 
+    @pytest.mark.slow
     def test_any_of_four_faces_at_one_edge(self):
         mesh = nicmm.Mesh(
             [[0, 0, -0.5], [0, 0, 0.5], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]],
