@@ -3,7 +3,7 @@
 """Demo, tests and packages of NICMM Curves; needs Python 3.11 and nothing else.
 
     python3 build.py demo      draw curves on Suzanne in headless Blender and render them
-    python3 build.py test      run every check
+    python3 build.py test      run every check; with --quick all but the slow tests
     python3 build.py package   build the installable zips
 
 Each command makes `.venv/` on its first run and installs requirements.txt into it.

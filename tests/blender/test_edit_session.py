@@ -125,7 +125,9 @@ def test_inserted_point_is_dragged_from_there(parts):
     assert_passes(session)
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize(
+    "number", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 5))]
+)
 @pytest.mark.parametrize("closed", [True, False])
 def test_remove(parts, number, closed):
     session = filled(parts, scenes.sphere(), closed=closed)

@@ -72,7 +72,9 @@ def distances(points, mesh_edges, place):
 
 @MODES
 @pytest.mark.parametrize("cut_faces", ["POLYGONS", "TRIANGLES"])
-@pytest.mark.parametrize("simplify", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize(
+    "simplify", [0.01, *(pytest.param(by, marks=pytest.mark.slow) for by in (0.0, 0.1))]
+)
 def test_edges_follow_the_curve(monkey, mode, cut_faces, simplify):
     before = len(monkey.data.polygons), euler(monkey), area(monkey)
     expected = scenes.points(drawn(monkey))
@@ -375,6 +377,7 @@ CONVERSIONS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", CONVERSIONS, ids=lambda settings: settings["output"])
 def test_converting_is_designing_with_that_output(monkey, settings):
     vertices = [73, 365, 74, 366]

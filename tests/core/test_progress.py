@@ -62,6 +62,7 @@ def modules_above():
     return names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_every_stage_asks_and_fractions_only_grow(at_every_checkpoint, name):
     mesh, points, arguments, stages = request_of(name)

@@ -15,8 +15,8 @@ from tests.core.checks import (
     assert_valid_curve,
     assert_valid_design,
     circle,
-    nearest_vertices,
 )
+from tests.oracles.named_curves import nearest_vertices
 
 ANGLES = np.array([0.0, 1.3, 2.5, 3.6, 5.0])
 HEIGHTS = np.array([0.1, -0.2, 0.15, 0.0, -0.1])

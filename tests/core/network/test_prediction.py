@@ -38,6 +38,7 @@ def run(network, problem, watch=None, weights=WEIGHTS, **settings):
     return predict(network, problem, weights, PredictionConfig(**settings), watch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [1, 2, 5, 20])
 def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     start = run(network, problem, iterations=1)

@@ -54,7 +54,7 @@ def assert_simple_loop(mesh, points, order, working, loop, closed=True):
 
 
 @pytest.mark.parametrize("order", ["given", "shortest"])
-@pytest.mark.parametrize("count", [3, 5, 8])
+@pytest.mark.parametrize("count", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (5, 8))])
 def test_loops_through_random_vertices_are_simple(surface, count, order):
     for seed in range(3):
         inner = interior_vertices(surface)
@@ -64,6 +64,7 @@ def test_loops_through_random_vertices_are_simple(surface, count, order):
         assert_simple_loop(surface, points, order, working, loop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["given", "shortest"])
 def test_loops_through_points_in_faces_are_simple(surface, order):
     for seed in range(3):

@@ -32,7 +32,8 @@ def first_repair(mesh):
     return repairs_of(mesh)[0]
 
 
-@pytest.mark.parametrize("request_number", [0, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("request_number", [0, 3])
 @pytest.mark.parametrize("name", MESHES)
 def test_a_good_curve_unless_an_error_is_due(name, request_number):
     outcome = corpus.outcome(corpus.Item(corpus.GENERATED, name, None, request_number))
@@ -293,6 +294,7 @@ class TestOpenEdgesAtOnePlace:
 class TestEdgesOfManyFaces:
     """Where going straight on does not join the points."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(4))
     def test_octants_about_one_vertex(self, seed):
         """Every edge at it has four faces, and each curve needs other pairs of them."""
