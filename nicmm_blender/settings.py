@@ -1,74 +1,67 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a curve: one definition for the operator and for the sidebar panel."""
+"""The settings of a curve, for the operators and the sidebar: options of the core, and outputs."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
+from ..nicmm_core.options import OPTIONS, Kind
 from .outputs import sticky_curves
+from .scene import curve_record
+
+AUTOMATIC = (
+    "AUTO",
+    "Automatic",
+    "As selected where Blender knows the order of all selected vertices, otherwise the shortest "
+    "way round",
+)
+"""An order of Blender's own, before those of the core."""
+
+
+def properties_of(options) -> dict:
+    """Blender's properties for options of the core, by name; those of points have none."""
+    return {
+        curve_record.property_name(option): _property(option)
+        for option in options
+        if option.kind is not Kind.POINTS
+    }
+
+
+def _property(option):
+    """A Blender property for an option of the core."""
+    words = {"name": option.label, "description": option.description}
+    if option.kind is Kind.SWITCH:
+        return BoolProperty(**words, default=option.default)
+    if option.kind is Kind.CHOICE:
+        items = [
+            (curve_record.identifier(each.name), each.label, each.description)
+            for each in option.choices
+        ]
+        if option.name == "order":
+            items.insert(0, AUTOMATIC)
+            return EnumProperty(**words, items=items, default="AUTO")
+        return EnumProperty(**words, items=items, default=curve_record.identifier(option.default))
+    if option.kind is Kind.WEIGHTS:
+        words["description"] += ": a vertex group. Leave empty for none"
+        return StringProperty(**words)
+    names, values = ("min", "max", "soft_min", "soft_max"), (*option.limits, *option.usual)
+    limits = {
+        name: value for name, value in zip(names, values, strict=True) if value < float("inf")
+    }
+    subtype = "DISTANCE" if option.kind is Kind.LENGTH else "NONE"
+    return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
 
 
 class DesignProperties:
-    """What the operator and the scene's settings have in common."""
+    """What the operator and the scene's settings have in common: the options of the core."""
 
-    closed: BoolProperty(
-        name="Closed",
-        description="Lead the curve from the last control point back to the first, or end it there",
-        default=True,
-    )
-    order: EnumProperty(
-        name="Order",
-        description="How the curve visits the selected vertices",
-        items=(
-            (
-                "AUTO",
-                "Automatic",
-                "As selected where Blender knows the order of all selected vertices, "
-                "otherwise the shortest way round",
-            ),
-            ("GIVEN", "As Selected", "In the order in which the vertices were clicked"),
-            ("SHORTEST", "Shortest", "The shortest way round"),
-        ),
-        default="AUTO",
-    )
-    method: EnumProperty(
-        name="Method",
-        description="How the curve is computed",
-        items=(
-            ("NICMM", "NICMM", "The default method"),
-            (
-                "NICMM_PAPER",
-                "NICMM (Paper)",
-                "The method exactly as the paper describes it. Needs PyTorch",
-            ),
-            ("VARIATIONAL", "Variational", "The same energy without a network"),
-        ),
-        default="NICMM",
-    )
-    smoothness: FloatProperty(
-        name="Smoothness",
-        description="Weight of a fair curve against a short one, relative to the usual balance",
-        default=1.0,
-        min=0.001,
-        soft_min=0.1,
-        soft_max=10.0,
-    )
-    obstacle_group: StringProperty(
-        name="Obstacles",
-        description=(
-            "Vertex group whose weights keep the curve away; where the weight is 1 the curve never "
-            "enters. Leave empty for none"
-        ),
-    )
-    clearance: FloatProperty(
-        name="Clearance",
-        description="Distance along the surface that the curve keeps from obstacles of weight 1",
-        subtype="DISTANCE",
-        default=0.0,
-        min=0.0,
-    )
-    alignment_group: StringProperty(
-        name="Alignment",
-        description="Vertex group whose weights attract the curve. Leave empty for none",
+    __annotations__ = properties_of(OPTIONS)
+
+
+class EditingProperties:
+    """What can be asked of a curve that is being edited: its points have an order already."""
+
+    __annotations__ = properties_of(
+        option for option in OPTIONS if option.name not in ("order", "method")
     )
 
 

@@ -158,8 +158,10 @@ def _place(fraction: float, count: int) -> int:
 
 def reporting(operator, work):
     """Do an operator's work; what it cannot do becomes a report that says what would mend it."""
+    from ... import nicmm_core as nicmm
+
     try:
-        from ... import nicmm_core as nicmm
+        nicmm.Designer  # noqa: B018 - loads the core with its libraries
     except ImportError as error:
         return _cancelled(
             operator,

@@ -7,11 +7,12 @@ points are kept so too, with what else the curve was asked for, so that it can b
 """
 
 import hashlib
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, field, fields, make_dataclass
 
 import bpy
 import numpy as np
 
+from ...nicmm_core.options import OPTIONS, Kind
 from . import mesh_data
 from .mesh_data import InputError
 
@@ -21,16 +22,61 @@ VERSION = 1
 DESIGNED_ON = "nicmm_designed_on"
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What a curve is asked for, besides its control points; see `settings.DesignProperties`."""
+def identifier(name: str) -> str:
+    """A choice of the core as Blender writes it."""
+    return name.upper().replace("-", "_")
 
-    closed: bool = True
-    method: str = "NICMM"
-    smoothness: float = 1.0
-    obstacle_group: str = ""
-    clearance: float = 0.0
-    alignment_group: str = ""
+
+def property_name(option) -> str:
+    """What Blender calls an option of the core: weights are those of a vertex group."""
+    return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
+
+
+def _default(option):
+    """The value of a Blender property that nobody has set."""
+    if option.kind is Kind.WEIGHTS:
+        return ""
+    if option.kind is Kind.CHOICE:
+        return identifier(option.default)
+    return option.default
+
+
+RECORDED = tuple(
+    option for option in OPTIONS if option.kind is not Kind.POINTS and option.name != "order"
+)
+"""Options that a record keeps; its control points are in the order visited."""
+
+Asked = make_dataclass(
+    "Asked",
+    [
+        (property_name(option), type(_default(option)), field(default=_default(option)))
+        for option in RECORDED
+    ],
+    frozen=True,
+    namespace={"__doc__": "What a curve is asked for, besides its control points."},
+)
+
+
+def groups_of(asked: Asked) -> list:
+    """The vertex groups that a curve depends on."""
+    names = [property_name(option) for option in RECORDED if option.kind is Kind.WEIGHTS]
+    return [getattr(asked, name) for name in names]
+
+
+def arguments_of(asked: Asked, weights) -> dict:
+    """Options as the core takes them; `weights` gives those of a vertex group, None for no name."""
+    values = {}
+    for option in RECORDED:
+        value = getattr(asked, property_name(option))
+        if option.kind is Kind.WEIGHTS:
+            value = weights(value)
+        elif option.kind is Kind.CHOICE:
+            value = value.lower().replace("_", "-")
+        values[option.name] = value
+    for option in RECORDED:
+        if option.needs and values[option.needs] is None:
+            values[option.name] = option.default
+    return values
 
 
 def asked_by(properties) -> Asked:
@@ -74,7 +120,7 @@ def digest(mesh_object, surface, asked: Asked) -> str:
     found = hashlib.blake2b(repr(asked).encode(), digest_size=16)
     found.update(surface.solved.tobytes())
     found.update(surface.faces.tobytes())
-    for name in (asked.obstacle_group, asked.alignment_group):
+    for name in groups_of(asked):
         if name in mesh_object.vertex_groups:
             found.update(mesh_data.group_weights(mesh_object, name).tobytes())
     return found.hexdigest()

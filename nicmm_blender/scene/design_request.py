@@ -18,7 +18,7 @@ from .curve_record import Asked
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points` are control points as the core takes them and `order` is the core's; `moved` of the
+    `points` are control points and `options` options as the core takes them; `moved` of the
     points are not where they were when the curve was designed before.
     """
 
@@ -29,8 +29,7 @@ class DesignRequest:
     points: object
     order: str
     asked: Asked
-    obstacles: np.ndarray | None
-    alignment: np.ndarray | None
+    options: dict
     moved: int = 0
 
     def mesh_object(self):
@@ -68,8 +67,9 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
         points=points,
         order=order,
         asked=asked,
-        obstacles=mesh_data.group_weights(mesh_object, asked.obstacle_group),
-        alignment=mesh_data.group_weights(mesh_object, asked.alignment_group),
+        options=curve_record.arguments_of(
+            asked, lambda name: mesh_data.group_weights(mesh_object, name)
+        ),
     )
 
 
@@ -87,15 +87,7 @@ def answer(request: DesignRequest, progress):
     with designers.lent(request.surface.solved, request.surface.faces) as designer:
         try:
             return designer.design(
-                request.points,
-                closed=asked.closed,
-                order=request.order,
-                method=asked.method.lower().replace("_", "-"),
-                obstacles=request.obstacles,
-                alignment=request.alignment,
-                clearance=0.0 if request.obstacles is None else asked.clearance,
-                smoothness=asked.smoothness,
-                progress=progress,
+                request.points, order=request.order, progress=progress, **request.options
             )
         except nicmm.MissingPackageError:
             raise

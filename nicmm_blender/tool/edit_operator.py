@@ -61,10 +61,7 @@ HINTS = (
 )
 
 
-_DESIGN = settings.DesignProperties.__annotations__
 _OUTPUT = settings.OutputProperties.__annotations__
-
-ASKED_NAMES = ("closed", "smoothness", "obstacle_group", "clearance", "alignment_group")
 
 
 class NICMM_PG_control_point(bpy.types.PropertyGroup):
@@ -77,18 +74,13 @@ class NICMM_PG_control_point(bpy.types.PropertyGroup):
     )
 
 
-class NICMM_OT_edit_curve(bpy.types.Operator):
+class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     """Draw a curve on the surface of the mesh point by point, or edit one that was drawn before"""
 
     bl_idname = "nicmm.edit_curve"
     bl_label = "Edit Curve on Surface"
     bl_options = {"REGISTER", "UNDO"}
 
-    closed: _DESIGN["closed"]
-    smoothness: _DESIGN["smoothness"]
-    obstacle_group: _DESIGN["obstacle_group"]
-    clearance: _DESIGN["clearance"]
-    alignment_group: _DESIGN["alignment_group"]
     output: bpy.props.EnumProperty(
         name="Output",
         description="What a new curve becomes",
@@ -167,7 +159,7 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
             asked = curve_record.asked_of(edited)
         given = {
             name: getattr(self, name)
-            for name in ASKED_NAMES
+            for name in settings.EditingProperties.__annotations__
             if self.properties.is_property_set(name)
         }
         return replace(asked, method="NICMM", **given)
@@ -388,7 +380,7 @@ class NICMM_OT_edit_curve(bpy.types.Operator):
         if missing:
             raise mesh_data.InputError(missing)
         made = keep(context, opened, edited, self)
-        for name in ASKED_NAMES:
+        for name in settings.EditingProperties.__annotations__:
             setattr(self, name, getattr(session.asked, name))
         self.points.clear()
         for position in session.positions():

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..scene import curve_record
 from ..scene.curve_record import Asked
 from ..scene.mesh_data import InputError, in_words
 
@@ -311,7 +312,7 @@ class EditSession:
         """The core's design, or None where it has none; `problem` says why."""
         self.state = replace(self.state, problem="")
         try:
-            return self.designer.design(self.points, closed=self.closed, **self._maps(), **bounds)
+            return self.designer.design(self.points, **self._options(), **bounds)
         except self._nicmm.CurveError:
             raise
         except (self._nicmm.NicmmError, InputError) as error:
@@ -331,14 +332,10 @@ class EditSession:
             converged=self.resting,
         )
 
-    def _maps(self) -> dict:
-        obstacles = self._weights_of(self.asked.obstacle_group)
-        return {
-            "obstacles": obstacles,
-            "alignment": self._weights_of(self.asked.alignment_group),
-            "clearance": 0.0 if obstacles is None else self.asked.clearance,
-            "smoothness": self.asked.smoothness,
-        }
+    def _options(self) -> dict:
+        """The options of the core; points in the order given, and its method that goes on."""
+        options = curve_record.arguments_of(self.asked, self._weights_of)
+        return {**options, "closed": self.closed, "method": "nicmm"}
 
     def _weights_of(self, name: str) -> np.ndarray | None:
         if name not in self._weights:

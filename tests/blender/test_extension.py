@@ -37,7 +37,11 @@ assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
 REPORT = """
 loaded = {name.partition(".")[0] for name in sys.modules}
 addon_utils.disable("bl_ext.user_default.nicmm_curves", default_set=True)
-core = [name for name in sys.modules if ".nicmm_core" in name]
+core = [
+    name
+    for name in sys.modules
+    if ".nicmm_core." in name and not name.endswith(".nicmm_core.options")
+]
 print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}), *(["core"] if core else []))
 """
 
@@ -156,3 +160,22 @@ def test_works_after_enabling_again(empty_scene, location):
     scenes.select(sphere, scenes.ring(sphere, 3))
     assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
     assert np.isfinite(scenes.points(scenes.curves()[0])).all()
+
+
+def test_properties_follow_the_options_of_the_core(empty_scene):
+    """Every option is a property of the operators; one that is added to the table would be too."""
+    table = import_module(f"{empty_scene.name}.nicmm_core.options")
+    settings = import_module(f"{empty_scene.name}.nicmm_blender.settings")
+    record = import_module(f"{empty_scene.name}.nicmm_blender.scene.curve_record")
+    designing = bpy.ops.nicmm.design_curve.get_rna_type().properties
+    editing = bpy.ops.nicmm.edit_curve.get_rna_type().properties
+    for option in table.OPTIONS:
+        if option.kind is table.Kind.POINTS:
+            continue
+        name = record.property_name(option)
+        assert designing[name].name == option.label
+        assert (name in editing) == (option.name not in ("order", "method"))
+        assert (name in record.Asked.__dataclass_fields__) == (option.name != "order")
+    added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
+    made = settings.properties_of((*table.OPTIONS, added))["torsion"]
+    assert made.keywords["default"] == 2.0 and made.keywords["max"] == 5.0

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,7 +45,8 @@ def test_program_writes_the_curve_that_the_function_gives(mesh_file, tmp_path):
     result = as_program(
         "design", mesh_file, "--points", CHOSEN, "-o", "curve.json", folder=tmp_path
     )
-    assert (result.returncode, result.stderr) == (0, "")
+    assert result.returncode == 0
+    assert re.fullmatch(r"3 points, length [\d.]+, converged: curve\.json\n", result.stderr)
     data = json.loads((tmp_path / "curve.json").read_text())
     arrays = {name: np.array(data[name]) for name in data if name != "closed"}
     mesh = read_mesh(mesh_file)
