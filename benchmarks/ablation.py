@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nicmm_core.design_result import is_one_curve
+from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork
+from nicmm_core.status import Status
 
 from . import collections, report
 from .scale import Scale
@@ -206,7 +207,7 @@ def _early_stops(
                 Stop(
                     iterations=prediction.iterations,
                     loss=min(prediction.losses),
-                    early=prediction.stopped == "converged",
+                    early=prediction.status == Status.CONVERGED,
                     one_loop=is_one_curve(level_set(sample, prediction.field)),
                 )
             )

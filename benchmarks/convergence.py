@@ -12,6 +12,7 @@ from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.status import Status
 
 from . import collections, plots, renders, report
 from .scale import Scale
@@ -107,11 +108,11 @@ def _followed(network: CurveNetwork, sample: Sample) -> Course:
         network, sample.problem, sample.weights, without_early_stop(LATER[-1]), watch
     ).losses
     outcomes = [designed_curve(sample, fields[iteration]) for iteration in wanted]
-    print(f"  {sample.name}: {early.stopped} at {early.iterations}", flush=True)
+    print(f"  {sample.name}: {early.status} at {early.iterations}", flush=True)
     return Course(
         sample=sample,
         stop=early.iterations,
-        early=early.stopped == "converged",
+        early=early.status == Status.CONVERGED,
         losses=losses,
         curves=[curve for curve, _ in outcomes],
         by_itself=[by_itself for _, by_itself in outcomes],

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import IntArray
-from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.distances import distances
 from tests.oracles.perturbation import (

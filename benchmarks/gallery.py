@@ -12,9 +12,8 @@ from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import FloatArray, IntArray
-from nicmm_core.geometry.curve import SurfaceCurve, resample
+from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve, resample
 from nicmm_core.geometry.mesh import Mesh, unique_edges
 from nicmm_core.io.files import read_mesh
 from nicmm_core.level_set.features import vertex_normals

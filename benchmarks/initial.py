@@ -9,9 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
-from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import FloatArray
-from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.features import BASE_CHANNELS

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.design_result import is_one_curve
+from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, report

@@ -29,6 +29,7 @@ from nicmm_core.network.forward_pass import NetworkWeights
 from nicmm_core.network.single_pass import predict_once
 from nicmm_core.network.trainable_network import network_weights
 from nicmm_core.network.weights_file import shipped_weights
+from nicmm_core.status import Status
 
 from . import collections, plots, report
 from .guarantee import NEARLY_STRAIGHT
@@ -200,7 +201,7 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
     predicted: list[tuple[Mesh, ZeroSet]] = []
 
     def solution(weights: NetworkWeights, problem: Problem) -> Solution:
-        return Solution(field(problem), {}, [], "converged")
+        return Solution(field(problem), {}, [], Status.CONVERGED)
 
     def collected(mesh: Mesh, problem: Problem, phi: FloatArray) -> ZeroSet:
         predicted.append((mesh, zero_set(mesh, problem, phi)))

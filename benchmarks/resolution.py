@@ -11,9 +11,8 @@ from matplotlib.ticker import NullLocator
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import IntArray
-from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.distances import distances
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.design_result import is_one_curve
 from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, plots, report

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from .design import Designer as Designer
     from .design import design_curve as design_curve
     from .design_result import Design as Design
-    from .design_result import Status as Status
     from .errors import ArgumentError as ArgumentError
     from .errors import ControlPointError as ControlPointError
     from .errors import CurveError as CurveError
@@ -34,16 +33,14 @@ if TYPE_CHECKING:
     from .outputs.parts import part_mesh as part_mesh
     from .outputs.region import Region as Region
     from .outputs.region import enclosed_region as enclosed_region
+    from .status import Status as Status
 
 _NAMES = {
     "design": (
         "Designer",
         "design_curve",
     ),
-    "design_result": (
-        "Design",
-        "Status",
-    ),
+    "design_result": ("Design",),
     "errors": (
         "ArgumentError",
         "ControlPointError",
@@ -76,6 +73,7 @@ _NAMES = {
         "Region",
         "enclosed_region",
     ),
+    "status": ("Status",),
 }
 """What each module gives to the package."""
 

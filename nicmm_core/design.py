@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import check_iterations, check_torch, checked_options
-from .design_result import Design, Status, cancelled_design
+from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
@@ -35,6 +35,7 @@ from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
 from .repaired_surface import RepairedSurface, design_on_original, start_on
 from .request import Request, same_request
+from .status import Status
 from .surface_designer import SurfaceDesigner
 
 PARTS = (

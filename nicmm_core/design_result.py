@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -12,36 +11,7 @@ from .errors import CurveError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .start import Resumable
-
-
-class Status(enum.Enum):
-    """How a design ended; ``str()`` says what to change."""
-
-    CONVERGED = "converged: one curve through all control points"
-    ITERATION_LIMIT = (
-        "stopped at the iteration limit before the energy converged; the curve is usable, a finer "
-        "mesh, one without defects, or other control points may make it fairer"
-    )
-    DIVERGED = (
-        "the energy left the range of numbers and the best curve before is returned; look for "
-        "faces without area, or merge vertices by distance"
-    )
-    UNRELAXED = (
-        "strands of the curve are so close to one another that it is returned as the level set "
-        "gives it; use a finer mesh, fewer points or another order"
-    )
-    CANCELLED = (
-        "cancelled by the progress function; the curve, if there was one already, is the best so "
-        "far, and the same request gives the whole one"
-    )
-    NOT_ONE_CURVE = (
-        "the level set is not one simple curve through all control points; the mesh may be too "
-        "coarse there: subdivide it, or use the method 'nicmm', which always gives one"
-    )
-
-    def __str__(self) -> str:
-        """What happened and what to change."""
-        return self.value
+from .status import Status
 
 
 @dataclass(frozen=True)
@@ -93,16 +63,6 @@ class Design:
         return self.find_field()
 
 
-STATUS = {
-    "converged": Status.CONVERGED,
-    "cap": Status.ITERATION_LIMIT,
-    "cancelled": Status.CANCELLED,
-    "diverged": Status.DIVERGED,
-    "unrelaxed": Status.UNRELAXED,
-}
-"""What the reason of a solver's stop means for the design."""
-
-
 def cancelled_design(seconds: float) -> Design:
     """A design that was cancelled before there was a curve."""
 
@@ -121,10 +81,3 @@ def cancelled_design(seconds: float) -> Design:
         breaking_vertices=0,
         find_field=no_field,
     )
-
-
-def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
-    """Whether curves are a single one, closed or open, through all control points."""
-    if len(curves) != 1 or curves[0].closed != closed:
-        return False
-    return bool((curves[0].control_index >= 0).all())

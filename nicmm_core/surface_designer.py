@@ -12,7 +12,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
-from .design_result import STATUS, Design, Status
+from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
@@ -34,6 +34,7 @@ from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import WARM
 from .request import Request
 from .start import Resumable, moved_start
+from .status import Status
 
 STARTED = 0.6
 """About how much of the time is over when relaxation begins."""
@@ -189,7 +190,7 @@ class SurfaceDesigner:
         energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
         collisions = COLLISIONS if relaxed.collided else max(start.collisions - 1, 0)
         return Design(
-            status=STATUS[relaxed.stopped],
+            status=relaxed.status,
             curves=[relaxed.curve],
             iterations=relaxed.iterations,
             seconds=time.perf_counter() - started,
@@ -205,7 +206,7 @@ class SurfaceDesigner:
         """The design that a level set is."""
         one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
         return Design(
-            status=STATUS[solution.stopped] if one else Status.NOT_ONE_CURVE,
+            status=solution.status if one else Status.NOT_ONE_CURVE,
             curves=zeros.curves,
             iterations=solution.iterations,
             seconds=time.perf_counter() - started,
@@ -268,7 +269,7 @@ class _FieldWatch:
         field = self.shown.field
         terms = loss_terms(energy_surface(self._problem), field)
         terms = {name: float(value) for name, value in terms.items()}
-        return Solution(field, terms, [], "cancelled")
+        return Solution(field, terms, [], Status.CANCELLED)
 
     def _show(self, field: FloatArray, iteration: int) -> FloatArray:
         zeros = zero_set(self._mesh, self._problem, field)

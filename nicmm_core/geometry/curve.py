@@ -64,6 +64,13 @@ def curve_on_mesh(
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
+def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
+    """Whether curves are a single one, closed or open, through all control points."""
+    if len(curves) != 1 or curves[0].closed != closed:
+        return False
+    return bool((curves[0].control_index >= 0).all())
+
+
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
     """The point some share of the way from one point of a curve to the next, in a face of both."""
     faces, barycentric, segment_faces = checked_curve(mesh, curve)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..geometry.array_types import FloatArray
+from ..status import Status
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Solution:
         The unweighted terms of the loss there.
     losses : list of float
         Total loss of every iteration.
-    stopped : {"converged", "cap", "cancelled", "diverged"}
+    status : Status
     keeps_topology : bool
         Whether the zero set is known to be isotopic to that of φ₀.
     """
@@ -27,7 +28,7 @@ class Solution:
     field: FloatArray
     terms: dict[str, float]
     losses: list[float]
-    stopped: str
+    status: Status
     keeps_topology: bool = False
 
     @property

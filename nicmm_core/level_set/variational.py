@@ -18,6 +18,7 @@ from scipy import sparse
 
 from ..geometry.array_types import BoolArray, FloatArray
 from ..progress import checkpoint
+from ..status import Status
 from .losses import LossWeights, energy_surface, loss_terms
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
 from .problem import Problem
@@ -102,31 +103,31 @@ def solve(
     field = redistanced(surface, problem.initial_distance, controls, reach)
     best_field, losses, least = field, [], []
     damping = config.damping
-    stopped = "cap"
+    status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
         band = build_narrow_band(problem, field, config.half_width * h)
         losses.append(evaluate(band, weights, field[band.unknowns]).energy)
         if not np.isfinite(losses[-1]):
-            stopped = "diverged"
+            status = Status.DIVERGED
             break
         if losses[-1] <= min(losses):
             best_field = field
         least.append(min(losses))
         if watch is not None and not watch(iteration / config.iterations, best_field):
-            stopped = "cancelled"
+            status = Status.CANCELLED
             break
         if _rests(least, config):
-            stopped = "converged"
+            status = Status.CONVERGED
             break
         moved, damping = gauss_newton_step(problem, band, links, field, weights, damping, config)
         if moved is None:
-            stopped = "converged"
+            status = Status.CONVERGED
             break
         field = redistanced(surface, moved, controls, reach)
     field = redistanced(surface, best_field, controls)
     terms = loss_terms(energy_surface(problem), field)
     terms = {name: float(value) for name, value in terms.items()}
-    return Solution(field, terms, losses, stopped, keeps_topology=True)
+    return Solution(field, terms, losses, status, keeps_topology=True)
 
 
 def _rests(least: list[float], config: VariationalConfig) -> bool:

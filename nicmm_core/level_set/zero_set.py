@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design_result import is_one_curve
 from ..geometry.array_types import FloatArray
 from ..geometry.crossings import crossing_segments
-from ..geometry.curve import SurfaceCurve
+from ..geometry.curve import SurfaceCurve, is_one_curve
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from ..path.leg_search import length_factor

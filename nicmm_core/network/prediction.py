@@ -21,6 +21,7 @@ from ..level_set.losses import (
 )
 from ..level_set.problem import Problem
 from ..level_set.solution import Solution
+from ..status import Status
 from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .trainable_network import CurveNetwork
@@ -91,7 +92,7 @@ def predict(
     best_terms = dict.fromkeys(("sdf", "int", "smooth", "fea"), np.inf)
     energies: list[float] = []
     losses: list[float] = []
-    stopped = "cap"
+    status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
         optimiser.zero_grad()
         phi = network(given)  # (n,)
@@ -100,21 +101,21 @@ def predict(
         value = loss.item()
         losses.append(value)
         if not np.isfinite(value):
-            stopped = "diverged"
+            status = Status.DIVERGED
             break
         if value < best_loss:
             best_loss, best_terms = value, _as_floats(terms)
             best_field = phi.detach().cpu().numpy().astype(np.float64)
         energies.append(narrow_band_energy(surface, phi.detach(), weights, problem.edge_length))
         if watch is not None and not watch(iteration / config.iterations, best_field):
-            stopped = "cancelled"
+            status = Status.CANCELLED
             break
         if _may_stop(energies, config):
-            stopped = "converged"
+            status = Status.CONVERGED
             break
         loss.backward()
         optimiser.step()
-    return Solution(best_field, best_terms, losses, stopped)
+    return Solution(best_field, best_terms, losses, status)
 
 
 @torch.no_grad()

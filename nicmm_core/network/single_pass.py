@@ -15,6 +15,7 @@ from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
 from ..path.band_refinement import PIECES_TO_START
 from ..progress import part
 from ..request import Request
+from ..status import Status
 from .forward_pass import NetworkInput, NetworkWeights, Operations, level_set
 from .weights_file import shipped_weights
 
@@ -76,11 +77,11 @@ def predict_once(weights: NetworkWeights, problem: Problem) -> Solution:
     # Weights of a bad file may overflow; the check below says so.
     with np.errstate(over="ignore", invalid="ignore"):
         field = level_set(weights, network_input(problem), NUMPY).astype(np.float64)
-    stopped = "converged"
+    status = Status.CONVERGED
     if not np.isfinite(field).all():
-        field, stopped = problem.initial_distance, "diverged"
+        field, status = problem.initial_distance, Status.DIVERGED
     terms = loss_terms(energy_surface(problem), field)
-    return Solution(field, {name: float(value) for name, value in terms.items()}, [], stopped)
+    return Solution(field, {name: float(value) for name, value in terms.items()}, [], status)
 
 
 def network_input(problem: Problem) -> NetworkInput:

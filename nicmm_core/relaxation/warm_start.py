@@ -12,11 +12,15 @@ from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .levenberg_marquardt import StepConfig
 from .noded_curve import NodedCurve, drawn, is_simple, shifted
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(
-    levels=(512,), steps=1, longest_move=4.0, least_decrease=1e-3, defer_tracing=True
+    levels=(512,),
+    stepping=StepConfig(steps=1, longest_move=4.0),
+    least_decrease=1e-3,
+    defer_tracing=True,
 )
 """Relaxation from there: the curve has enough nodes and has nearly converged.
 

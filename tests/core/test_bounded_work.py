@@ -6,7 +6,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
-from nicmm_core.relaxation import noded_curve, relaxing
+from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
 from tests.oracles.checker import judge
 
 pytestmark = pytest.mark.slow
@@ -51,7 +51,7 @@ def test_a_fan_of_thousands_of_needles(monkeypatch):
     design = nicmm.design_curve(mesh, points)
     assert not judge(mesh, design, points).faults
     # One move may begin before the limit, which half of the faces, and a little more, may follow.
-    assert sum(passed) <= relaxing.FACES_OF_A_MOVE * WORK + 2 * count
+    assert sum(passed) <= levenberg_marquardt.FACES_OF_A_MOVE * WORK + 2 * count
 
 
 def test_forty_points_back_and_forth(monkeypatch):

@@ -11,6 +11,7 @@ from nicmm_core.level_set.problem import build_problem
 from nicmm_core.level_set.topology import breaking_vertices
 from nicmm_core.level_set.variational import VariationalConfig, solve
 from nicmm_core.level_set.vertex_links import VertexLinks
+from nicmm_core.status import Status
 from tests.core.checks import assert_valid_curve, assert_valid_design, circle
 from tests.oracles.named_curves import nearest_vertices
 
@@ -72,7 +73,7 @@ def test_loss_falls_far_and_the_loop_stays_one(body):
     points = locate_control_points(body, [5, 150, 300, 400], closed=True)
     problem = build_problem(body, points, "shortest")
     solution = solve(problem, LossWeights(), VariationalConfig())
-    assert solution.stopped == "converged"
+    assert solution.status == Status.CONVERGED
     assert solution.keeps_topology
     assert min(solution.losses) < 0.5 * solution.losses[0]
     links = VertexLinks(problem.working)
@@ -91,7 +92,7 @@ def test_stops_by_the_papers_rule(ball):
     assert len(losses) > config.patience
     assert min(losses[: -config.patience]) - min(losses) < config.tolerance
     capped = solve(problem, LossWeights(), VariationalConfig(iterations=3))
-    assert (capped.stopped, capped.iterations) == ("cap", 3)
+    assert (capped.status, capped.iterations) == (Status.ITERATION_LIMIT, 3)
 
 
 def test_can_be_watched_and_cancelled(ball):
@@ -105,7 +106,7 @@ def test_can_be_watched_and_cancelled(ball):
         return len(seen) < 4
 
     solution = solve(problem, LossWeights(), VariationalConfig(), watch)
-    assert solution.stopped == "cancelled"
+    assert solution.status == Status.CANCELLED
     assert seen == pytest.approx([0.01, 0.02, 0.03, 0.04])
 
 

@@ -25,6 +25,7 @@ from nicmm_core.network.forward_pass import (
 from nicmm_core.network.single_pass import NUMPY, network_input, predict_once
 from nicmm_core.network.trainable_network import TORCH, CurveNetwork, build_network, network_weights
 from nicmm_core.network.weights_file import load_weights, save_weights, shipped_weights
+from nicmm_core.status import Status
 from tests.core.checks import random_surface_points
 
 SMALL = NetworkConfig(width=8, depth=2, gate_rank=2)
@@ -246,7 +247,7 @@ def test_weights_without_numbers_give_the_initial_distance(problem):
         weights.parameters["head.weight"][:] = bad
         weights.parameters["head.bias"][:] = bad
         solution = predict_once(weights, problem)
-        assert solution.stopped == "diverged"
+        assert solution.status == Status.DIVERGED
         np.testing.assert_array_equal(solution.field, problem.initial_distance)
         assert all(np.isfinite(value) for value in solution.terms.values())
 
@@ -255,7 +256,7 @@ def test_single_pass_repeats_exactly(problem):
     first, second = (predict_once(load_weights(), problem) for _ in range(2))
     np.testing.assert_array_equal(first.field, second.field)
     assert first.terms == second.terms
-    assert (first.stopped, first.iterations) == ("converged", 0)
+    assert (first.status, first.iterations) == (Status.CONVERGED, 0)
 
 
 def assert_same_weights(first, second):

@@ -11,6 +11,7 @@ from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.prediction import PredictionConfig, narrow_band_energy, predict
 from nicmm_core.network.tensors import surface_tensors
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.status import Status
 
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
@@ -73,12 +74,12 @@ def test_stops_when_the_energy_has_been_still_for_the_patience(network, problem)
             fluctuation=1e9,
             threshold=-1.0,
         )
-        assert (result.stopped, result.iterations) == ("converged", expected)
+        assert (result.status, result.iterations) == (Status.CONVERGED, expected)
 
 
 def test_stops_at_once_when_the_energy_is_low_enough(network, problem):
     result = run(network, problem, fluctuation=-1.0, threshold=1e9)
-    assert (result.stopped, result.iterations) == ("converged", 1)
+    assert (result.status, result.iterations) == (Status.CONVERGED, 1)
 
 
 @pytest.mark.slow
@@ -92,7 +93,7 @@ def test_looser_fluctuation_stops_no_later(network, problem):
 
 def test_stops_at_the_cap(network, problem):
     result = run(network, problem, iterations=4, **NEVER)
-    assert (result.stopped, result.iterations) == ("cap", 4)
+    assert (result.status, result.iterations) == (Status.ITERATION_LIMIT, 4)
 
 
 def test_watch_cancels_and_sees_the_best_field(network, problem):
@@ -103,7 +104,7 @@ def test_watch_cancels_and_sees_the_best_field(network, problem):
         return len(seen) < 6
 
     result = run(network, problem, watch, iterations=50, **NEVER)
-    assert (result.stopped, result.iterations) == ("cancelled", 6)
+    assert (result.status, result.iterations) == (Status.CANCELLED, 6)
     fractions, losses = zip(*seen, strict=True)
     assert all(a < b for a, b in zip(fractions, fractions[1:], strict=False))
     assert 0.0 <= fractions[0] and fractions[-1] <= 1.0
@@ -113,7 +114,7 @@ def test_watch_cancels_and_sees_the_best_field(network, problem):
 
 def test_an_energy_without_value_diverges_to_the_initial_field(network, problem):
     result = run(network, problem, weights=LossWeights(smooth=float("nan")))
-    assert result.stopped == "diverged"
+    assert result.status == Status.DIVERGED
     np.testing.assert_array_equal(result.field, problem.initial_distance)
     assert set(result.terms) == {"sdf", "int", "smooth", "fea"}
 

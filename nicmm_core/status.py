@@ -1,0 +1,35 @@
+"""How a design ended."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Status(enum.Enum):
+    """How a design ended; ``str()`` says what to change."""
+
+    CONVERGED = "converged: one curve through all control points"
+    ITERATION_LIMIT = (
+        "stopped at the iteration limit before the energy converged; the curve is usable, a finer "
+        "mesh, one without defects, or other control points may make it fairer"
+    )
+    DIVERGED = (
+        "the energy left the range of numbers and the best curve before is returned; look for "
+        "faces without area, or merge vertices by distance"
+    )
+    UNRELAXED = (
+        "strands of the curve are so close to one another that it is returned as the level set "
+        "gives it; use a finer mesh, fewer points or another order"
+    )
+    CANCELLED = (
+        "cancelled by the progress function; the curve, if there was one already, is the best so "
+        "far, and the same request gives the whole one"
+    )
+    NOT_ONE_CURVE = (
+        "the level set is not one simple curve through all control points; the mesh may be too "
+        "coarse there: subdivide it, or use the method 'nicmm', which always gives one"
+    )
+
+    def __str__(self) -> str:
+        """What happened and what to change."""
+        return self.value
