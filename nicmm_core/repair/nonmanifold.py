@@ -65,7 +65,7 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     is_welded = number >= 2
     checkpoint()
     kept = usable
-    if mesh.has_nonmanifold_edges or is_welded:
+    if mesh.has_nonmanifold_edges or is_welded or _has_lone_twins(mesh):
         kept = kept[_without_twins(welded[mesh.faces[kept]])]
     sides = _Sides(mesh.faces[kept], welded)
     if not sides.branching:
@@ -105,6 +105,12 @@ def welded_vertices(mesh: Mesh) -> IntArray:
     first, place = distinct_rows(mesh.vertices[rim])
     welded[rim] = rim[first[place]]
     return welded
+
+
+def _has_lone_twins(mesh: Mesh) -> bool:
+    """Whether two faces have the same three corners, and their edges no other faces."""
+    across = mesh.face_neighbours
+    return bool(((across == np.roll(across, 1, axis=1)) & (across >= 0)).any())
 
 
 def _without_twins(faces: IntArray) -> IntArray:

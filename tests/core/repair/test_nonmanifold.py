@@ -320,3 +320,14 @@ class TestEdgesOfManyFaces:
         for points in ([2, 3, 4], [5, 3, 4, 2]):
             design = designer.design(points, order="shortest")
             assert not judge(mesh, design, points, order="shortest").faults
+
+
+def test_two_faces_with_the_same_corners_are_one(small_ball):
+    """Also where their edges have no other faces, so that they form a closed surface."""
+    for second in ([0, 1, 2], [1, 0, 2]):
+        corners = np.vstack([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], small_ball.vertices + 5.0])
+        mesh = nicmm.Mesh(corners, np.vstack([[[0, 1, 2], second], small_ball.faces + 3]))
+        weights = np.random.default_rng(0).dirichlet(np.ones(3), size=6)
+        points = nicmm.SurfacePoints(np.array([0, 1, 0, 1, 1, 0]), weights)
+        design = nicmm.design_curve(mesh, points, order="shortest")
+        assert not judge(mesh, design, points, True, "shortest").faults
