@@ -138,7 +138,6 @@ def build_coarse_mesh(
     areas = np.zeros(len(mesh.vertices))
     checkpoint()
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
-    checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     seed = _seeds(mesh, vertex_normals, areas, CANDIDATES * count, distance)
     graph = _edge_graph(mesh)
@@ -169,7 +168,6 @@ def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
 def _edge_graph(mesh: Mesh) -> sparse.csr_array:
     """Lengths of the edges, each in one place, shape (V, V)."""
     length = edge_lengths(mesh.vertices, mesh.edges)
-    checkpoint()
     size = len(mesh.vertices)
     return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
 
@@ -185,7 +183,6 @@ def _nearest_seeds(
     """
     n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
     along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]
-    checkpoint()
     bounds = np.quantile(along, np.linspace(0.0, 1.0, n_slabs + 1))
     if n_slabs == 1:
         margin = np.inf
@@ -194,7 +191,6 @@ def _nearest_seeds(
     number = np.cumsum(is_seed) - 1  # seeds are ascending
     nearest = np.full(len(vertices), -1)
     for low, high in itertools.pairwise(bounds):
-        checkpoint()
         near = np.flatnonzero((along >= low - margin) & (along <= high + margin))
         seeds = np.flatnonzero(is_seed[near])
         if not len(seeds):
@@ -207,7 +203,6 @@ def _nearest_seeds(
         )  # fmt: skip
         own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
         nearest[near[own]] = number[near[found[own]]]
-    checkpoint()
     return nearest
 
 
@@ -229,11 +224,9 @@ def _seeds(
     size = len(candidates)
     graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))
     graph = sparse.csr_array(graph + graph.T)
-    checkpoint()
     free = np.ones(size, dtype=bool)
     chosen = []
     for place in range(size):
-        checkpoint()
         if free[place]:
             chosen.append(place)
             free[graph.indices[graph.indptr[place] : graph.indptr[place + 1]]] = False

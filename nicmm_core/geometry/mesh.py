@@ -12,7 +12,7 @@ from scipy import sparse
 from ..errors import MeshError
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
-from .by_parts import components, grouped, parts
+from .grouping import components, grouped
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
@@ -49,7 +49,6 @@ class Mesh:
         self.vertices = _checked_vertices(vertices)
         checkpoint()
         self.faces = _checked_faces(faces, len(self.vertices))
-        checkpoint()
         if self.diagonal < SMALLEST:
             raise MeshError(
                 f"vertices of all faces lie within {self.diagonal:g}, as good as at one place; "
@@ -72,12 +71,9 @@ class Mesh:
     @cached_property
     def face_normals(self) -> FloatArray:
         """Unit normal of each face, shape (F, 3); zero where it has no area."""
-        normals = np.empty(self.faces.shape)
-        for part in parts(len(self.faces)):
-            normal = _area_vectors(self.vertices, self.faces[part])
-            length = np.linalg.norm(normal, axis=1, keepdims=True)
-            normals[part] = normal / np.where(length > 0.0, length, 1.0)
-        return normals
+        normal = _area_vectors(self.vertices, self.faces)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return normal / np.where(length > 0.0, length, 1.0)
 
     @cached_property
     def face_neighbours(self) -> IntArray:
@@ -99,16 +95,13 @@ class Mesh:
         across = self.face_neighbours
         checkpoint()
         face, corner = np.nonzero(across > np.arange(len(self.faces))[:, None])
-        checkpoint()
         of_two = np.stack([self.faces[face, corner - 2], self.faces[face, corner - 1]], axis=1)
         return np.concatenate([of_two, self.unpaired_edges[0]])
 
     @cached_property
     def unpaired_edges(self) -> tuple[IntArray, IntArray]:
         """Edges that one face has, or more than two, and how many; (e, 2) and (e,), ascending."""
-        checkpoint()
         face, corner = np.nonzero(self.face_neighbours < 0)
-        checkpoint()
         start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]
         size = len(self.vertices)
         return _edges(_edge_keys(start, end, size), size)
@@ -188,10 +181,7 @@ def real_array(values: ArrayLike) -> FloatArray:
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
-    areas = np.empty(len(faces))
-    for part in parts(len(faces)):
-        areas[part] = 0.5 * np.linalg.norm(_area_vectors(vertices, faces[part]), axis=1)
-    return areas
+    return 0.5 * np.linalg.norm(_area_vectors(vertices, faces), axis=1)
 
 
 def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -203,12 +193,7 @@ def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
     """Length of each edge, shape (E,)."""
-    lengths = np.empty(len(edges))
-    for part in parts(len(edges)):
-        checkpoint()
-        start, end = edges[part].T
-        lengths[part] = np.linalg.norm(vertices[start] - vertices[end], axis=1)
-    return lengths
+    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -243,7 +228,6 @@ def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
     """Edges that have some keys, (E, 2), and how often each is there, (E,)."""
     order, first, count = grouped(keys)
     distinct = keys[order[first]]
-    checkpoint()
     return np.stack([distinct // size, distinct % size], axis=1), count
 
 
@@ -252,7 +236,6 @@ def unoriented_vertices(faces: IntArray) -> IntArray:
     size = int(faces.max()) + 1
     checkpoint()
     start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-    checkpoint()
     order, first, count = grouped(start * size + end)
     twice = order[first[count > 1]]
     return np.unique([start[twice], end[twice]])
@@ -267,14 +250,12 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
         ) from error
     if checked.ndim != 2 or checked.shape[1] != 3:
         raise MeshError(f"vertices has shape {checked.shape}; pass positions of shape (V, 3)")
-    checkpoint()
     bad = ~np.isfinite(checked).all(axis=1)
     if bad.any():
         raise MeshError(
             f"vertices has {bad.sum()} positions that are NaN or infinite, the first at index "
             f"{bad.argmax()}; remove or repair them"
         )
-    checkpoint()
     if checked.size and np.abs(checked).max() > LARGEST:
         raise MeshError(
             f"vertices has coordinates up to {np.abs(checked).max():g}, with which nothing can be "

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.by_parts import components, grouped
+from ..geometry.grouping import components, grouped
 from ..geometry.mesh import Mesh, side_keys
 from ..progress import checkpoint
 
@@ -130,7 +130,6 @@ def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
         np.concatenate([start[one], end[one]]),
         np.concatenate([start[other], end[other]]),
     )
-    checkpoint()
     vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
     vertex_of_fan[fan] = faces.ravel()
     return fan.reshape(-1, 3), vertex_of_fan

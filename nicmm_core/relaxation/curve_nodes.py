@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.by_parts import FACES, parts
 from ..geometry.mesh import Mesh, unoriented_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..level_set.features import vertex_normals
@@ -80,8 +78,7 @@ def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
     Or across it, as every face does where the normal is zero.
     """
     folded = np.zeros(len(mesh.vertices), dtype=bool)
-    for block, facing in _facing(mesh, normals):
-        folded[mesh.faces[block][(facing <= 0.0).any(axis=1)]] = True
+    folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
     return np.flatnonzero(folded)
 
 
@@ -90,9 +87,7 @@ def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
 
     None is said to where faces of opposite orientation meet: signs of normals mean nothing there.
     """
-    folded = np.zeros(len(mesh.faces), dtype=bool)
-    for block, facing in _facing(mesh, normals):
-        folded[block] = facing.sum(axis=1) < 0.0
+    folded = _facing(mesh, normals).sum(axis=1) < 0.0
     if folded.any():
         mixed = np.zeros(len(mesh.vertices), dtype=bool)
         mixed[unoriented_vertices(mesh.faces)] = True
@@ -100,11 +95,10 @@ def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
     return folded if folded.any() else None
 
 
-def _facing(mesh: Mesh, normals: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-    """Cosines between the normals of faces and of their corners, (b, 3), block after block."""
-    for block in parts(len(mesh.faces), FACES):
-        checkpoint()
-        yield block, np.einsum("fcd,fd->fc", normals[mesh.faces[block]], mesh.face_normals[block])
+def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
+    """Cosines between the normals of faces and of their corners, (F, 3)."""
+    checkpoint()
+    return np.einsum("fcd,fd->fc", normals[mesh.faces], mesh.face_normals)
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.by_parts import FACES, components, parts
+from ..geometry.grouping import components
 from ..geometry.mesh import edge_lengths, unique_edges
 from ..progress import checkpoint
 
@@ -33,16 +33,14 @@ def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray
     -------
     (f,) bool array
     """
-    flat = np.zeros(len(faces), dtype=bool)
-    for block in parts(len(faces), FACES):
-        checkpoint()
-        corner = vertices[faces[block]]
-        sides = np.roll(corner, -1, axis=1) - corner
-        lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
-        twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        flat[block] = lengths[:, 0] <= short
-        flat[block] |= twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
-    return flat
+    checkpoint()
+    sides = vertices[np.roll(faces, -1, axis=1)]
+    sides -= vertices[faces]
+    checkpoint()
+    lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    without = twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
+    return without | (lengths[:, 0] <= short)
 
 
 def with_areas(
@@ -73,15 +71,11 @@ def with_areas(
     checkpoint()
     reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
     generator = np.random.default_rng(SEED)
-    vertices = vertices.copy()
     for _ in range(ATTEMPTS):
-        checkpoint()
         moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
         moves[faces[still]] = True
-        for block in parts(len(vertices), FACES):
-            checkpoint()
-            way = generator.uniform(-1.0, 1.0, start[block].shape) * reach[block, None]
-            vertices[block] = np.where(moves[block, None], start[block] + way, vertices[block])
+        move = generator.uniform(-1.0, 1.0, start.shape) * reach[:, None]
+        vertices = np.where(moves[:, None], start + move, vertices)
         still = flat_faces(vertices, faces, short)
         if not still.any():
             break
@@ -99,6 +93,5 @@ def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> Floa
     n_places, place = components(len(vertices), *edges[lengths <= short].T)
     shortest = np.full(n_places, np.inf)
     for end in edges[lengths > short].T:
-        checkpoint()
         np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.by_parts import grouped
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.grouping import grouped
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint

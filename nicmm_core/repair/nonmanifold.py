@@ -20,7 +20,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.by_parts import components, distinct_rows, grouped
+from ..geometry.grouping import components, distinct_rows, grouped
 from ..geometry.mesh import Mesh
 from ..progress import checkpoint
 from .degenerate_faces import flat_faces, with_areas
@@ -63,7 +63,6 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
         if (welded == np.arange(len(welded))).all():
             return None
     is_welded = number >= 2
-    checkpoint()
     kept = usable
     if mesh.has_nonmanifold_edges or is_welded or _has_lone_twins(mesh):
         kept = kept[_without_twins(welded[mesh.faces[kept]])]
@@ -96,12 +95,10 @@ def welded_vertices(mesh: Mesh) -> IntArray:
     are closed already, so closed surfaces that touch each other stay apart.
     """
     edges, count = mesh.unpaired_edges
-    checkpoint()
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
     on_rim[edges[count == 1]] = True
     rim = np.flatnonzero(on_rim)
     welded = np.arange(len(mesh.vertices))
-    checkpoint()
     first, place = distinct_rows(mesh.vertices[rim])
     welded[rim] = rim[first[place]]
     return welded
@@ -158,20 +155,16 @@ class _Sides:
         # welded to one, the vertices themselves decide.
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
-        checkpoint()
         vertices = faces.ravel()
         one = welded[vertices[first]]
-        checkpoint()
         other = welded[vertices[second]]
         checkpoint()
         swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
-        checkpoint()
         self._low = np.where(swapped, second, first)
         self._high = np.where(swapped, first, second)
         checkpoint()
         size = int(vertices.max()) + 1
         keys = np.minimum(one, other) * size + np.maximum(one, other)
-        checkpoint()
         nowhere = np.flatnonzero(one == other)  # such a side joins nothing
         keys[nowhere] = size * size + nowhere
         del one, other, swapped, first, second
@@ -181,7 +174,6 @@ class _Sides:
     def plain_pairs(self) -> IntArray:
         """Sides of edges that two faces have, shape (p, 2)."""
         first = self._first[self._count == 2]
-        checkpoint()
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
@@ -261,7 +253,6 @@ class _Sides:
         one, other = pairs.T
         checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
-        checkpoint()
         columns = np.concatenate([self._low[other], self._high[other]])
         n_labels, label = components(len(corner), rows, columns)
         source = np.zeros(n_labels, dtype=np.int64)
@@ -274,7 +265,6 @@ class _Sides:
         new = np.flatnonzero(number < 0)
         checkpoint()
         number[new] = n_vertices + np.arange(len(new))
-        checkpoint()
         vertex = np.concatenate([np.arange(n_vertices), source[new]])
         return number[label].reshape(-1, 3), vertex
 
@@ -308,7 +298,6 @@ def _with_areas(
     checkpoint()
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
     flat = flat_faces(vertices, faces, short)
-    checkpoint()
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
     origin = np.zeros(3)
@@ -321,5 +310,4 @@ def _with_areas(
         # Far from the origin a small move would be lost to rounding.
         origin = vertices[faces[0, 0]]
         vertices = with_areas(vertices - origin, faces, short, flat, doubled)
-    checkpoint()
     return MappedMesh(mesh, Mesh(vertices, faces), face, corners, place, original_place, origin)

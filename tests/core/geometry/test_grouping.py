@@ -1,4 +1,4 @@
-"""Part by part comes out what NumPy and SciPy find in one call."""
+"""Groups, rows and components are those that NumPy and SciPy find."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from scipy.sparse import csgraph
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_mesh
-from nicmm_core.geometry import by_parts, mesh
-from nicmm_core.geometry.by_parts import components, distinct_rows, grouped, stable_order
+from nicmm_core.geometry import grouping, mesh
+from nicmm_core.geometry.grouping import components, distinct_rows, grouped, stable_order
 from nicmm_core.geometry.surface_points import first_hits, nearest_points
 
 SEEDS = st.integers(0, 10_000)
@@ -19,7 +19,7 @@ SEEDS = st.integers(0, 10_000)
 
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch):
-    monkeypatch.setattr(by_parts, "PART", 7)
+    monkeypatch.setattr(grouping, "LARGE", 7)
 
 
 def some_keys(seed):
@@ -67,29 +67,22 @@ def test_components(seed):
     np.testing.assert_array_equal(label, expected)
 
 
-def test_no_call_gets_more_than_a_part(monkeypatch):
-    """Else a large mesh would hold up whoever wants to stop; and in between there is a question."""
+def test_large_arrays_are_sorted_by_parts(monkeypatch):
+    """So that a design can be cancelled in between."""
     sorted_at_once, asked = [], []
-    argsort, connected = np.argsort, csgraph.connected_components
+    argsort = np.argsort
 
     def watched_sort(keys, **arguments):
-        if keys.dtype != np.uint16:  # of parts' numbers, by radix
+        if keys.dtype != np.uint8:  # of parts' numbers, by radix
             sorted_at_once.append(len(keys))
         return argsort(keys, **arguments)
 
-    def watched_components(graph, directed):
-        sorted_at_once.append(graph.nnz)
-        return connected(graph, directed=directed)
-
     monkeypatch.setattr(np, "argsort", watched_sort)
-    monkeypatch.setattr(csgraph, "connected_components", watched_components)
-    monkeypatch.setattr(by_parts, "PART", 100)
-    monkeypatch.setattr(by_parts, "checkpoint", lambda: asked.append(1))
-    keys = np.random.default_rng(0).permutation(10_000)
-    stable_order(keys)
-    components(10_000, keys, keys[::-1])
-    assert len(sorted_at_once) == 200 <= len(asked)
-    assert max(sorted_at_once) < 160  # parts are of about the same size
+    monkeypatch.setattr(grouping, "LARGE", 1_000)
+    monkeypatch.setattr(grouping, "checkpoint", lambda: asked.append(1))
+    stable_order(np.random.default_rng(0).permutation(50_000))
+    assert len(sorted_at_once) == 50 < len(asked)
+    assert max(sorted_at_once) < 1_600  # parts are of about the same size
 
 
 @pytest.fixture
@@ -103,9 +96,9 @@ def bumpy():
 def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
     """All that a design does by parts on a large mesh, here on one of 5,120 faces."""
     points = [3, 700, 1500, 2400]
-    monkeypatch.setattr(by_parts, "PART", 10**9)
+    monkeypatch.setattr(grouping, "LARGE", 10**9)
     whole = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
-    monkeypatch.setattr(by_parts, "PART", 700)
+    monkeypatch.setattr(grouping, "LARGE", 700)
     monkeypatch.setattr(coarse_mesh, "SLAB", 600)
     in_parts = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
     np.testing.assert_array_equal(in_parts.curves[0].points, whole.curves[0].points)
