@@ -10,6 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+FEWEST_CLOSED, FEWEST_OPEN = 3, 2
+"""Control points of a closed and of an open curve at least."""
+
 
 class Kind(Enum):
     """What the value of an option is."""

@@ -16,6 +16,7 @@ from .. import preferences
 from ..scene import design_request, mesh_data
 from . import turns
 from .partial_curve import PartialCurve
+from .viewports import NAVIGATION
 
 TURN = 0.03
 """Seconds; about the time between two pictures of the window."""
@@ -23,22 +24,14 @@ TURN = 0.03
 LONGEST_TURN = 0.25
 """Seconds. Where the window takes longer to draw, turns are as long, so that work goes on."""
 
-# Turning the view is no change of what is being worked on.
-NAVIGATION = {
+PASSED_ON = NAVIGATION | {
     "MOUSEMOVE",
     "INBETWEEN_MOUSEMOVE",
-    "MIDDLEMOUSE",
-    "WHEELUPMOUSE",
-    "WHEELDOWNMOUSE",
     "WHEELINMOUSE",
     "WHEELOUTMOUSE",
-    "TRACKPADPAN",
-    "TRACKPADZOOM",
-    "MOUSEROTATE",
-    "MOUSESMARTZOOM",
-    "NDOF_MOTION",
     "WINDOW_DEACTIVATE",
 }
+"""Events that change nothing of what the operator works on."""
 
 
 # Operators that wait for their turns.
@@ -73,7 +66,7 @@ class LongSolves:
                 return reporting(self, lambda: self._end(context))
             self._show(context)
             return {"PASS_THROUGH"}
-        return {"PASS_THROUGH" if event.type in NAVIGATION else "RUNNING_MODAL"}
+        return {"PASS_THROUGH" if event.type in PASSED_ON else "RUNNING_MODAL"}
 
     def cancel(self, context):
         """Also called by Blender, when it opens another file or ends."""

@@ -3,6 +3,8 @@
 
 import bpy
 
+from . import viewports
+
 COLOUR = (1.0, 0.6, 0.1, 1.0)
 WIDTH = 2.0
 """Pixels, times the scale of the interface."""
@@ -19,12 +21,12 @@ class PartialCurve:
         """Show other points, (n, 3)."""
         positions = points.tolist()
         self._positions = positions + positions[:1] if closed else positions
-        redraw_viewports()
+        viewports.redraw()
 
     def remove(self) -> None:
         """Show nothing more."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")
-        redraw_viewports()
+        viewports.redraw()
 
     def _draw(self) -> None:
         import gpu
@@ -40,10 +42,3 @@ class PartialCurve:
         gpu.state.blend_set("ALPHA")
         batch.draw(shader)
         gpu.state.blend_set("NONE")
-
-
-def redraw_viewports() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()

@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 
 from .. import settings
-from ..operators import polls
+from ..operators import polls, viewports
 from ..operators.long_solves import reporting
+from ..operators.viewports import NAVIGATION, WHEEL
 from ..scene import curve_record, designers, mesh_data
 from ..scene.curve_record import Asked
 from .edit_overlay import Overlay
@@ -25,25 +26,16 @@ PAUSE = 0.15
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """How near the mouse has to be to a point and to the curve, in pixels at a scale of 1."""
 
-WHEEL = ("WHEELUPMOUSE", "WHEELDOWNMOUSE")
-
-NAVIGATION = {
-    "MIDDLEMOUSE",
-    *WHEEL,
-    "TRACKPADPAN",
-    "TRACKPADZOOM",
-    "MOUSEROTATE",
-    "MOUSESMARTZOOM",
+PASSED_ON = NAVIGATION | {
     "HOME",
     "ACCENT_GRAVE",
-    "NDOF_MOTION",
     *(f"NUMPAD_{digit}" for digit in range(10)),
     "NUMPAD_PERIOD",
     "NUMPAD_PLUS",
     "NUMPAD_MINUS",
     "NUMPAD_SLASH",
 }
-"""Events that Blender itself answers, so that the view can be turned while editing."""
+"""Events that Blender itself handles, so that the view can be turned while editing."""
 
 HINTS = (
     ("MOUSE_LMB", "Add, move, insert on the curve"),
@@ -193,7 +185,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         self._say(context)
         if self.at_mouse:
             self._press(context, event)
-        self._redraw(context)
+        viewports.redraw()
         return {"RUNNING_MODAL"}
 
     def _clicked(self, context, event) -> tuple | None:
@@ -222,7 +214,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             self._end(context)
             raise
         if result & {"FINISHED", "CANCELLED"}:
-            self._redraw(context)
+            viewports.redraw()
         return result
 
     def cancel(self, context):
@@ -250,7 +242,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._release(context)
             return {"RUNNING_MODAL"}
-        if event.type in NAVIGATION and not (event.type in WHEEL and event.ctrl):
+        if event.type in PASSED_ON and not (event.type in WHEEL and event.ctrl):
             return {"PASS_THROUGH"}
         if event.value not in {"PRESS", "DOUBLE_CLICK"}:
             return {"RUNNING_MODAL"}
@@ -340,7 +332,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             found = view.nearest_point(pixel, self._opened.session.positions(), reach)
         if found != self._overlay.hover:
             self._overlay.hover = found
-            self._redraw(context)
+            viewports.redraw()
 
     def _release(self, context) -> None:
         self._opened.session.drop()
@@ -371,7 +363,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         context.workspace.status_text_set(None)
         if self._area is not None:
             self._area.header_text_set(None)
-        self._redraw(context)
+        viewports.redraw()
 
     def _keep(self, context, opened, edited):
         """Write the curve of a session, and remember how it was made for the redo panel."""
@@ -424,13 +416,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
     def _show(self, context) -> None:
         self._say(context)
-        self._redraw(context)
-
-    def _redraw(self, context) -> None:
-        for window in context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D":
-                    area.tag_redraw()
+        viewports.redraw()
 
     def _say(self, context) -> None:
         session = self._opened.session

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
 from ..scene import curve_record
 from ..scene.curve_record import Asked
 from ..scene.mesh_data import InputError, in_words
@@ -27,8 +28,6 @@ SMOOTHER = 1.25
 """Factor of one step of smoothness."""
 
 SMOOTHNESS_LIMITS = (0.01, 100.0)
-
-FEWEST_CLOSED, FEWEST_OPEN = 3, 2
 
 
 @dataclass(frozen=True)

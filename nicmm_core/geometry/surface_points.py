@@ -12,12 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import ControlPointError, UnreachableError
+from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
-
-FEWEST_POINTS_CLOSED = 3
-FEWEST_POINTS_OPEN = 2
 
 
 @dataclass(frozen=True)
@@ -309,7 +307,7 @@ def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:
 
 
 def _check_count(count: int, closed: bool) -> None:
-    fewest = FEWEST_POINTS_CLOSED if closed else FEWEST_POINTS_OPEN
+    fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
     if count < fewest:
         kind = "a closed" if closed else "an open"
         raise ControlPointError(
