@@ -74,9 +74,8 @@ def run(scale: Scale) -> None:
     )  # fmt: skip
     body = (
         f"Seed {SEED}. CPU time between two places where a design asks whether to go on; the "
-        f"progress function itself is called at most every {progress.INTERVAL:g} s. What sorts, "
-        "groups or searches arrays of the size of the mesh does so by parts (`by_parts`); the "
-        "longest times are single calls of NumPy and libigl that pass over such arrays once.\n\n"
+        f"progress function itself is called at most every {progress.INTERVAL:g} s. The longest "
+        "times are single calls that pass over arrays of the size of the mesh.\n\n"
         + report.table(header, rows)
     )
     report.write_section("cancellation", "Cancelling", body, scale)
@@ -128,7 +127,7 @@ def _requests(
     yield "fins", fins, _drawn(fins, 5), {"order": "shortest"}
     ball = shapes.sphere(scale.choose(4, 4, 3))
     many = scale.choose(30, 20, 8)
-    yield f"{many} points to and fro", ball, _drawn(ball, many), {}
+    yield f"{many} points back and forth", ball, _drawn(ball, many), {}
     yield "variational", ball, _drawn(ball, 5), {"order": "shortest", "method": "variational"}
 
 

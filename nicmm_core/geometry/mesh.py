@@ -95,6 +95,7 @@ class Mesh:
         across = self.face_neighbours
         checkpoint()
         face, corner = np.nonzero(across > np.arange(len(self.faces))[:, None])
+        checkpoint()
         of_two = np.stack([self.faces[face, corner - 2], self.faces[face, corner - 1]], axis=1)
         return np.concatenate([of_two, self.unpaired_edges[0]])
 
@@ -188,6 +189,7 @@ def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Normals that are twice as long as the areas, shape (F, 3)."""
     checkpoint()
     corner = vertices[faces]
+    checkpoint()
     return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
 
 
