@@ -197,7 +197,6 @@ def _nearest_seeds(
             continue
         part = graph if len(near) == len(along) else graph[near][:, near]
         checkpoint()
-        checkpoint()
         _, _, found = csgraph.dijkstra(
             part, directed=False, indices=seeds, min_only=True, return_predecessors=True,
             limit=margin,
