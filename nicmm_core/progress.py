@@ -113,7 +113,7 @@ def checkpoint(done: float | None = None, points: Callable[[], FloatArray] | Non
 
 
 @contextlib.contextmanager
-def part(start: float, end: float) -> Iterator[None]:
+def subrange(start: float, end: float) -> Iterator[None]:
     """What is done in this block is one part of what is being done, by fractions of it."""
     watch = _watch.get()
     if watch is None:

@@ -25,7 +25,7 @@ from .maps.guidance import component_unit, feature_map
 from .network.single_pass import predicted
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
-from .progress import CancelledError, checkpoint, part
+from .progress import CancelledError, checkpoint, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface
 from .relaxation.elastic_energy import FEATURE_TENSION
@@ -100,11 +100,11 @@ class SurfaceDesigner:
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
             return self._designed(request, max_iterations, started)
-        with part(0.0, 0.3):
+        with subrange(0.0, 0.3):
             problem = requested_problem(self.mesh, request)
         watch = _FieldWatch(self.mesh, problem)
         try:
-            with part(0.3, 0.9):
+            with subrange(0.3, 0.9):
                 solution = self._solution(problem, request, watch)
             zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
         except CancelledError:
@@ -132,11 +132,11 @@ class SurfaceDesigner:
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """A relaxed curve that starts from a coarse mesh or the network."""
-        with part(0.0, STARTED):
+        with subrange(0.0, STARTED):
             start = self._start_from_coarse(request)
             if start is None:
                 start = self._start_from_network(request)
-        with part(STARTED, 1.0):
+        with subrange(STARTED, 1.0):
             config = RelaxationConfig() if request.alignment is None else GUIDED
             return self._relaxed(request, start, config, max_iterations, started)
 

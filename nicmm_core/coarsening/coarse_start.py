@@ -12,7 +12,7 @@ from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import predicted
-from ..progress import part
+from ..progress import subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
@@ -104,7 +104,7 @@ class CoarseStarts:
     def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        with part(COARSE_SHARE, 0.9):
+        with subrange(COARSE_SHARE, 0.9):
             zeros = predicted(coarse.mesh, on_coarse).zeros
         if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None

@@ -20,7 +20,7 @@ from ..path.band_refinement import PIECES
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
-from ..progress import checkpoint, part
+from ..progress import checkpoint, subrange
 from ..request import Request
 from .features import control_indicator, in_principal_frame, input_features, vertex_normals
 from .finite_elements import FiniteElements, build_finite_elements
@@ -138,7 +138,7 @@ def build_problem(
     if obstacles is not None or alignment is not None:
         width = component_unit(mesh, int(points.faces[0]))
         phi_fea = feature_map(mesh, obstacles, alignment, width)
-    with part(0.0, PATH_SHARE):
+    with subrange(0.0, PATH_SHARE):
         working, loop = build_initial_loop(mesh, points, order, phi_fea, closed, via_points, pieces)
     checkpoint(PATH_SHARE, lambda: working.vertices[loop.vertices])
     unit = float(np.sqrt(working.face_areas.sum()))

@@ -13,7 +13,7 @@ from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
 from ..path.band_refinement import PIECES_TO_START
-from ..progress import part
+from ..progress import subrange
 from ..request import Request
 from ..status import Status
 from .forward_pass import NetworkInput, NetworkWeights, Operations, level_set
@@ -55,9 +55,9 @@ def predicted(mesh: Mesh, request: Request) -> Predicted:
     UnreachableError
         If no simple path passes the points in this order.
     """
-    with part(0.0, 0.8):
+    with subrange(0.0, 0.8):
         problem = requested_problem(mesh, request, PIECES_TO_START)
-    with part(0.8, 1.0):
+    with subrange(0.8, 1.0):
         solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
         zeros = zero_set(mesh, problem, solution.field)
         if request.has_maps:

@@ -8,7 +8,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.progress import CancelledError, checkpoint, displaced, part, watched
+from nicmm_core.progress import CancelledError, checkpoint, displaced, subrange, watched
 from tests.oracles.checker import judge_curve
 from tests.oracles.defects import defective_meshes
 
@@ -131,13 +131,13 @@ def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
 
 class TestWatched:
     def test_nobody_watches(self):
-        with watched(None), part(0.2, 0.4), displaced(np.ones(3)):
+        with watched(None), subrange(0.2, 0.4), displaced(np.ones(3)):
             checkpoint(0.5, lambda: 1 / 0)
 
     def test_parts_of_parts(self, at_every_checkpoint):
         seen = []
         with watched(lambda done, _: seen.append(done)):
-            with part(0.0, 0.5), part(0.5, 1.0):
+            with subrange(0.0, 0.5), subrange(0.5, 1.0):
                 checkpoint(0.5)
             checkpoint(0.1)
             checkpoint(1.0)
