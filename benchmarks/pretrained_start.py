@@ -26,7 +26,7 @@ from nicmm_core.level_set.solution import Solution
 from nicmm_core.level_set.zero_set import ZeroSet, zero_set
 from nicmm_core.network import single_pass
 from nicmm_core.network.forward_pass import NetworkWeights
-from nicmm_core.network.single_pass import predict_once
+from nicmm_core.network.single_pass import infer_level_set
 from nicmm_core.network.trainable_network import network_weights
 from nicmm_core.network.weights_file import shipped_weights
 from nicmm_core.status import Status
@@ -140,7 +140,7 @@ def _disturbed(problem: Problem) -> FloatArray:
 
 
 def _network(weights: NetworkWeights) -> Field:
-    return lambda problem: predict_once(weights, problem).field
+    return lambda problem: infer_level_set(weights, problem).field
 
 
 STARTS: dict[str, Callable[[], Field]] = {
@@ -179,12 +179,12 @@ def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> dict[str, Results]:
 def _rest(
     designer: nicmm.Designer, points: IntArray, closed: bool, order: str, field: Field
 ) -> Rest:
-    with _instead_of_the_network(field) as predicted:
+    with _instead_of_the_network(field) as level_sets:
         began = time.process_time()
         design = designer.design(points, closed=closed, order=order)
         seconds = time.process_time() - began
     # The last of them is the one that gave a curve.
-    mesh, zeros = predicted[-1]
+    mesh, zeros = level_sets[-1]
     return Rest(
         repaired=zeros.breaking_vertices > 0,
         start=bending(mesh, zeros.curves[0]),
@@ -198,20 +198,20 @@ def _rest(
 @contextmanager
 def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]]:
     """Let designs start from a field; collects the level sets that they make of it."""
-    predicted: list[tuple[Mesh, ZeroSet]] = []
+    level_sets: list[tuple[Mesh, ZeroSet]] = []
 
     def solution(weights: NetworkWeights, problem: Problem) -> Solution:
         return Solution(field(problem), {}, [], Status.CONVERGED)
 
     def collected(mesh: Mesh, problem: Problem, phi: FloatArray) -> ZeroSet:
-        predicted.append((mesh, zero_set(mesh, problem, phi)))
-        return predicted[-1][1]
+        level_sets.append((mesh, zero_set(mesh, problem, phi)))
+        return level_sets[-1][1]
 
     with (
-        mock.patch.object(single_pass, "predict_once", solution),
+        mock.patch.object(single_pass, "infer_level_set", solution),
         mock.patch.object(single_pass, "zero_set", collected),
     ):
-        yield predicted
+        yield level_sets
 
 
 def _ends(results: Results) -> dict[str, FloatArray]:

@@ -38,7 +38,7 @@ STAGES: dict[str, list[tuple[ModuleType, str]]] = {
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
-    "network": [(single_pass, "predict_once")],
+    "network": [(single_pass, "infer_level_set")],
     "one loop, contour": [
         (problem, "keep_topology"),
         (zero_set, "keep_topology"),

@@ -22,7 +22,7 @@ from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
 from .maps.guidance import component_unit, feature_map
-from .network.single_pass import predicted
+from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
 from .progress import CancelledError, checkpoint, subrange
@@ -142,7 +142,7 @@ class SurfaceDesigner:
 
     def _start_from_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
-        found = predicted(self.mesh, request)
+        found = infer(self.mesh, request)
         problem, zeros = found.problem, found.zeros
         # A level set may touch itself where the mesh is too coarse; the path does not.
         one = zeros.is_simple_curve(self.mesh, request.closed)

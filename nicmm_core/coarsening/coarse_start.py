@@ -11,7 +11,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, locate_control_points
-from ..network.single_pass import predicted
+from ..network.single_pass import infer
 from ..progress import subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request
@@ -105,7 +105,7 @@ class CoarseStarts:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
         with subrange(COARSE_SHARE, 0.9):
-            zeros = predicted(coarse.mesh, on_coarse).zeros
+            zeros = infer(coarse.mesh, on_coarse).zeros
         if not zeros.is_simple_curve(coarse.mesh, request.closed):
             return None
         curve = zeros.curves[0]

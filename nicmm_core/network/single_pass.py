@@ -23,7 +23,7 @@ SingleArray = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Predicted:
+class Inference:
     """What the network says to a request on a mesh.
 
     Attributes
@@ -40,7 +40,7 @@ class Predicted:
     zeros: ZeroSet
 
 
-def predicted(mesh: Mesh, request: Request) -> Predicted:
+def infer(mesh: Mesh, request: Request) -> Inference:
     """Where a curve runs by the network.
 
     Parameters
@@ -58,14 +58,14 @@ def predicted(mesh: Mesh, request: Request) -> Predicted:
     with subrange(0.0, 0.8):
         problem = requested_problem(mesh, request, PIECES_TO_START)
     with subrange(0.8, 1.0):
-        solution = predict_once(shipped_weights(problem.features.shape[1]), problem)
+        solution = infer_level_set(shipped_weights(problem.features.shape[1]), problem)
         zeros = zero_set(mesh, problem, solution.field)
         if request.has_maps:
             zeros = shortest_by_map(mesh, problem, zeros)
-        return Predicted(problem, solution, zeros)
+        return Inference(problem, solution, zeros)
 
 
-def predict_once(weights: NetworkWeights, problem: Problem) -> Solution:
+def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
     """The network's level set for a problem, or φ₀ where it is not finite.
 
     Parameters

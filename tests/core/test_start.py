@@ -51,13 +51,13 @@ def converged(designer, points, start, iterations=3, **arguments):
 def from_nothing(monkeypatch):
     """How often a curve has been designed from nothing."""
     found = []
-    predicted = surface_designer.predicted
+    infer = surface_designer.infer
 
     def counted(*arguments):
         found.append(arguments)
-        return predicted(*arguments)
+        return infer(*arguments)
 
-    monkeypatch.setattr(surface_designer, "predicted", counted)
+    monkeypatch.setattr(surface_designer, "infer", counted)
     return found
 
 

@@ -22,7 +22,7 @@ from nicmm_core.network.forward_pass import (
     linear,
     parameter_shapes,
 )
-from nicmm_core.network.single_pass import NUMPY, network_input, predict_once
+from nicmm_core.network.single_pass import NUMPY, infer_level_set, network_input
 from nicmm_core.network.trainable_network import TORCH, CurveNetwork, build_network, network_weights
 from nicmm_core.network.weights_file import load_weights, save_weights, shipped_weights
 from nicmm_core.status import Status
@@ -246,14 +246,14 @@ def test_weights_without_numbers_give_the_initial_distance(problem):
         weights = random_weights()
         weights.parameters["head.weight"][:] = bad
         weights.parameters["head.bias"][:] = bad
-        solution = predict_once(weights, problem)
+        solution = infer_level_set(weights, problem)
         assert solution.status == Status.DIVERGED
         np.testing.assert_array_equal(solution.field, problem.initial_distance)
         assert all(np.isfinite(value) for value in solution.terms.values())
 
 
 def test_single_pass_repeats_exactly(problem):
-    first, second = (predict_once(load_weights(), problem) for _ in range(2))
+    first, second = (infer_level_set(load_weights(), problem) for _ in range(2))
     np.testing.assert_array_equal(first.field, second.field)
     assert first.terms == second.terms
     assert (first.status, first.iterations) == (Status.CONVERGED, 0)

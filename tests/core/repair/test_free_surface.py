@@ -110,26 +110,26 @@ def test_clearance_keeps_the_curve_away():
 
 @pytest.mark.slow
 def test_dragging_beside_an_obstacle_goes_on_from_the_last_curve(monkeypatch):
-    predictions = []
-    predicted = surface_designer.predicted
+    inferences = []
+    infer = surface_designer.infer
     monkeypatch.setattr(
-        surface_designer, "predicted", lambda *given: predictions.append(1) or predicted(*given)
+        surface_designer, "infer", lambda *given: inferences.append(1) or infer(*given)
     )
     ball = shapes.sphere(4)
     chosen = nearest_vertices(ball, [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     weights = disc_on(ball, nicmm.design_curve(ball, chosen).curves[0], 0.2)
-    predictions.clear()
+    inferences.clear()
     designer = nicmm.Designer(ball)
     first = designer.design(chosen, obstacles=weights)
     again = designer.design(chosen, obstacles=weights)
     assert np.array_equal(first.curves[0].points, again.curves[0].points)
     around = ball.faces[ball.faces_at(chosen[:1])].ravel()
     chosen[0] = next(vertex for vertex in around if vertex not in chosen)
-    predictions.clear()
+    inferences.clear()
     moved = designer.design(chosen, obstacles=weights, start=first)
     assert_valid_design(ball, moved)
     assert length_inside(ball, moved.curves[0], weights) == 0.0
-    assert not predictions
+    assert not inferences
 
 
 def test_distances_are_along_what_is_left():

@@ -132,10 +132,10 @@ def triangle_heights(corners):
 
 def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     mesh = MESHES["caps"]
-    predictions = []
-    predicted = surface_designer.predicted
+    inferences = []
+    infer = surface_designer.infer
     monkeypatch.setattr(
-        surface_designer, "predicted", lambda *given: predictions.append(1) or predicted(*given)
+        surface_designer, "infer", lambda *given: inferences.append(1) or infer(*given)
     )
     before = mesh.vertices.copy(), mesh.faces.copy()
     designer = nicmm.Designer(mesh)
@@ -147,7 +147,7 @@ def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
         assert design.field.shape == (len(mesh.vertices),)
         assert np.isfinite(design.field).all()
         np.testing.assert_allclose(design.field[points], 0.0, atol=1e-2 * mesh.mean_edge_length)
-    assert len(predictions) == 1
+    assert len(inferences) == 1
     np.testing.assert_array_equal(mesh.vertices, before[0])
     np.testing.assert_array_equal(mesh.faces, before[1])
 
