@@ -10,8 +10,8 @@ import numpy as np
 
 from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.network.finetuning import FinetuningConfig, finetune
 from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork
 from nicmm_core.status import Status
 
@@ -66,7 +66,7 @@ PAPER_FEATURES = {ALL_FEATURES: 32.0, "w/o normals": 35.4, "w/o φ_p": 75.4, "w/
 
 @dataclass(frozen=True)
 class Stop:
-    """How the prediction of one set ended.
+    """How fine-tuning for one set ended.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Stop:
 
 
 def run(scale: Scale) -> None:
-    """Pretrain every variant alike on one mesh and predict other sets of that mesh."""
+    """Pretrain every variant alike on one mesh and fine-tune for other sets of that mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets, epochs = scale.choose(100, 6, 4), scale.choose(10, 2)
     networks, seconds = _pretrained({**MODULES, **FEATURES}, mesh, sets, epochs)
@@ -94,7 +94,7 @@ def run(scale: Scale) -> None:
         random_samples([(name, mesh)], scale.choose(40, 2), TEST_SEED),
         ITERATIONS,
     )
-    cap = scale.choose(PredictionConfig.iterations, 100, 40)
+    cap = scale.choose(FinetuningConfig.iterations, 100, 40)
     stops = _early_stops(
         {label: networks[label] for label in FEATURES}, name, mesh, scale.choose(10, 1), cap
     )
@@ -198,17 +198,17 @@ def _early_stops(
     networks: Mapping[str, CurveNetwork], name: str, mesh: Mesh, count: int, cap: int
 ) -> dict[str, list[Stop]]:
     stops: dict[str, list[Stop]] = {label: [] for label in networks}
-    config = PredictionConfig(iterations=cap)
+    config = FinetuningConfig(iterations=cap)
     for sample in random_samples([(name, mesh)], count, FEATURE_SEED):
         started = time.perf_counter()
         for label, network in networks.items():
-            prediction = predict(network, sample.problem, sample.weights, config)
+            finetuned = finetune(network, sample.problem, sample.weights, config)
             stops[label].append(
                 Stop(
-                    iterations=prediction.iterations,
-                    loss=min(prediction.losses),
-                    early=prediction.status == Status.CONVERGED,
-                    one_loop=is_one_curve(level_set(sample, prediction.field)),
+                    iterations=finetuned.iterations,
+                    loss=min(finetuned.losses),
+                    early=finetuned.status == Status.CONVERGED,
+                    one_loop=is_one_curve(level_set(sample, finetuned.field)),
                 )
             )
         counts = ", ".join(f"{label} {stops[label][-1].iterations}" for label in networks)
@@ -282,6 +282,6 @@ def _feature_findings(stops: Mapping[str, Sequence[Stop]]) -> str:
             "that row's iterations say little; the paper does not mention this. "
         )
     return text + (
-        f"The early stop does not count stillness before {PredictionConfig.least_iterations} "
+        f"The early stop does not count stillness before {FinetuningConfig.least_iterations} "
         "iterations."
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
-from nicmm_core.network.prediction import PredictionConfig, predict
+from nicmm_core.network.finetuning import FinetuningConfig, finetune
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.status import Status
 
@@ -44,7 +44,7 @@ COLOURS = (renders.BLUE, renders.ORANGE, renders.GREEN, renders.YELLOW)
 
 @dataclass(frozen=True)
 class Course:
-    """One prediction, followed far beyond its early stop.
+    """One fine-tuning run, continued far beyond its early stop.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Course:
     by_itself : list of bool
         Which of them were one loop before the topology was held.
     seconds : list of float
-        Of the prediction stage until then.
+        Of fine-tuning until then.
     """
 
     sample: Sample
@@ -73,7 +73,7 @@ class Course:
 
 
 def run(scale: Scale) -> None:
-    """Follow predictions on several meshes."""
+    """Continue fine-tuning beyond its early stop, on several meshes."""
     network = load_network()
     meshes = collections.surfaces(scale, scale.choose(8, 1))
     courses = [_followed(network, sample) for sample in random_samples(meshes, 1, SEED)]
@@ -90,7 +90,7 @@ def run(scale: Scale) -> None:
 
 
 def _followed(network: CurveNetwork, sample: Sample) -> Course:
-    early = predict(network, sample.problem, sample.weights, PredictionConfig())
+    early = finetune(network, sample.problem, sample.weights, FinetuningConfig())
     wanted = (early.iterations, *LATER)
     fields: dict[int, FloatArray] = {}
     seconds: dict[int, float] = {}
@@ -104,7 +104,7 @@ def _followed(network: CurveNetwork, sample: Sample) -> Course:
             fields[done], seconds[done] = field, time.perf_counter() - started
         return True
 
-    losses = predict(
+    losses = finetune(
         network, sample.problem, sample.weights, without_early_stop(LATER[-1]), watch
     ).losses
     outcomes = [designed_curve(sample, fields[iteration]) for iteration in wanted]

@@ -16,8 +16,8 @@ from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.features import BASE_CHANNELS
 from nicmm_core.level_set.problem import Problem, build_problem
 from nicmm_core.level_set.signed_distance import heat_distance
+from nicmm_core.network.finetuning import FinetuningConfig, finetune
 from nicmm_core.network.forward_pass import DISTANCE_CHANNEL
-from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
@@ -149,14 +149,14 @@ def _with_loops(network: CurveNetwork, sample: Sample) -> dict[str, Outcome]:
 
 
 def _outcome(network: CurveNetwork, sample: Sample) -> Outcome:
-    prediction = predict(network, sample.problem, sample.weights, PredictionConfig())
-    curve, by_itself = designed_curve(sample, prediction.field)
+    finetuned = finetune(network, sample.problem, sample.weights, FinetuningConfig())
+    curve, by_itself = designed_curve(sample, finetuned.field)
     return Outcome(
         initial_path(sample.mesh, sample.problem),
         curve,
         by_itself,
-        prediction.iterations,
-        min(prediction.losses),
+        finetuned.iterations,
+        min(finetuned.losses),
     )
 
 
@@ -211,7 +211,7 @@ def _without_loops(
         features = problem.features.copy()
         features[:, DISTANCE_CHANNEL] = start
         blind = replace(problem, initial_distance=start, features=features)
-        found = predict(network, blind, sample.weights, PredictionConfig()).field
+        found = finetune(network, blind, sample.weights, FinetuningConfig()).field
         curves = level_set(sample, found)
         one = is_one_curve(curves)
         distance = relative_distances(sample, curves[0], reference) if one else None

@@ -10,7 +10,7 @@ import numpy as np
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.level_set.losses import LossWeights
-from nicmm_core.network.prediction import BAND_WIDTH, predict
+from nicmm_core.network.finetuning import BAND_WIDTH, finetune
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
@@ -106,14 +106,16 @@ def _varied(
 ) -> dict[tuple[str, float], Outcome]:
     """The outcome for each weight and factor; both have factor 1 in common."""
     fields: dict[tuple[str, float], FloatArray] = {}
-    default = predict(network, sample.problem, sample.weights, without_early_stop(iterations)).field
+    default = finetune(
+        network, sample.problem, sample.weights, without_early_stop(iterations)
+    ).field
     for weight in NAMES:
         for factor in FACTORS:
             if factor == 1.0:
                 fields[weight, factor] = default
                 continue
             changed = replace(sample.weights, **{weight: factor * getattr(sample.weights, weight)})
-            fields[weight, factor] = predict(
+            fields[weight, factor] = finetune(
                 network, sample.problem, changed, without_early_stop(iterations)
             ).field
     reference, _ = designed_curve(sample, default)

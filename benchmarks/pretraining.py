@@ -36,7 +36,7 @@ PAPER_TRAINING = 1000 * 10
 
 
 def run(scale: Scale) -> None:
-    """Pretrain for several durations and predict sets of the same mesh."""
+    """Pretrain for several durations and fine-tune for sets of the same mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets = scale.choose(250, 10, 4)
     trained = {_label(sets, epochs): train(mesh, sets, epochs, SEED) for epochs in _epochs(scale)}

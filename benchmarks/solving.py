@@ -20,8 +20,8 @@ from nicmm_core.level_set.contour import extract_curves
 from nicmm_core.level_set.losses import LossWeights, balanced
 from nicmm_core.level_set.problem import Problem, build_problem
 from nicmm_core.level_set.zero_set import zero_set
+from nicmm_core.network.finetuning import FinetuningConfig, finetune
 from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.prediction import PredictionConfig, predict
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.path.band_refinement import PIECES
@@ -136,10 +136,10 @@ def train(
     return Trained(network, losses, prepared - started, finished - prepared)
 
 
-def without_early_stop(iterations: int) -> PredictionConfig:
+def without_early_stop(iterations: int) -> FinetuningConfig:
     """Settings that stop after a number of steps of the optimiser and never before."""
     # The loss is taken before each step, so the last one needs a further evaluation.
-    return PredictionConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
+    return FinetuningConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Runs:
     least_losses : (samples, iterations + 1) float array
         Least loss so far, from before the first step to after the last one.
     seconds : (samples,) float array
-        Of the whole prediction stage.
+        Of all fine-tuning.
     smooth : (samples,) float array
         λ_smooth of the energy, as a design takes it.
     """
@@ -172,11 +172,11 @@ def run_networks(
         smooth.append(sample.weights.smooth)
         for label, network in networks.items():
             started = time.perf_counter()
-            prediction = predict(
+            finetuned = finetune(
                 network, sample.problem, sample.weights, without_early_stop(iterations)
             )
             seconds[label].append(time.perf_counter() - started)
-            losses[label].append(_least_so_far(prediction.losses, iterations + 1))
+            losses[label].append(_least_so_far(finetuned.losses, iterations + 1))
         last = ", ".join(f"{label} {losses[label][-1][-1]:.3f}" for label in networks)
         print(f"  {sample.name}: {last}", flush=True)
     if not smooth:

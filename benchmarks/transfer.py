@@ -31,7 +31,7 @@ PAPER = {UNTRAINED: 15.298, ONE_MESH: 10.996}
 
 
 def run(scale: Scale) -> None:
-    """Pretrain on one mesh and predict sets of others."""
+    """Pretrain on one mesh and fine-tune for sets of others."""
     sets, epochs = scale.choose(100, 10, 4), scale.choose(16, 3, 2)
     others = scale.choose(20, 2, 1)
     (name, mesh), *rest = collections.surfaces(scale, others + 1)

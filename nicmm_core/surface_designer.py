@@ -222,10 +222,10 @@ class SurfaceDesigner:
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
         pretrained = shipped_weights(problem.features.shape[1])
         # These import PyTorch, which nothing else needs.
-        from .network.prediction import PredictionConfig, predict
+        from .network.finetuning import FinetuningConfig, finetune
         from .network.trainable_network import build_network
 
-        return predict(build_network(pretrained), problem, weights, PredictionConfig(), watch)
+        return finetune(build_network(pretrained), problem, weights, FinetuningConfig(), watch)
 
     def _curve_surface(self, request: Request) -> CurveSurface:
         """The surface that curves move on."""

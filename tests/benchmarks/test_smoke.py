@@ -10,7 +10,7 @@ import pytest
 from benchmarks import report
 from benchmarks.__main__ import MEASUREMENTS
 from benchmarks.scale import Scale
-from nicmm_core.network.prediction import PredictionConfig
+from nicmm_core.network.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
 
@@ -18,13 +18,13 @@ FEW_ITERATIONS = 40
 
 
 @pytest.fixture(autouse=True)
-def short_predictions(monkeypatch):
-    """Stop predictions early wherever the default configuration is used: time is spent there."""
+def short_finetuning(monkeypatch):
+    """Stop fine-tuning early wherever the default configuration is used: time is spent there."""
     defaults = tuple(
         FEW_ITERATIONS if field.name == "iterations" else field.default
-        for field in dataclasses.fields(PredictionConfig)
+        for field in dataclasses.fields(FinetuningConfig)
     )
-    monkeypatch.setattr(PredictionConfig.__init__, "__defaults__", defaults)
+    monkeypatch.setattr(FinetuningConfig.__init__, "__defaults__", defaults)
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)

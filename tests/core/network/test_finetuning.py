@@ -7,8 +7,8 @@ import torch
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.losses import LossWeights, loss_terms, total_loss
 from nicmm_core.level_set.problem import build_problem
+from nicmm_core.network.finetuning import FinetuningConfig, finetune, narrow_band_energy
 from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.prediction import PredictionConfig, narrow_band_energy, predict
 from nicmm_core.network.tensors import surface_tensors
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.status import Status
@@ -36,7 +36,7 @@ def loss_of(problem, field):
 
 
 def run(network, problem, watch=None, weights=WEIGHTS, **settings):
-    return predict(network, problem, weights, PredictionConfig(**settings), watch)
+    return finetune(network, problem, weights, FinetuningConfig(**settings), watch)
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ BAND_WIDTH = 3.0
 
 
 @dataclass(frozen=True)
-class PredictionConfig:
+class FinetuningConfig:
     """How stage 2 runs.
 
     Attributes
@@ -62,11 +62,11 @@ class PredictionConfig:
 
 
 @single_thread()
-def predict(
+def finetune(
     network: CurveNetwork,
     problem: Problem,
     weights: LossWeights,
-    config: PredictionConfig,
+    config: FinetuningConfig,
     watch: Callable[[float, FloatArray], bool] | None = None,
 ) -> Solution:
     """Optimise a copy of the network for one problem.
@@ -77,9 +77,9 @@ def predict(
         As pretrained; not changed.
     problem : Problem
     weights : LossWeights
-    config : PredictionConfig
+    config : FinetuningConfig
     watch : callable, optional
-        Called with the fraction of the cap that is done and φ after every iteration; prediction
+        Called with the fraction of the cap that is done and φ after every iteration; fine-tuning
         stops when it returns False.
     """
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
@@ -130,7 +130,7 @@ def narrow_band_energy(
     return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
 
 
-def _may_stop(energies: list[float], config: PredictionConfig) -> bool:
+def _may_stop(energies: list[float], config: FinetuningConfig) -> bool:
     """The paper's early stop: the energy is low enough, or rests."""
     if energies[-1] < config.threshold:
         return True
