@@ -21,7 +21,7 @@ from ..geometry.surface_points import SurfacePoints, joined, nearest_points
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
-from ..relaxation.noded_curve import NodedCurve, is_simple, noded_curve, straight_ways
+from ..relaxation.noded_curve import NodedCurve, is_simple, noded_curve, straight_traces
 from .coarse_mesh import CoarseMesh
 
 NODES = (256, 512, 128)
@@ -77,7 +77,7 @@ def _lifted_nodes(
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
     # The coarse mesh's normals do not follow every dent that a way has to pass.
     smooth = replace(nodes, normals=exact.nodes.normals)
-    polyline, node_place, lost = straight_ways(surface, exact, smooth)
+    polyline, node_place, lost = straight_traces(surface, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()

@@ -1,7 +1,7 @@
 """A curve that is exactly on the mesh, and the nodes along it that move.
 
 The polyline is what counts: each of its segments lies in one face. Nodes are points of it, at
-about equal distances. When they move, the stretches between them are drawn anew by straight ways
+about equal distances. When they move, the stretches between them are drawn anew by straight traces
 over the faces. A stretch that cannot be drawn, or that would cross another, keeps its two nodes
 where they were and stays as it is; so whatever is asked for, the result is a simple curve through
 the same control points in the same order.
@@ -155,7 +155,7 @@ def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> Node
     aside = CubicHermiteSpline(at, through, slope)(along) - straight
     step = (aside * fine.nodes.conormals).sum(axis=1)
     step[fine.control_nodes] = 0.0
-    return redrawn(surface, fine, moved_along_conormals(surface, fine.nodes, step)[0])[0]
+    return retraced(surface, fine, moved_along_conormals(surface, fine.nodes, step)[0])[0]
 
 
 def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
@@ -218,7 +218,7 @@ def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:
     return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
-def drawn(
+def traced_through(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes, still: BoolArray | None = None
 ) -> NodedCurve | None:
     """The curve through nodes at new places, simple or not; None where it cannot be drawn.
@@ -230,16 +230,16 @@ def drawn(
         kept = still & np.roll(still, -1)
         if not curve.closed:
             kept[-1] = False
-    polyline, node_place, lost = _drawn(surface, curve, nodes, kept)
+    polyline, node_place, lost = _traced_polyline(surface, curve, nodes, kept)
     if lost.any():
         return None
     return NodedCurve(nodes, curve.control_nodes, polyline, node_place)
 
 
-def straight_ways(
+def straight_traces(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
-    """The polyline of straight ways between nodes at new places.
+    """The polyline of straight traces between nodes at new places.
 
     Returns
     -------
@@ -249,10 +249,12 @@ def straight_ways(
     (n,) bool array
         Nodes after which no way to the next one was found; there is nothing between them.
     """
-    return _drawn(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
+    return _traced_polyline(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
 
 
-def redrawn(surface: CurveSurface, curve: NodedCurve, nodes: Nodes) -> tuple[NodedCurve, BoolArray]:
+def retraced(
+    surface: CurveSurface, curve: NodedCurve, nodes: Nodes
+) -> tuple[NodedCurve, BoolArray]:
     """The curve through nodes at new places where that leaves it simple, the old one elsewhere.
 
     Parameters
@@ -280,7 +282,7 @@ def redrawn(surface: CurveSurface, curve: NodedCurve, nodes: Nodes) -> tuple[Nod
                 np.where(stays[:, None], old.barycentric, new.barycentric),
             )
             nodes = nodes_at(surface, places, curve.closed)
-        polyline, node_place, bad = _drawn(surface, curve, nodes, kept)
+        polyline, node_place, bad = _traced_polyline(surface, curve, nodes, kept)
         if not bad.any():
             pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
             bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
@@ -333,7 +335,7 @@ def _with_nodes(
     return NodedCurve(nodes, control_nodes, merged, node_place)
 
 
-def _drawn(
+def _traced_polyline(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline through nodes at new places.
@@ -359,16 +361,16 @@ def _drawn(
     n = len(places)
     node = np.arange(n if curve.closed else n - 1)
     following = (node + 1) % n
-    redraw = ~kept[node]
+    changed = ~kept[node]
     lost = np.zeros(n, dtype=bool)
-    parts = [_kept_stretches(curve, np.flatnonzero(~redraw))]
+    parts = [_kept_stretches(curve, np.flatnonzero(~changed))]
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
     # A way starts inside a face, which a control point need not.
     for backwards in (False, True):
-        here = node[redraw & (controls[node] == backwards)]
+        here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
-        part, reached = _drawn_stretches(surface, nodes.normals, places, here, ends, backwards)
+        part, reached = _traced_stretches(surface, nodes.normals, places, here, ends, backwards)
         lost[here[~reached]] = True
         parts.append(part)
     if not curve.closed:
@@ -391,7 +393,7 @@ def _kept_stretches(curve: NodedCurve, nodes: IntArray) -> Stretches:
     return owner, curve.polyline[bounds[owner] + offset]
 
 
-def _drawn_stretches(
+def _traced_stretches(
     surface: CurveSurface,
     normals: FloatArray,
     places: SurfacePoints,
@@ -399,23 +401,23 @@ def _drawn_stretches(
     ends: tuple[IntArray, IntArray],
     backwards: bool,
 ) -> tuple[Stretches, BoolArray]:
-    """Straight ways from nodes to the ones after them, drawn from there if backwards."""
+    """Straight traces from nodes to the ones after them, drawn from there if backwards."""
     mesh = surface.mesh
     start, end = reversed(ends) if backwards else ends
     # A mesh need not be oriented: both normals count as pointing to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
-    ways = trace_between(mesh, places[start], places[end], plane, DETOUR, surface.folded)
-    first, crossings = places[start], ways.crossings
+    traces = trace_between(mesh, places[start], places[end], plane, DETOUR, surface.folded)
+    first, crossings = places[start], traces.crossings
     if not backwards:
-        owner = np.concatenate([nodes, nodes[ways.pair]])
+        owner = np.concatenate([nodes, nodes[traces.pair]])
         order = np.argsort(owner, kind="stable")
         points = joined([first, crossings])
-        return (owner[order], points[order]), ways.reached
+        return (owner[order], points[order]), traces.reached
     # In reverse, a crossing belongs to the face that the way came from, and the node before all
     # of them to the face where it ended.
-    begins = np.searchsorted(ways.pair, np.arange(len(nodes)))
-    ends_at = np.searchsorted(ways.pair, np.arange(len(nodes)), side="right")
+    begins = np.searchsorted(traces.pair, np.arange(len(nodes)))
+    ends_at = np.searchsorted(traces.pair, np.arange(len(nodes)), side="right")
     came_from = np.roll(crossings.faces, 1)
     passes = ends_at > begins
     came_from[begins[passes]] = first.faces[passes]
@@ -425,6 +427,6 @@ def _drawn_stretches(
     crossings = in_faces(mesh, crossings, came_from)[reverse]
     # A trace that got lost did not end beside its node, whose coordinates are then ignored.
     node_points = in_faces(mesh, places[end], last_face)
-    owner = np.concatenate([nodes, nodes[ways.pair][reverse]])
+    owner = np.concatenate([nodes, nodes[traces.pair][reverse]])
     order = np.argsort(owner, kind="stable")
-    return (owner[order], joined([node_points, crossings])[order]), ways.reached
+    return (owner[order], joined([node_points, crossings])[order]), traces.reached

@@ -40,12 +40,12 @@ from .levenberg_marquardt import (
 )
 from .noded_curve import (
     NodedCurve,
-    drawn,
     is_simple,
     noded_curve,
-    redrawn,
     respaced,
+    retraced,
     rounded,
+    traced_through,
     without_short_segments,
 )
 
@@ -353,7 +353,7 @@ class _Attempt:
                 return None
             curve, nodes, energy, stayed = state.curve, moved.nodes, moved.energy, moved.stayed
             if self.simple:
-                curve, kept = redrawn(self.surface, state.curve, nodes)
+                curve, kept = retraced(self.surface, state.curve, nodes)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
                     tries += 1
@@ -368,7 +368,7 @@ class _Attempt:
 
     def _traced(self, curve: NodedCurve, nodes: Nodes) -> NodedCurve:
         """The curve through its nodes, which may have moved since it was last traced."""
-        changed = curve if nodes is curve.nodes else drawn(self.surface, curve, nodes)
+        changed = curve if nodes is curve.nodes else traced_through(self.surface, curve, nodes)
         if changed is None:
             raise _LostError
         return changed

@@ -13,7 +13,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .levenberg_marquardt import StepConfig
-from .noded_curve import NodedCurve, drawn, is_simple, shifted
+from .noded_curve import NodedCurve, is_simple, shifted, traced_through
 from .relaxing import RelaxationConfig
 
 WARM = RelaxationConfig(
@@ -69,7 +69,7 @@ def moved_along(
     still[going] = False
     places = SurfacePoints(faces, barycentric)
     # A stretch that once could not be drawn straight stays as it is where nothing moves.
-    changed = drawn(surface, curve, nodes_at(surface, places, curve.closed), still)
+    changed = traced_through(surface, curve, nodes_at(surface, places, curve.closed), still)
     if changed is None or not is_simple(surface, changed):
         return None
     return changed

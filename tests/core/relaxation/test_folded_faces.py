@@ -9,7 +9,7 @@ from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import trace_between, trace_from
 from nicmm_core.relaxation.curve_nodes import curve_surface, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
-from nicmm_core.relaxation.noded_curve import drawn, moved_along_conormals, noded_curve
+from nicmm_core.relaxation.noded_curve import moved_along_conormals, noded_curve, traced_through
 from tests.core.checks import assert_valid_curve, curve_through, flipped, grid, points_near
 from tests.oracles.distances import distances
 from tests.oracles.named_curves import nearest_vertices
@@ -84,9 +84,9 @@ def test_without_a_fold_nodes_are_at_equal_distances(square):
     np.testing.assert_allclose(nodes.lengths, nodes.lengths.mean(), rtol=1e-4)
 
 
-def test_a_way_over_a_fold_is_drawn_and_stays_straight(square, surface):
+def test_a_trace_over_a_fold_stays_straight(square, surface):
     curve = noded_curve(surface, straight_across(square, surface.mesh), 64)
-    again = drawn(surface, curve, curve.nodes)
+    again = traced_through(surface, curve, curve.nodes)
     assert again is not None
     result = again.surface_curve(surface.mesh)
     assert_valid_curve(surface.mesh, result, closed=False)

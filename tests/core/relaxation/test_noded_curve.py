@@ -11,13 +11,13 @@ from nicmm_core.geometry.surface_points import SurfacePoints, in_faces
 from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.noded_curve import (
-    drawn,
     is_simple,
     moved_along_conormals,
     noded_curve,
-    redrawn,
     respaced,
+    retraced,
     rounded,
+    traced_through,
     without_short_segments,
 )
 from tests.core.checks import (
@@ -142,7 +142,7 @@ def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", [None, 3])
-def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed):
+def test_a_traced_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed):
     """Round a section of the body, every node moved a little to its own side."""
     mesh = body if seed is None else flipped(body, seed)
     surface = surface_of(mesh)
@@ -150,7 +150,7 @@ def test_a_drawn_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed)
     step = 0.02 * np.sin(np.arange(len(exact.nodes.positions)))
     step[exact.control_nodes] = 0.0
     nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
-    new = drawn(surface, exact, nodes)
+    new = traced_through(surface, exact, nodes)
     result = new.surface_curve(mesh)
     assert_lies_on_surface(mesh, result)
     assert_visits(mesh, result, exact.nodes.positions[exact.control_nodes])
@@ -178,7 +178,7 @@ def sides(mesh):
 def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
     surface = surface_of(ball)
     exact = noded_curve(surface, ring_on(ball, radius=1.0), 100)
-    again = drawn(surface, exact, exact.nodes)
+    again = traced_through(surface, exact, exact.nodes)
     assert_valid_curve(ball, again.surface_curve(ball))
     length = exact.surface_curve(ball).length
     assert again.surface_curve(ball).length == pytest.approx(length, rel=1e-3)
@@ -198,7 +198,7 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
         step = generator.normal(scale=size, size=n)
         step[exact.control_nodes] = 0.0
         nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
-        new, stays = redrawn(surface, exact, nodes)
+        new, stays = retraced(surface, exact, nodes)
         assert is_simple(surface, new)
         result = new.surface_curve(flat_disc)
         assert_valid_curve(flat_disc, result, controls)
@@ -214,7 +214,7 @@ def test_moves_that_cross_nothing_are_all_made(flat_disc):
     step = np.full(len(exact.nodes.positions), 0.02)
     step[exact.control_nodes] = 0.0
     nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
-    new, stays = redrawn(surface, exact, nodes)
+    new, stays = retraced(surface, exact, nodes)
     assert not stays.any()
     np.testing.assert_array_equal(new.nodes.positions, nodes.positions)
 
@@ -228,8 +228,8 @@ def test_only_the_nodes_that_would_cross_stay(flat_disc):
     step[here[:, 0] > 0.5] = 1.19  # over to the other side
     step[exact.control_nodes] = 0.0
     nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
-    assert not is_simple(surface, drawn(surface, exact, nodes))
-    simple, stays = redrawn(surface, exact, nodes)
+    assert not is_simple(surface, traced_through(surface, exact, nodes))
+    simple, stays = retraced(surface, exact, nodes)
     assert is_simple(surface, simple)
     assert stays.any() and not stays[np.abs(here[:, 1]) > 0.5].any()
 
@@ -245,8 +245,8 @@ def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
     far = (node + n // 2) % n
     chosen.faces[node], chosen.barycentric[node] = chosen.faces[far], chosen.barycentric[far]
     nodes = nodes_at(surface, chosen, True)
-    assert drawn(surface, exact, nodes) is None
-    kept, stays = redrawn(surface, exact, nodes)
+    assert traced_through(surface, exact, nodes) is None
+    kept, stays = retraced(surface, exact, nodes)
     assert stays[node]
     np.testing.assert_array_equal(kept.nodes.positions[node], exact.nodes.positions[node])
     assert_valid_curve(mesh, kept.surface_curve(mesh), kept.nodes.positions[kept.control_nodes])
@@ -276,7 +276,7 @@ def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(
     """∮ κ² ds of a circle is 2π / r; a polygon has more than twice that."""
     surface = surface_of(flat_disc)
     ring = noded_curve(surface, ring_on(flat_disc), 48)
-    polygon = drawn(surface, ring, ring.nodes)
+    polygon = traced_through(surface, ring, ring.nodes)
     finer = respaced(surface, polygon, 144)
     assert bending_energy(finer.nodes) > 2.0 * 2.0 * np.pi / 0.6
     smooth = rounded(surface, polygon, finer)
@@ -290,13 +290,15 @@ def test_a_node_close_beside_an_edge_makes_no_short_segment(flat_disc):
     """Nodes are moved along the curve to a hundredth of a step behind the crossing before them."""
     surface = surface_of(flat_disc)
     ring = noded_curve(surface, ring_on(flat_disc), 64)
-    ring = drawn(surface, ring, ring.nodes)
+    ring = traced_through(surface, ring, ring.nodes)
     places = ring.nodes.places
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     beside = np.setdiff1d(np.arange(64), ring.control_nodes)
     before = in_faces(flat_disc, ring.polyline[ring.node_place[beside] - 1], faces[beside])
     barycentric[beside] = 0.99 * before.barycentric + 0.01 * barycentric[beside]
-    moved = drawn(surface, ring, nodes_at(surface, SurfacePoints(faces, barycentric), True))
+    moved = traced_through(
+        surface, ring, nodes_at(surface, SurfacePoints(faces, barycentric), True)
+    )
     result = without_short_segments(flat_disc, moved)
     assert len(result.points) < len(moved.polyline) - 20
     assert_valid_curve(flat_disc, result, ring.nodes.positions[ring.control_nodes])
