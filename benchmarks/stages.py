@@ -44,7 +44,7 @@ STAGES: dict[str, list[tuple[ModuleType, str]]] = {
         (zero_set, "keep_topology"),
         (zero_set, "extract_curves"),
     ],
-    "lifting": [(coarse_start, "lifted")],
+    "mapping to the fine mesh": [(coarse_start, "curve_on_fine_mesh")],
     "start from the last curve": [(surface_designer, "moved_start")],
     "relaxation": [(surface_designer, "relax")],
 }

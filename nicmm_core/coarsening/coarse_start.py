@@ -16,7 +16,7 @@ from ..progress import subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
-from .lifting import lifted
+from .fine_curve import curve_on_fine_mesh
 
 CELLS = 4_000
 """Cells of the first coarse mesh, about as many vertices as the network was trained on."""
@@ -87,7 +87,7 @@ class CoarseStarts:
         count = min(CELLS, most)
         while count <= most:
             try:
-                start = self._lifted(self._surface(component, count), request)
+                start = self._start_on(self._surface(component, count), request)
             except NicmmError:
                 start = None
             if start is not None:
@@ -101,7 +101,7 @@ class CoarseStarts:
             self._sizes[component] = np.count_nonzero(np.bincount(inside.ravel()))
         return self._sizes[component]
 
-    def _lifted(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
+    def _start_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
         with subrange(COARSE_SHARE, 0.9):
@@ -110,7 +110,7 @@ class CoarseStarts:
             return None
         curve = zeros.curves[0]
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
-        result = lifted(self._fine, coarse, level.surface, curve, request.points[visited])
+        result = curve_on_fine_mesh(self._fine, coarse, level.surface, curve, request.points[visited])
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:

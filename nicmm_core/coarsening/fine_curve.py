@@ -1,7 +1,7 @@
 """Bring a curve from the coarse mesh back to the fine one.
 
 Nodes of the coarse curve are found again in the cells that they lie in and joined by straight ways
-over the faces, as in the relaxation. Where the fine surface is too rough for that, the shortest way
+over the faces, as in the relaxation. Where the fine surface is too rough for that, the shortest path
 along its edges joins them. Cells and ways stay on the surface, so a curve on one side of a thin
 limb is lifted to that side.
 """
@@ -32,7 +32,7 @@ one another, ways between other nodes may pass beside each other.
 """
 
 
-def lifted(
+def curve_on_fine_mesh(
     surface: CurveSurface,
     coarse: CoarseMesh,
     coarse_surface: CurveSurface,
@@ -59,13 +59,13 @@ def lifted(
     for count in NODES:
         checkpoint()
         exact = noded_curve(coarse_surface, curve, count)
-        result = _lifted_nodes(surface, coarse, exact, controls)
+        result = _through_nodes(surface, coarse, exact, controls)
         if result is not None and is_simple(surface, result):
             return result.surface_curve(surface.mesh)
     return None
 
 
-def _lifted_nodes(
+def _through_nodes(
     surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
     """The curve through the nodes of a coarse one, simple or not."""
@@ -75,7 +75,7 @@ def _lifted_nodes(
     faces[exact.control_nodes] = controls.faces
     barycentric[exact.control_nodes] = controls.barycentric
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
-    # The coarse mesh's normals do not follow every dent that a way has to pass.
+    # The coarse mesh's normals do not follow every dent that a path has to pass.
     smooth = replace(nodes, normals=exact.nodes.normals)
     polyline, node_place, lost = straight_traces(surface, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
@@ -83,7 +83,7 @@ def _lifted_nodes(
         checkpoint()
         following = (node + 1) % len(cell)
         around = coarse.cells_around(np.unique(cell[[node, following]]))
-        bridge = _way_along_edges(fine, coarse.faces_of_cells(fine, around), nodes, node, following)
+        bridge = _path_along_edges(fine, coarse.faces_of_cells(fine, around), nodes, node, following)
         if bridge is None:
             return None
         bridges[node] = bridge
@@ -107,10 +107,10 @@ def _nearest_points(
     return SurfacePoints(faces, strictly_inside(barycentric)), cell
 
 
-def _way_along_edges(
+def _path_along_edges(
     mesh: Mesh, inside: IntArray, nodes: Nodes, start: int, end: int
 ) -> SurfacePoints | None:
-    """The shortest way along edges of some faces from one node to another, without the latter."""
+    """The shortest path along edges of some faces from one node to another, without the latter."""
     vertices, faces = np.unique(mesh.faces[inside], return_inverse=True)
     edges, _ = unique_edges(faces.reshape(-1, 3))
     ends = nodes.places[np.array([start, end])]
@@ -134,22 +134,22 @@ def _way_along_edges(
     _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
     if previous[there] < 0:
         return None
-    way = [int(previous[there])]
-    while way[-1] != here:
-        way.append(int(previous[way[-1]]))
-    way = vertices[way[-2::-1]].tolist()
-    return _points_of_way(mesh, ends, way)
+    path = [int(previous[there])]
+    while path[-1] != here:
+        path.append(int(previous[path[-1]]))
+    path = vertices[path[-2::-1]].tolist()
+    return _points_of_path(mesh, ends, path)
 
 
-def _points_of_way(mesh: Mesh, ends: SurfacePoints, way: list[int]) -> SurfacePoints | None:
-    """A way over vertices as points, each in the face of the segment after it, with its start."""
+def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> SurfacePoints | None:
+    """A path over vertices as points, each in the face of the segment after it, with its start."""
     start, end = ({*_support(mesh, ends, number)} for number in range(2))
     # An end that is a vertex itself is not passed twice.
-    if start == {way[0]}:
-        way = way[1:]
-    if way and end == {way[-1]}:
-        way = way[:-1]
-    stops = [start, *({vertex} for vertex in way), end]
+    if start == {path[0]}:
+        path = path[1:]
+    if path and end == {path[-1]}:
+        path = path[:-1]
+    stops = [start, *({vertex} for vertex in path), end]
     faces, barycentric = [], []
     for number, (one, other) in enumerate(zip(stops[:-1], stops[1:], strict=True)):
         face = _common_face(mesh, one | other)

@@ -22,7 +22,7 @@ STAGES = {
         {"closed": False},
         "mesh nonmanifold coarse_mesh coarse_start leg_search leg_graph virtual_splits "
         "band_refinement sign_bundle sparse_solver smoothing topology forward_pass contour "
-        "lifting relaxing tracing noded_curve",
+        "fine_curve relaxing tracing noded_curve",
     ),
     "fins and an obstacle": (
         MESHES["fins"],

@@ -1,4 +1,4 @@
-"""A curve of the coarse mesh comes back to the fine one, through the points themselves."""
+"""A curve on the coarse mesh is mapped to the fine one, through the points themselves."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,13 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
-from nicmm_core.coarsening.lifting import lifted
+from nicmm_core.coarsening.fine_curve import curve_on_fine_mesh
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
 from tests.core.checks import assert_valid_curve
 
 
-def lifted_through(mesh, chosen, closed):
+def curves_through(mesh, chosen, closed):
     """The coarse mesh, a curve on it and the same on the fine mesh."""
     normals = unsigned_normals(mesh)
     coarse = build_coarse_mesh(mesh, normals, 0, 600)
@@ -22,11 +22,11 @@ def lifted_through(mesh, chosen, closed):
     (curve,) = nicmm.design_curve(coarse.mesh, near, closed=closed).curves
     surface = CurveSurface(mesh, normals)
     coarse_surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-    return coarse, curve, lifted(surface, coarse, coarse_surface, curve, points)
+    return coarse, curve, curve_on_fine_mesh(surface, coarse, coarse_surface, curve, points)
 
 
 def rough_sphere():
-    """A sphere with needles and dents, on which straight ways get lost."""
+    """A sphere with needles and dents, on which straight traces get lost."""
     generator = np.random.default_rng(4)
     fine = shapes.sphere(5)
     return nicmm.Mesh(
@@ -40,9 +40,9 @@ def rough_sphere():
     [shapes.sphere(5), shapes.creature(2, faces=200, subdivisions=3), rough_sphere()],
     ids=["sphere", "creature", "rough"],
 )
-def test_lifted_curve_is_valid_and_near(mesh, closed):
+def test_fine_curve_is_valid_and_near(mesh, closed):
     chosen = np.random.default_rng(2).choice(len(mesh.vertices), size=4, replace=False)
-    coarse, curve, result = lifted_through(mesh, chosen, closed)
+    coarse, curve, result = curves_through(mesh, chosen, closed)
     assert result is not None
     assert_valid_curve(mesh, result, closed=closed)
     found = result.points[result.control_index]
