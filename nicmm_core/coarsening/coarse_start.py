@@ -110,7 +110,9 @@ class CoarseStarts:
             return None
         curve = zeros.curves[0]
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
-        result = curve_on_fine_mesh(self._fine, coarse, level.surface, curve, request.points[visited])
+        result = curve_on_fine_mesh(
+            self._fine, coarse, level.surface, curve, request.points[visited]
+        )
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:

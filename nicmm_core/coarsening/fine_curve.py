@@ -83,7 +83,9 @@ def _through_nodes(
         checkpoint()
         following = (node + 1) % len(cell)
         around = coarse.cells_around(np.unique(cell[[node, following]]))
-        bridge = _path_along_edges(fine, coarse.faces_of_cells(fine, around), nodes, node, following)
+        bridge = _path_along_edges(
+            fine, coarse.faces_of_cells(fine, around), nodes, node, following
+        )
         if bridge is None:
             return None
         bridges[node] = bridge

@@ -116,7 +116,7 @@ def solve(
         if watch is not None and not watch(iteration / config.iterations, best_field):
             status = Status.CANCELLED
             break
-        if _rests(least, config):
+        if _is_still(least, config):
             status = Status.CONVERGED
             break
         moved, damping = gauss_newton_step(problem, band, links, field, weights, damping, config)
@@ -130,7 +130,7 @@ def solve(
     return Solution(field, terms, losses, status, keeps_topology=True)
 
 
-def _rests(least: list[float], config: VariationalConfig) -> bool:
+def _is_still(least: list[float], config: VariationalConfig) -> bool:
     """Whether the least loss so far has not changed for some iterations."""
     if len(least) <= config.patience:
         return False

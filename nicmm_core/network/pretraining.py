@@ -238,11 +238,11 @@ def _resume(
     return list(state["losses"])
 
 
-def _kind(drawn: float, config: PretrainingConfig) -> tuple[bool, str]:
+def _kind(sample: float, config: PretrainingConfig) -> tuple[bool, str]:
     """Whether a set's curve is closed, and in which order it visits the points."""
-    if drawn < config.open_share:
+    if sample < config.open_share:
         return False, "shortest"
-    return True, "given" if drawn < config.open_share + config.given_share else "shortest"
+    return True, "given" if sample < config.open_share + config.given_share else "shortest"
 
 
 def _fingerprint(meshes: Sequence[Mesh]) -> str:

@@ -47,30 +47,30 @@ def random_maps(
     obstacles, alignment = np.zeros(size), np.zeros(size)
     for _ in range(generator.integers(1, MOST_STROKES + 1)):
         ends = generator.choice(points, 2, replace=False)
-        way = _way(graph, int(ends[0]), int(ends[1]))
+        path = _shortest_path(graph, int(ends[0]), int(ends[1]))
         weight = generator.uniform(*WEIGHTS)
         if generator.random() < 0.5:
-            middle = generator.choice(way)
+            middle = generator.choice(path)
             radius = generator.uniform(*RADII) * unit
             near = _around(graph, int(middle), radius)
             obstacles[near] = np.maximum(obstacles[near], weight)
         else:
-            stops = [way[int(share * (len(way) - 1))] for share in PART]
+            stops = [path[int(share * (len(path) - 1))] for share in PART]
             beside = [
                 int(generator.choice(_around(graph, int(stop), BESIDE * unit))) for stop in stops
             ]
-            lane = _way(graph, *beside)
+            lane = _shortest_path(graph, *beside)
             alignment[lane] = np.maximum(alignment[lane], weight)
     return obstacles, alignment
 
 
-def _way(graph: sparse.csr_array, start: int, end: int) -> IntArray:
+def _shortest_path(graph: sparse.csr_array, start: int, end: int) -> IntArray:
     """Vertices of the shortest way along edges."""
     _, previous = csgraph.dijkstra(graph, directed=False, indices=end, return_predecessors=True)
-    way = [start]
-    while way[-1] != end:
-        way.append(int(previous[way[-1]]))
-    return np.array(way)
+    path = [start]
+    while path[-1] != end:
+        path.append(int(previous[path[-1]]))
+    return np.array(path)
 
 
 def _around(graph: sparse.csr_array, middle: int, radius: float) -> IntArray:

@@ -22,7 +22,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
-from .simple_path import lay_path
+from .simple_path import find_path
 from .via_points import ViaPoints, Waypoints, names_of, with_via_points
 from .virtual_splits import SplitMesh, WorkingMesh
 from .visiting_order import order_along_boundaries, shortest_order
@@ -110,27 +110,28 @@ def build_initial_loop(
     tours = _Tours(mesh, points, closed)
     path, failure = None, None
     for visit in tours.of(order):
-        way = Waypoints(_chosen(points, visit), np.ones(len(points), dtype=bool), names_of(visit))
+        waypoints = Waypoints(points[visit], np.ones(len(points), dtype=bool), names_of(visit))
         if via_points is not None:
-            way = with_via_points(mesh, points, via_points, order, closed)
+            waypoints = with_via_points(mesh, points, via_points, order, closed)
         try:
-            path = lay_path(mesh, way.points, phi_fea, closed)
+            path = find_path(mesh, waypoints.points, phi_fea, closed)
             break
         except UnreachableError as error:
             failure = error
     if path is None:
         what = str(failure)
         if isinstance(failure, CrossingError):
-            here, there = way.names[failure.leg], way.names[(failure.leg + 1) % len(way.names)]
+            names, leg = waypoints.names, failure.leg
+            here, there = names[leg], names[(leg + 1) % len(names)]
             what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
-        advice = _advice(mesh, points, tours, visit, phi_fea, not way.is_control.all())
+        advice = _advice(mesh, points, tours, visit, phi_fea, not waypoints.is_control.all())
         raise UnreachableError(f"{what}; {advice}") from failure
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
     loop, zigzag = refine_along(split, component, path.vertices, closed, pieces)
     _separate_strands(split, loop, closed)
     working, renumbered = split.assemble(component)
-    vertices, controls = renumbered[loop], renumbered[path.waypoints[way.is_control]]
+    vertices, controls = renumbered[loop], renumbered[path.waypoints[waypoints.is_control]]
     beside = np.isin(working.edges, vertices).any(axis=1)
     edge_length = float(working.edge_lengths[beside].mean())
     return working, InitialLoop(vertices, controls, visit, edge_length, zigzag, closed)
@@ -234,7 +235,7 @@ def _advice(
             continue
         tried.append(order.tolist())
         try:
-            lay_path(mesh, _chosen(points, order), phi_fea, tours.closed)
+            find_path(mesh, points[order], phi_fea, tours.closed)
         except UnreachableError:
             continue
         without = "without via points " if via else ""
@@ -272,10 +273,6 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
     return curve_on_mesh(
         mesh, loop.closed, face, barycentric.reshape(-1, 3), place[loop.control_vertices]
     )
-
-
-def _chosen(points: SurfacePoints, chosen: IntArray) -> SurfacePoints:
-    return SurfacePoints(points.faces[chosen], points.barycentric[chosen])
 
 
 def _separate_strands(split: SplitMesh, loop: list[int], closed: bool) -> None:

@@ -60,7 +60,7 @@ class Legs:
         self._search = search
         self._waypoints = waypoints
         self.count = len(waypoints) - (not closed)
-        self._laid: dict[int, list[int]] = {}
+        self._paths: dict[int, list[int]] = {}
         self._length: dict[int, float] = {}
         self._splits_before = split.n_vertices
 
@@ -76,7 +76,7 @@ class Legs:
     @property
     def vertices(self) -> list[int]:
         """The whole path; the first vertex of a closed one is not repeated."""
-        path = [vertex for leg in range(self.count) for vertex in self._laid[leg][:-1]]
+        path = [vertex for leg in range(self.count) for vertex in self._paths[leg][:-1]]
         closed = self.count == len(self._waypoints)
         return path if closed else [*path, self._waypoints[-1]]
 
@@ -98,13 +98,13 @@ class Legs:
             if lengths[leg] > straight * np.linalg.norm(end - start):
                 for vertex in self.ends(leg):
                     self._open_corners(vertex)
-                way = self._search.shortest(*self.ends(leg), free)
-                if way is None:
+                alone = self._search.shortest(*self.ends(leg), free)
+                if alone is None:
                     raise CrossingError(leg)
-                lengths[leg] = way.length
+                lengths[leg] = alone.length
         return lengths
 
-    def lay_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
+    def find_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
         """Lay every leg; False when the path has become longer than it may be.
 
         Parameters
@@ -131,13 +131,13 @@ class Legs:
             if self.length > most_length:
                 return False
         while separating:
-            leg = self._lay_one_of(separating)
+            leg = self._find_one_of(separating)
             separating.remove(leg)
             if self.length > most_length:
                 return False
         return True
 
-    def _lay_one_of(self, separating: list[int]) -> int:
+    def _find_one_of(self, separating: list[int]) -> int:
         """Lay the first leg after which all others are still possible, and say which it is."""
         for leg in separating:
             found = self._find(leg)
@@ -147,7 +147,7 @@ class Legs:
             if self._all_possible([other for other in separating if other != leg]):
                 return leg
             # What was split for it stays split.
-            del self._laid[leg], self._length[leg]
+            del self._paths[leg], self._length[leg]
         raise CrossingError(separating[0])
 
     def _by_separation(self, sequence: list[int]) -> tuple[list[int], list[int]]:
@@ -172,7 +172,7 @@ class Legs:
         return self._search.shortest(source, target, self._obstacles(source, target))
 
     def _keep(self, leg: int, found: Leg) -> None:
-        self._laid[leg] = split_along(self._split, found.nodes)
+        self._paths[leg] = split_along(self._split, found.nodes)
         self._length[leg] = found.length
         if self._split.n_vertices - self._splits_before > MOST_PATH_SPLITS:
             raise UnreachableError(
@@ -190,10 +190,10 @@ class Legs:
 
     def _obstacles(self, *free: int) -> BlockedElements:
         """All legs, and all waypoints but those that are free."""
-        laid = [np.array(path, dtype=np.int64) for path in self._laid.values()]
-        edges = [np.stack([path[:-1], path[1:]], axis=1) for path in laid]
+        paths = [np.array(path, dtype=np.int64) for path in self._paths.values()]
+        edges = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
         nothing = np.zeros((0, 2), dtype=np.int64)
-        vertices = np.concatenate([*laid, np.array(self._waypoints, dtype=np.int64)])
+        vertices = np.concatenate([*paths, np.array(self._waypoints, dtype=np.int64)])
         return BlockedElements(
             vertices=np.setdiff1d(vertices, free),
             edges=np.concatenate([*edges, nothing]),
@@ -202,7 +202,7 @@ class Legs:
 
     def _loose(self) -> IntArray:
         """Waypoints that one leg has reached."""
-        reached = [vertex for leg in self._laid for vertex in self.ends(leg)]
+        reached = [vertex for leg in self._paths for vertex in self.ends(leg)]
         vertices, count = np.unique(np.array(reached, dtype=np.int64), return_counts=True)
         return vertices[count == 1]
 
@@ -220,7 +220,7 @@ class Legs:
         """
         if not self._is_on_rim(vertex):
             return
-        closed = {other for path in self._laid.values() for other in _beside(path, vertex)}
+        closed = {other for path in self._paths.values() for other in _beside(path, vertex)}
         for face in sorted(self._split.faces_around(vertex)):
             others = [corner for corner in self._split.corners(face) if corner != vertex]
             if all(

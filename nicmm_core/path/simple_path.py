@@ -62,7 +62,7 @@ class Path:
     length: float
 
 
-def lay_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
+def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
     """A simple path through points in their order, on a mesh that is split for it virtually.
 
     The legs are laid as the points follow one another. If that makes a path much longer than its
@@ -100,7 +100,7 @@ def lay_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clos
         legs = Legs(split, search, waypoints.tolist(), closed)
         done = False
         try:
-            done = legs.lay_all(sequence, np.inf if best is None else best.length)
+            done = legs.find_all(sequence, np.inf if best is None else best.length)
         except UnreachableError as error:
             # Winding too often says no more than that; crossing, that no path may exist.
             if failure is None or not isinstance(error, CrossingError):

@@ -139,9 +139,9 @@ def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> Su
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
     on_rim[mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]] = True
     support = (points.barycentric > 0.0) & ~on_rim[mesh.faces[points.faces]]
-    drawn = (which & ~support.any(axis=1))[:, None]
+    moved = (which & ~support.any(axis=1))[:, None]
     inside = (1.0 - OFF_BOUNDARY) * points.barycentric + OFF_BOUNDARY / 3.0
-    return SurfacePoints(points.faces, np.where(drawn, inside, points.barycentric))
+    return SurfacePoints(points.faces, np.where(moved, inside, points.barycentric))
 
 
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
