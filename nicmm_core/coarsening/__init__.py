@@ -1,4 +1,4 @@
-"""Large meshes: the curve is found on a coarse mesh of the same surface, then lifted.
+"""Large meshes: the curve is found on a coarse mesh of the same surface first.
 
-`coarse_mesh` makes the coarse mesh, `lifting` brings a curve back from it.
+`coarse_mesh` makes the coarse mesh, `fine_curve` maps a curve from there to the fine mesh.
 """

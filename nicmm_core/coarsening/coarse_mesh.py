@@ -1,10 +1,9 @@
 """A coarse mesh of the same surface: the dual of geodesic Voronoi cells.
 
 Some vertices of the fine mesh are chosen as seeds, about evenly spread. Every vertex belongs to the
-seed that it is nearest to along edges, and three seeds whose cells meet in a face make a coarse
-face. Distances run along the surface, so two sheets that come close stay apart, and nothing is
-asked of the mesh but that it is connected. One run of Dijkstra's algorithm does it, on a large mesh
-one for each slab of it.
+cell of its nearest seed along edges, and three seeds whose cells meet in a face make a coarse face.
+Distances are measured along the surface, so two sheets that come close stay separate. The mesh only
+has to be connected. Dijkstra's algorithm finds the cells, on a large mesh slab by slab.
 """
 
 from __future__ import annotations
@@ -27,44 +26,44 @@ from ..progress import checkpoint
 from ..repair.degenerate_faces import flat_faces, with_areas
 
 CANDIDATES = 8
-"""Vertices that seeds are chosen from, for each seed."""
+"""Candidate vertices per seed."""
 
 PACKING = 0.84
-"""Least distance of two seeds, relative to the side of a square of the area that one has."""
+"""Least distance between two seeds, relative to the square root of the area per seed."""
 
 NORMAL_WEIGHT = 0.6
-"""Distance that the difference of two unit normals counts for, in least distances of seeds.
+"""Weight of the difference of two unit normals in the distance, in least distances of seeds.
 
-Twice that, for opposite normals, is more than one: the two sides of a plate and of a thin limb have
-seeds of their own.
+Opposite normals differ by 2, which counts as more than the least distance; so the two sides of a
+plate or of a thin limb get separate seeds.
 """
 
 SLAB = 150_000
-"""Vertices of a slab; a run of Dijkstra's algorithm over them takes a tenth of a second.
+"""Vertices of a slab; a run of Dijkstra's algorithm over them takes about 0.1 s.
 
-Nobody can be asked meanwhile whether to go on, nor by another thread: it holds Python's lock.
+It holds Python's global lock and cannot be cancelled while it runs.
 """
 
 MARGIN = 4.0
-"""What a slab is widened by on both sides, in least distances of seeds.
+"""Overlap of a slab with its neighbours on either side, in least distances of seeds.
 
-Seeds are one of these apart and candidates half of one, so hardly any vertex is as far as two from
-its nearest seed, along edges a little more.
+Candidates are about half a distance apart, so hardly any vertex is farther than two distances from
+its nearest seed; paths along edges are a little longer.
 """
 
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """A coarse mesh of one component and where its vertices are on the fine one.
+    """A coarse mesh of one component, with its vertices on the fine mesh.
 
     Attributes
     ----------
     mesh : Mesh
         n vertices.
     seed : (n,) int array
-        The fine vertex that each vertex is.
+        The fine vertex of each coarse vertex.
     cell : (V,) int array
-        The coarse vertex that each fine one is nearest to, -1 on other components.
+        The nearest coarse vertex of each fine vertex, -1 on other components.
     """
 
     mesh: Mesh
@@ -73,12 +72,12 @@ class CoarseMesh:
 
     @cached_property
     def _by_cell(self) -> tuple[IntArray, IntArray]:
-        """Fine vertices in the order of their cells, and where each cell begins."""
+        """Fine vertices sorted by cell, and the start of each cell."""
         order = np.argsort(self.cell, kind="stable")
         return order, np.searchsorted(self.cell[order], np.arange(len(self.seed) + 1))
 
     def faces_of_cells(self, fine: Mesh, vertices: IntArray) -> IntArray:
-        """Fine faces at the fine vertices of some cells, ascending."""
+        """Fine faces at the vertices of some cells, ascending."""
         order, begin = self._by_cell
         parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
         return fine.faces_at(np.concatenate(parts))
@@ -95,12 +94,12 @@ class CoarseMesh:
         return greatest
 
     def nearest_points(self, fine: Mesh, points: SurfacePoints) -> SurfacePoints:
-        """The points nearest to points of the fine mesh, in the cells that those lie in.
+        """Project points of the fine mesh to the coarse mesh, within the cells that they lie in.
 
         Raises
         ------
         UnreachableError
-            If a cell meets too few others to have a face.
+            If a cell has no coarse face.
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
         positions = points.positions(fine)
@@ -127,7 +126,7 @@ def build_coarse_mesh(
         Unit vectors.
     component : int
     count : int
-        More cells come where the surface is strongly curved.
+        Strongly curved regions get more cells.
 
     Raises
     ------
@@ -155,7 +154,7 @@ def build_coarse_mesh(
 
 
 def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
-    """A mesh whose faces have areas: on a grid three seeds may lie on one straight line."""
+    """A mesh without degenerate faces: on a grid, three seeds may be collinear."""
     mesh = Mesh(vertices, faces)
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
     flat = flat_faces(vertices, faces, short)
@@ -166,7 +165,7 @@ def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
 
 
 def _edge_graph(mesh: Mesh) -> sparse.csr_array:
-    """Lengths of the edges, each in one place, shape (V, V)."""
+    """Lengths of the edges, each stored once, shape (V, V)."""
     length = edge_lengths(mesh.vertices, mesh.edges)
     size = len(mesh.vertices)
     return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
@@ -175,11 +174,11 @@ def _edge_graph(mesh: Mesh) -> sparse.csr_array:
 def _nearest_seeds(
     vertices: FloatArray, graph: sparse.csr_array, seed: IntArray, margin: float
 ) -> IntArray:
-    """Which seed each vertex is nearest to along edges, shape (V,).
+    """The nearest seed of each vertex along edges, shape (V,).
 
-    -1 where there is none, or, on meshes of more than one slab, none as near as the margin. Ways
-    no longer than that from a vertex of a slab stay in the widened slab, so what is found there
-    holds on the whole mesh.
+    -1 where there is none, or none within the margin on a mesh of several slabs. Paths no longer
+    than the margin from a vertex of a slab stay in the widened slab, so the results for its own
+    vertices hold on the whole mesh.
     """
     n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
     along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]
@@ -209,10 +208,10 @@ def _nearest_seeds(
 def _seeds(
     mesh: Mesh, normals: FloatArray, areas: FloatArray, n_candidates: int, distance: float
 ) -> IntArray:
-    """Vertices that keep a distance from one another, ascending."""
+    """Vertices at least a distance apart, ascending."""
     generator = np.random.default_rng(0)
     there = np.flatnonzero(areas > 0.0)
-    # The smallest of exponential times by area: a draw by area, without replacement.
+    # The smallest exponential times: a sample weighted by area, without replacement.
     times = generator.exponential(size=len(there)) / areas[there]
     checkpoint()
     candidates = there[np.argsort(times)[:n_candidates]]

@@ -1,4 +1,4 @@
-"""Where a curve on a large mesh begins: predicted on a coarse mesh of the surface, then lifted."""
+"""The start of a curve on a large mesh: inferred on a coarse mesh, then mapped to the fine mesh."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import curve_on_fine_mesh
 
 CELLS = 4_000
-"""Cells of the first coarse mesh, about as many vertices as the network was trained on."""
+"""Cells of the first coarse mesh: about the number of vertices of the training meshes."""
 
 REDUCTION = 2
-"""Vertices of the mesh for each cell at least."""
+"""Least number of fine vertices per cell."""
 
 SMALL = 3_000
-"""Vertices up to which a mesh is its own coarse mesh."""
+"""Number of vertices up to which a mesh needs no coarse mesh."""
 
 GROWTH = 4
-"""Growth of the number of cells from one coarse mesh that gives no curve to the next."""
+"""Factor of the number of cells after a coarse mesh on which no curve was found."""
 
 
 COARSE_SHARE = 0.3
-"""About how much of the time to the first start on a mesh its coarse mesh takes."""
+"""Approximate share of the time to a first start that building the coarse mesh takes."""
 
 
 @dataclass(frozen=True)
 class CoarseStart:
-    """A curve from which relaxation on the fine mesh begins.
+    """A curve from which relaxation on the fine mesh starts.
 
     Attributes
     ----------
     curve : SurfaceCurve
         Simple.
     visited : (k,) int array
-        Which of the control points it passes, in order.
+        Indices of the control points in the order of the curve.
     breaking_vertices : int
         Of the level set on the coarse mesh.
     """
@@ -61,12 +61,12 @@ class _CoarseSurface:
 
 
 class CoarseStarts:
-    """The coarse meshes of one mesh, each made when it is first needed and kept.
+    """The coarse meshes of one mesh, each built on first use and cached.
 
     Parameters
     ----------
     surface : CurveSurface
-        Of that mesh.
+        Of the fine mesh.
     """
 
     def __init__(self, surface: CurveSurface) -> None:
@@ -75,10 +75,10 @@ class CoarseStarts:
         self._sizes: dict[int, int] = {}
 
     def find(self, request: Request) -> CoarseStart | None:
-        """The curve of the first coarse mesh that gives one; None where none does.
+        """The curve of the coarsest mesh on which one is found; None if there is none.
 
-        That is so on a small mesh, and may be so for points or strands that are close to one
-        another: then the mesh itself decides.
+        There is none on a small mesh, and perhaps none where points or strands are close together;
+        the caller then falls back to full resolution.
         """
         component = int(self._mesh.face_component[request.points.faces[0]])
         most = self._n_vertices(component) // REDUCTION
@@ -129,7 +129,7 @@ def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
     Raises
     ------
     ControlPointError, UnreachableError
-        If control points are the same there, or apart.
+        If control points coincide there, or lie on different components.
     """
 
     def nearest(points: SurfacePoints) -> SurfacePoints:
@@ -145,11 +145,11 @@ def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
 
 
 def _in_cells(coarse: CoarseMesh, weights: FloatArray | None) -> FloatArray | None:
-    """The greatest weight in each cell: no wall and no lane is lost."""
+    """The greatest weight in each cell, so that no obstacle and no lane is lost."""
     return None if weights is None else coarse.greatest_in_cells(weights)
 
 
 def _visited(curve: SurfaceCurve, positions: FloatArray) -> IntArray:
-    """Which of the control points, (k, 3), a curve passes, in order."""
+    """Indices of the control points, (k, 3), in the order of a curve."""
     passed = curve.points[curve.control_index]
     return np.linalg.norm(passed[:, None] - positions, axis=2).argmin(axis=1)

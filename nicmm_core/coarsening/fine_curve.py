@@ -1,9 +1,9 @@
-"""Bring a curve from the coarse mesh back to the fine one.
+"""Map a curve from the coarse mesh to the fine mesh.
 
-Nodes of the coarse curve are found again in the cells that they lie in and joined by straight ways
-over the faces, as in the relaxation. Where the fine surface is too rough for that, the shortest path
-along its edges joins them. Cells and ways stay on the surface, so a curve on one side of a thin
-limb is lifted to that side.
+Nodes of the coarse curve are projected to the fine faces of their cells and joined by straight
+traces, as in the relaxation. Where the fine surface is too rough for a trace, the shortest path
+along edges joins them. Cells and paths follow the surface, so a curve on one side of a thin limb
+stays on that side.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..relaxation.noded_curve import NodedCurve, is_simple, noded_curve, straigh
 from .coarse_mesh import CoarseMesh
 
 NODES = (256, 512, 128)
-"""Nodes that are lifted, the numbers that are tried one after the other.
+"""Numbers of nodes, tried in this order.
 
-What is finer on a coarse curve is its mesh's and not the surface's; but where strands are close to
-one another, ways between other nodes may pass beside each other.
+Finer detail of the coarse curve comes from the coarse mesh and not from the surface. Where strands
+are close together, traces between other nodes may avoid a crossing.
 """
 
 
@@ -54,7 +54,7 @@ def curve_on_fine_mesh(
     Returns
     -------
     SurfaceCurve or None
-        Simple and exactly through its control points; None where that does not come out.
+        Simple and exactly through its control points; None if no such curve is found.
     """
     for count in NODES:
         checkpoint()
@@ -75,7 +75,7 @@ def _through_nodes(
     faces[exact.control_nodes] = controls.faces
     barycentric[exact.control_nodes] = controls.barycentric
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
-    # The coarse mesh's normals do not follow every dent that a path has to pass.
+    # Normals of the coarse mesh ignore small dents that a trace has to cross.
     smooth = replace(nodes, normals=exact.nodes.normals)
     polyline, node_place, lost = straight_traces(surface, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
@@ -95,7 +95,7 @@ def _through_nodes(
 def _nearest_points(
     fine: Mesh, coarse: CoarseMesh, points: SurfacePoints
 ) -> tuple[SurfacePoints, IntArray]:
-    """Points of the coarse mesh on the fine one, strictly inside faces, and their cells, (p,)."""
+    """Coarse points projected to the fine mesh, strictly inside faces, and their cells, (p,)."""
     positions = points.positions(coarse.mesh)
     cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
     faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
@@ -112,7 +112,7 @@ def _nearest_points(
 def _path_along_edges(
     mesh: Mesh, inside: IntArray, nodes: Nodes, start: int, end: int
 ) -> SurfacePoints | None:
-    """The shortest path along edges of some faces from one node to another, without the latter."""
+    """The shortest path along edges of some faces from one node to another, without its end."""
     vertices, faces = np.unique(mesh.faces[inside], return_inverse=True)
     edges, _ = unique_edges(faces.reshape(-1, 3))
     ends = nodes.places[np.array([start, end])]
@@ -130,7 +130,7 @@ def _path_along_edges(
     arcs = np.concatenate([edges, np.array([link[:2] for link in links]).reshape(-1, 2)])
     length = np.linalg.norm(positions[arcs[:, 0]] - positions[arcs[:, 1]], axis=1)
     size = len(positions)
-    # A zero would not be an arc.
+    # A length of zero would not be stored as an arc.
     length = np.maximum(length, np.finfo(float).tiny)
     graph = sparse.csr_array((length, (arcs[:, 0], arcs[:, 1])), shape=(size, size))
     _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
@@ -144,9 +144,9 @@ def _path_along_edges(
 
 
 def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> SurfacePoints | None:
-    """A path over vertices as points, each in the face of the segment after it, with its start."""
+    """A path along vertices as points, with its start, each in the face of the next segment."""
     start, end = ({*_support(mesh, ends, number)} for number in range(2))
-    # An end that is a vertex itself is not passed twice.
+    # An end that is itself a vertex must not be repeated.
     if start == {path[0]}:
         path = path[1:]
     if path and end == {path[-1]}:
@@ -168,12 +168,12 @@ def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> Surface
 
 
 def _support(mesh: Mesh, points: SurfacePoints, number: int) -> list[int]:
-    """The vertices that a point is a mixture of."""
+    """The vertices with nonzero weight at a point."""
     return mesh.faces[points.faces[number]][points.barycentric[number] > 0.0].tolist()
 
 
 def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
-    """The first face that has all of some vertices."""
+    """The face of lowest index that has all the vertices."""
     around = [mesh.faces_at(np.array([vertex])) for vertex in sorted(vertices)]
     common = around[0]
     for faces in around[1:]:
@@ -188,7 +188,7 @@ def _with_bridges(
     node_place: IntArray,
     bridges: dict[int, SurfacePoints],
 ) -> NodedCurve:
-    """The polyline with the ways that replace single stretches between nodes."""
+    """The polyline with paths along edges in place of lost traces."""
     bounds = np.append(node_place, len(polyline))
     parts = [
         bridges.get(node, polyline[np.arange(bounds[node], bounds[node + 1])])
