@@ -1,4 +1,4 @@
-"""The curve itself is relaxed on the input mesh.
+"""Relaxation of the curve itself on the input mesh.
 
-`relaxing` is the entry point; `warm_start` goes on from a curve that was relaxed before.
+`relaxing` is the entry point; `warm_start` starts from a curve that was relaxed before.
 """

@@ -1,7 +1,8 @@
-"""The level set that belongs to a curve: distance to it, with a sign where it bounds a region.
+"""The level set of a curve: the distance to it, signed if the curve bounds a region.
 
-The sign is found from the edges that the curve crosses: their ends lie on different sides, the ends
-of all other edges on one. Where that contradicts itself, the curve bounds nothing.
+The two ends of an edge lie on different sides if the curve crosses the edge an odd number of times,
+and on the same side otherwise. If these conditions contradict each other, the curve bounds no
+region.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
     """Distance to a curve at the vertices, in mesh units, shape (V,).
 
     Negative inside a closed curve that bounds a region, which is the side with the smaller area.
-    Vertices that are not connected to the curve get the greatest distance: they are outside.
+    Vertices on other components are outside, at the greatest distance found.
     """
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
     n_segments = len(curve.points) if curve.closed else len(curve.points) - 1
@@ -39,7 +40,7 @@ def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
 
 
 def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
-    """-1 inside a closed curve, +1 outside and 0 on it, (V,); None where it bounds nothing."""
+    """-1 inside a closed curve, +1 outside and 0 on it, (V,); None if it bounds no region."""
     n_vertices = len(mesh.vertices)
     edges, _ = unique_edges(mesh.faces)
     corners = mesh.faces[curve.faces]
@@ -47,7 +48,7 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     on_curve = np.zeros(n_vertices, dtype=bool)
     at_vertex = weights.sum(axis=1) == 1
     on_curve[corners[at_vertex][weights[at_vertex]]] = True
-    # A point on an edge crosses it if the curve comes from one face and goes on in another.
+    # At a point on an edge, the curve crosses the edge if it passes from one face to another.
     changes = (weights.sum(axis=1) == 2) & (curve.faces != np.roll(curve.faces, 1))
     crossed = np.sort(corners[changes][weights[changes]].reshape(-1, 2), axis=1)
     size = np.array([n_vertices, 1])
@@ -58,7 +59,7 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     part, side = two_sides(n_vertices, edges[off], parity[off] == 1)
     if (side == 0)[~on_curve].any():
         return None
-    # What only vertices on the curve join to the rest counts as outside.
+    # Parts connected to the rest only through vertices on the curve count as outside.
     here = np.zeros(n_vertices, dtype=bool)
     here[mesh.faces[mesh.face_component == mesh.face_component[curve.faces[0]]]] = True
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n_vertices)

@@ -1,4 +1,4 @@
-"""Nodes of a curve on a surface: where they are, and how the surface and the curve lie there."""
+"""Nodes of a curve on a surface, with the normals and conormals there."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..progress import checkpoint
 
 @dataclass(frozen=True)
 class CurveSurface:
-    """What a curve needs of the surface that it moves on.
+    """The surface on which a curve moves.
 
     Attributes
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-        Unit vectors. Their signs are ignored: every face reads them to its own side.
+        Unit vectors. Their signs do not matter: each face turns them to its own side.
     feature_map : (V,) float array or None
         φ_fea.
     feature_weight : float
         λ_fea / λ_smooth, in 1/length², where there is a feature map.
     folded : (F,) bool array or None
-        Faces that are folded back over others: they look away from the normals of their corners.
-        None where there are none.
+        Faces that are folded back over others: they point against the normals of their corners.
+        None if there are none.
     """
 
     mesh: Mesh
@@ -41,7 +41,7 @@ class CurveSurface:
 
 
 def curve_surface(mesh: Mesh) -> CurveSurface:
-    """The surface of a mesh, without a map."""
+    """The surface of a mesh, without a feature map."""
     normals = unsigned_normals(mesh)
     return CurveSurface(mesh, normals, folded=_folded_faces(mesh, normals))
 
@@ -49,11 +49,10 @@ def curve_surface(mesh: Mesh) -> CurveSurface:
 def unsigned_normals(mesh: Mesh) -> FloatArray:
     """Unit normals at the vertices, up to their signs, shape (V, 3).
 
-    Weighted by corner angle. A vertex that has been pushed over an edge has faces that are folded
-    back, whose angles count as much as others'; at their corners normals are weighted by area,
-    which no move of a vertex within its neighbours' plane changes. Where faces of opposite
-    orientation meet, as somewhere on any Möbius strip, normals would cancel; there it is the
-    direction that the faces' normals share best, whatever their signs.
+    Weighted by corner angle. At corners of folded faces, as beside a vertex pushed over an edge,
+    they are weighted by signed area instead, which does not change when a vertex moves within the
+    plane of its neighbours. Where faces of opposite orientation meet, as on a Möbius strip, normals
+    would cancel; there the normal is the principal direction of the face normals.
     """
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = unoriented_vertices(mesh.faces)
@@ -73,9 +72,9 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
 
 
 def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
-    """Vertices of faces that look away from the normal of one of their corners, ascending.
+    """Vertices of faces at an angle of at least 90° to the normal of a corner, ascending.
 
-    Or across it, as every face does where the normal is zero.
+    A normal of zero counts too.
     """
     folded = np.zeros(len(mesh.vertices), dtype=bool)
     folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
@@ -83,9 +82,9 @@ def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
 
 
 def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
-    """Faces that look away from the normals of their corners, None where none does.
+    """Faces that point against the normals of their corners; None if there are none.
 
-    None is said to where faces of opposite orientation meet: signs of normals mean nothing there.
+    Faces at vertices where opposite orientations meet never count: signs have no meaning there.
     """
     folded = _facing(mesh, normals).sum(axis=1) < 0.0
     if folded.any():
@@ -102,7 +101,7 @@ def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Of each face round some vertices: which of these it is at, its normal and its area."""
+    """Faces around some vertices: the index of the vertex, the normal and the area of each."""
     incidence = mesh.vertex_faces[vertices]
     owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
     return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
@@ -145,19 +144,19 @@ class Nodes:
 
     @cached_property
     def conormals(self) -> FloatArray:
-        """Unit vectors across the curve in the tangent planes, shape (n, 3)."""
+        """Unit vectors normal to the curve in the tangent planes, shape (n, 3)."""
         unit = _unit(self.steps)
         return _unit(cross(self.normals.T, unit.T + before_each(unit.T)).T)
 
     def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
-        """How normals, (n, 3), and φ_fea, (n,), change as their node moves along its conormal."""
+        """Derivatives of normals, (n, 3), and φ_fea, (n,), by moves along conormals."""
         mesh, faces = surface.mesh, self.places.faces
         a, b, c = mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2)
         one, other = b - a, c - a
         # Barycentric coordinates of the move: least squares in the plane of the face.
         p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
         f, g = (one * self.conormals).sum(axis=1), (other * self.conormals).sum(axis=1)
-        # No smaller than what rounding leaves of it where two long sides make hardly any angle.
+        # At least its rounding error, where two long sides are almost parallel.
         determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
         determinant = np.maximum(determinant, tolerances.TINY)
         u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
@@ -174,7 +173,7 @@ class Nodes:
 
 
 def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool) -> Nodes:
-    """Nodes with what the energy needs of the surface there."""
+    """Nodes with the normals and φ_fea that the energy needs."""
     weight = places.barycentric
     normals = _unit(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
     phi_fea = np.ones(len(places))
@@ -204,22 +203,22 @@ def _unit(vectors: FloatArray) -> FloatArray:
 
 
 def after_each(values: FloatArray) -> FloatArray:
-    """What the next node of the ring has; nodes are the last axis."""
+    """Values of the next node of the ring; nodes are the last axis."""
     return np.concatenate([values[..., 1:], values[..., :1]], axis=-1)
 
 
 def before_each(values: FloatArray) -> FloatArray:
-    """What the node before has; nodes are the last axis."""
+    """Values of the previous node of the ring; nodes are the last axis."""
     return np.concatenate([values[..., -1:], values[..., :-1]], axis=-1)
 
 
 def dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Products of vectors whose components are the first axis, which is several times as fast."""
+    """Dot products; components are the first axis, which is several times as fast."""
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Vectors across two others, components first."""
+    """Cross products; components are the first axis."""
     return np.stack(
         [
             one[1] * other[2] - one[2] * other[1],

@@ -1,20 +1,19 @@
-"""The energy of a curve itself: Eq. 6 and 7 where φ is exactly the distance to its zero set.
+"""The energy of a curve: Eq. 6 and 7 where φ is exactly the distance to its zero set.
 
-There |∇φ| = 1, the level-set term vanishes and the integrals over the surface run along the curve:
+There |∇φ| = 1, the level-set term vanishes and the integrals reduce to the curve:
 
     E = ∮ κ_g² ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds.
 
-The length keeps far points from being joined by ever larger bows. There τ = (2π / L)², with which a
-circle in the plane neither grows nor shrinks, so that the balance has no length of its own. φ_fea
-is 1 outside all maps, and there the curve is what it would be without any. τ_fea scales with the
-size of the surface, and is a few times τ on curves so short that this is more. An obstacle,
-where φ_fea is more, adds to the tension. Along a lane it is less; there only where the curve runs
-counts and not how much of it: ds is held, or it would pay to buckle in a lane for the sake of
-length. Where strands of the curve may not cross, a fourth term keeps them apart (`strand_contact`).
+Without the length term, ever larger arcs would join distant points. τ = (2π / L)², with which a
+circle in the plane neither grows nor shrinks, so the balance does not depend on scale. Outside all
+maps φ_fea = 1, and maps have no effect. τ_fea scales with the surface, but is at least a few times
+τ, which matters for short curves. In an obstacle φ_fea > 1, which adds to the tension. In a lane
+φ_fea < 1. The energy must not reward length there, or the curve would buckle in the lane to gain
+length; so ds is held constant, and only the position counts. Where strands must not cross, a
+contact term keeps them apart (`strand_contact`).
 
-The unknowns are moves of nodes along their conormals. A node's residuals know only its
-two neighbours, so that Gauss-Newton's matrix has two bands to each side and a step costs next to
-nothing.
+The unknowns are moves of nodes along their conormals. Residuals of a node depend on it and its two
+neighbours only, so the Gauss–Newton matrix has two bands on each side and a step is cheap.
 """
 
 from __future__ import annotations
@@ -33,16 +32,16 @@ from .strand_contact import contacts_between
 FEATURE_TENSION = 600.0
 """τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
 
-It sets how tightly the curve may bend to follow a map: about 1/√600, 4 % of that length. The ratio
-of the level set's energy, 30, leaves the curve too stiff for what people paint.
+It sets the smallest radius with which the curve bends to follow a map: about 1/√600, 4 % of that
+length. With the level set's ratio, 30, the curve would be too stiff for typical painted maps.
 """
 
 OVER_TENSION = 4.0
-"""What τ_fea has of τ besides, so that short curves follow a map too.
+"""Multiple of τ added to τ_fea, so that short curves follow a map too.
 
-τ falls with the square of the curve's length and does not know of the surface: a curve over a
-quarter of √area has as much tension as a map has to bend it, and a shorter one more. With this part
-any curve may bend for a map to half the radius of a circle of its length; long ones hardly feel it.
+τ grows as the curve gets shorter, whatever the surface: below about √area / 4, tension alone would
+exceed the pull of a map. With this term a map may bend any curve to half the radius of a circle of
+its length; long curves hardly change.
 """
 
 CONTACT = 10.0
@@ -62,7 +61,7 @@ class Balance:
     feature : float
         τ_fea, in 1/length²; 0 without a map.
     held : (n,) float array or None
-        ds at each node as far as lanes are concerned, where there is a map.
+        ds at each node, constant in the terms of lanes; None without a map.
     """
 
     tension: float
@@ -74,14 +73,14 @@ class Balance:
 def balance(
     surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, taut: float = 1.0
 ) -> Balance:
-    """The weights at a curve.
+    """The weights for a curve.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
     smoothness : float
-        Divides the tension and what a map has to say.
+        Divides the tension and the weight of a map.
     apart : bool
         Whether strands are kept apart.
     taut : float
@@ -108,7 +107,7 @@ def feature_energy(nodes: Nodes) -> float:
 
 
 def elastic_energy(nodes: Nodes, weights: Balance) -> float:
-    """E, with contact where that has a weight."""
+    """E, with the contact term if it has a weight."""
     energy = float(_bending(nodes).sum() + (_tension(nodes, weights) * _ds(nodes)).sum())
     if weights.held is not None:
         lane = np.minimum(nodes.phi_fea, 1.0)
@@ -119,14 +118,14 @@ def elastic_energy(nodes: Nodes, weights: Balance) -> float:
 
 
 def _ds(nodes: Nodes) -> FloatArray:
-    """Length of the curve that each node stands for, (n,)."""
+    """ds: half the length of both steps at each node, (n,)."""
     after = nodes.steps.T
     lengths = np.sqrt(dot(after, after))
     return np.maximum(0.5 * (lengths + before_each(lengths)), tolerances.TINY)
 
 
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
-    """Energy of the curve's length at each node, (n,): τ, and more in an obstacle."""
+    """Tension at each node, (n,): τ, and more in an obstacle."""
     return weights.tension + weights.feature * np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
 
 
@@ -154,7 +153,7 @@ def _no_entries() -> FloatArray:
 
 @dataclass(frozen=True)
 class ElasticSystem:
-    """Gauss-Newton's matrix and the slope: halves of the energy's derivatives.
+    """The Gauss–Newton matrix and the slope: half the derivatives of the energy.
 
     By moves of the nodes along their conormals.
 
@@ -164,11 +163,11 @@ class ElasticSystem:
         The matrix without contact, symmetric with two cyclic bands to each side: entries (i, i),
         (i, i + 1) and (i, i + 2) in column i, indices modulo n.
     slope : (n,) float array
-        By each node's move.
+        By the move of each node.
     pairs : (p, 2) int array
         Nodes in contact.
     pair_entries : (3, p) float array
-        What that adds to entries (i, i), (i, j) and (j, j) of the matrix.
+        What contact adds to entries (i, i), (i, j) and (j, j) of the matrix.
     """
 
     bands: FloatArray
@@ -184,7 +183,7 @@ class ElasticSystem:
 
 
 def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> ElasticSystem:
-    """Linearise the roots of what is integrated, and those of contact, about a curve."""
+    """The Gauss–Newton system of the square roots of the integrands and of contact."""
     n = len(nodes.positions)
     tension = _tension(nodes, weights)
     bending, stretch, bending_by, stretch_by, drift = _linearised(surface, nodes, weights, tension)
@@ -194,18 +193,18 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
         pull = np.where(nodes.phi_fea < 1.0, weights.feature * weights.held * drift, 0.0)
         bands[0] += pull * drift
         slope += pull * nodes.phi_fea
-    # Residuals do not have all of the length's second derivative: this is a string's stiffness.
+    # The residuals lack part of the second derivative of the length: the stiffness of a string.
     stiffness = np.zeros(n)
     count = len(nodes.lengths)
     stiffness[:count] = tension[:count] / np.maximum(nodes.lengths, tolerances.TINY)
     bands[0] += stiffness + before_each(stiffness)
-    # Without an orientation of the surface, neighbours may have opposite moves to one side.
+    # On an unoriented surface, moves of neighbours to one side may have opposite signs.
     opposite = dot(nodes.normals.T, after_each(nodes.normals.T)) < 0.0
     bands[1] -= np.where(opposite, -stiffness, stiffness)
     if not weights.contact:
         return ElasticSystem(bands, slope)
     contact = contacts_between(nodes)
-    weight = 2.0 * weights.contact  # a pair counts for either of its nodes
+    weight = 2.0 * weights.contact  # a pair counts for both of its nodes
     pull = weight * contact.overlap[:, None] * contact.derivatives
     slope += np.bincount(contact.pairs.ravel(), pull.ravel(), n)
     one, other = contact.derivatives.T
@@ -214,7 +213,7 @@ def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Ela
 
 
 def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> FloatArray:
-    """Sideways moves of the free nodes that lower the linearised energy, shape (n,).
+    """Moves of the free nodes along conormals that lower the linearised energy, shape (n,).
 
     Parameters
     ----------
@@ -237,14 +236,14 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> Float
 
 
 def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
-    """By how much moves along the conormals lower the linearised energy."""
+    """The decrease of the linearised energy by moves along the conormals."""
     return -float(move @ (2.0 * system.slope + _product(system, move)))
 
 
 def _linearised(
     surface: CurveSurface, nodes: Nodes, weights: Balance, tension: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Residuals κ_g √ds and √(tension ds) of every node, and how moves change them.
+    """Residuals κ_g √ds and √(tension ds) of every node, and their derivatives by moves.
 
     Returns
     -------
@@ -255,14 +254,14 @@ def _linearised(
     (3, n) float array
         Of the second.
     (n,) float array
-        Change of φ_fea with a node's own move.
+        Derivative of φ_fea by the node's own move.
     """
     here = nodes.conormals.T
     normal_turn, drift = nodes.conormal_derivatives(surface)
     turn, normal = normal_turn.T, nodes.normals.T
     after = nodes.steps.T
     before = before_each(after)
-    # How the steps before and after change with the moves of their two ends.
+    # Derivatives of the steps before and after by the moves of their two ends.
     before_by, after_by = np.stack([-before_each(here), here]), np.stack([-here, after_each(here)])
     if not nodes.closed:
         before_by[:, :, 0] = 0.0
@@ -277,7 +276,7 @@ def _linearised(
     by_before = cross(flat_before, normal) / squared_before
     by_after = cross(normal, flat_after) / squared_after
     by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
-    # One after the other: the product of two steps that are almost nothing may be nothing.
+    # Divided one after the other: the product of two tiny squares may underflow.
     by_normal = (by_normal + cosine * dot(product, turn)) / squared_before / squared_after
     turning_by = np.stack(
         [
@@ -310,9 +309,9 @@ def _linearised(
 
 
 def _solved(bands: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve a positive cyclic system."""
+    """Solve a positive definite cyclic banded system."""
     n = len(right)
-    # Folding the ring flat, 0, n-1, 1, n-2, …, puts neighbours at most four places apart.
+    # In the order 0, n-1, 1, n-2, …, entries coupled by the bands are at most four places apart.
     place = np.empty(n, dtype=np.int64)
     place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
     place[(n + 1) // 2 :] = 2 * np.arange(n // 2)[::-1] + 1
@@ -328,7 +327,7 @@ def _solved(bands: FloatArray, right: FloatArray) -> FloatArray:
 def _solved_with_pairs(
     bands: FloatArray, pairs: IntArray, entries: FloatArray, right: FloatArray
 ) -> FloatArray:
-    """The same with further entries, those of pairs of nodes."""
+    """The same with entries of pairs of nodes added."""
     n = len(right)
     node = np.arange(n)
     rows = np.concatenate([node, node, pairs[:, 0]])

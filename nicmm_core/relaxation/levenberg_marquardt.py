@@ -1,7 +1,7 @@
 """Levenberg–Marquardt steps of the nodes of a curve: moves along conormals that lower its energy.
 
 The energy is linearised about the nodes (`elastic_energy`), and the least damped step that lowers
-the energy itself is taken. Nothing is traced between the nodes here: `relaxing` does that after a
+the energy itself is taken. Only nodes move here; `relaxing` traces the curve between them after a
 few steps.
 """
 
@@ -24,39 +24,38 @@ from .elastic_energy import (
 from .noded_curve import moved_along_conormals
 
 DAMPING_NODES = 128
-"""Number of nodes that the damping is given for."""
+"""Number of nodes for which the damping is given."""
 
 DAMPING_FACTOR = 10.0
-"""By which damping rises when a step does not lower the energy, and falls when one does."""
+"""Factor by which damping rises after a failed step and falls after a successful one."""
 
 WORTHWHILE = 0.05
-"""Share of the fall so far that another step of the same iteration has to promise."""
+"""Predicted decrease, relative to that so far, from which an iteration takes another step."""
 
 FACES_OF_A_MOVE = 16.0
-"""Faces that nodes pass one after the other in the time that the rest of a move takes."""
+"""Number of faces passed that costs as much time as the rest of a move."""
 
 TWICE = 4.0 / 3.0
-"""Fall of the energy, relative to half its slope along a step, from which twice of it may pay."""
+"""Decrease, relative to half the slope along a step, from which a double step is tried."""
 
 
 @dataclass(frozen=True)
 class StepConfig:
-    """How steps are taken; lengths are in mean steps from node to node.
+    """Settings of the steps; lengths are in mean distances between neighbouring nodes.
 
     Attributes
     ----------
     steps : int
-        Most in an iteration.
+        Most steps in an iteration.
     longest_move : float
-        Farthest that the linearised energy is trusted; the curve may move twice as far if that is
-        seen to lower the energy further. Longer moves between one tracing and the next fold the
-        curve where it bends.
+        Trust radius of the linearised energy; a double move is taken if it lowers the energy
+        further. Longer moves between two traces fold the curve where it bends.
     damping : float
-        At the start of a level of `DAMPING_NODES`, relative to the greatest diagonal entry. Far
-        below 1, because that measures the stiffness of a zigzag from node to node, against which a
-        slow swing of the whole curve has almost none: the more nodes, the less, by the third power.
+        At the start of a level of `DAMPING_NODES` nodes, relative to the greatest diagonal entry.
+        That entry is the stiffness of a zigzag from node to node. Moves of the whole curve are far
+        softer, the more so with more nodes; so damping is far below 1 and falls with their cube.
     most_damping : float
-        Where the search for a step ends.
+        The search for a step ends there.
     """
 
     steps: int = 8
@@ -71,10 +70,10 @@ class StepConfig:
 
 @dataclass
 class Work:
-    """Moves of all nodes, taken or only tried, and how many there may be.
+    """Moves of all nodes, taken or only tried, with a cap on their number.
 
-    Where a surface is so defective that few steps lower the energy, an iteration takes many moves;
-    a move over many faces counts as several.
+    On defective surfaces few trial steps lower the energy, so an iteration may try many moves. A
+    move over many faces counts as several.
     """
 
     most: float
@@ -87,7 +86,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Stepping:
-    """What steps of one iteration have in common: the surface, the weights and the bounds."""
+    """What the steps of one iteration share: the surface, the weights and the limits."""
 
     surface: CurveSurface
     weights: Balance
@@ -104,7 +103,7 @@ class Linearised:
     system: ElasticSystem
 
     def may_fall(self, free: BoolArray, config: StepConfig) -> float:
-        """By how much the least damped step of the free nodes, (n,), would lower the energy."""
+        """Predicted decrease of the least damped step of the free nodes, (n,)."""
         if not free.any():
             return 0.0
         damping = config.least_damping(len(free))
@@ -117,9 +116,9 @@ class Moved:
 
     nodes: Nodes
     energy: float
-    stayed: BoolArray  # (n,) nodes that came to a boundary
+    stayed: BoolArray  # (n,) nodes that reached a boundary
     damping: float  # of the first step
-    farthest: float  # move, in mean steps from node to node
+    farthest: float  # move, in mean distances between nodes
 
 
 def linearised(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Linearised:
@@ -140,12 +139,12 @@ def take_steps(
     free : (n,) bool array
         Nodes that may move.
     damping : float
-        Of the first step that is tried.
+        Of the first trial step.
 
     Returns
     -------
     Moved or None
-        None when not even one lowers the energy.
+        None if no step lowers the energy.
     """
     moved = _first_step(stepping, start, free, damping)
     if moved is None:
@@ -161,14 +160,14 @@ def take_steps(
 
 
 def less_damping(moved: Moved, config: StepConfig) -> float:
-    """The damping to go on with after a step that lowered the energy."""
+    """The damping after a step that lowered the energy."""
     return max(moved.damping / DAMPING_FACTOR, config.least_damping(len(moved.stayed)))
 
 
 def _first_step(
     stepping: Stepping, start: Linearised, free: BoolArray, damping: float
 ) -> Moved | None:
-    """The least damped step that lowers the energy; None when there is none."""
+    """The least damped step that lowers the energy; None if there is none."""
     nodes, weights = start.nodes, stepping.weights
     while damping <= stepping.config.most_damping and free.any() and not stepping.work.exhausted():
         move = damped_step(start.system, free, damping)
@@ -177,8 +176,8 @@ def _first_step(
         move, farthest = _trusted(nodes, move, stepping.config)
         moved, stayed = _moved(stepping, nodes, move)
         reached = elastic_energy(moved, weights)
-        # Gauss-Newton's matrix is too stiff where the curve bends a lot. The parabola through
-        # both energies with the slope here is lower at twice the step after such a fall.
+        # The Gauss–Newton matrix is too stiff where the curve bends strongly. After such a
+        # decrease, the parabola through both energies with this slope is lower at twice the step.
         fallen = start.energy - reached
         if fallen > 0.0 and fallen > -TWICE * float(start.system.slope @ move):
             farther, also_stayed = _moved(stepping, nodes, 2.0 * move)
@@ -194,7 +193,7 @@ def _first_step(
 def _further_step(
     stepping: Stepping, moved: Moved, free: BoolArray, damping: float, least: float
 ) -> Moved | None:
-    """A step, or half of it, that lowers the energy; None when it promises less than that."""
+    """A step or half step that lowers the energy; None below the least predicted decrease."""
     nodes, free = moved.nodes, free & ~moved.stayed
     if not free.any() or stepping.work.exhausted():
         return None
@@ -214,14 +213,14 @@ def _further_step(
 
 
 def _moved(stepping: Stepping, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
-    """Nodes moved across the curve, and which came to a boundary."""
+    """Nodes moved along conormals, and which reached a boundary."""
     moved, stayed, passed = moved_along_conormals(stepping.surface, nodes, step)
     stepping.work.spent += 1.0 + passed / FACES_OF_A_MOVE
     return moved, stayed
 
 
 def _trusted(nodes: Nodes, move: FloatArray, config: StepConfig) -> tuple[FloatArray, float]:
-    """A move no longer than the linearised energy is trusted, and its length in mean steps."""
+    """A move limited to the trust radius, and its length in mean distances between nodes."""
     farthest = float(np.abs(move).max()) / float(nodes.lengths.mean())
     if farthest > config.longest_move:
         return move * (config.longest_move / farthest), config.longest_move

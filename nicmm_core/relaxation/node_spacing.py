@@ -1,9 +1,8 @@
-"""Where on a polyline nodes go: at about equal distances on each leg, and not into folds.
+"""Positions of nodes on a polyline: about equally spaced on each leg, and not inside folds.
 
-Where faces are folded back over their neighbours, a straight way over them runs forth, back and
-forth again. Nodes in there would have to turn about twice; so a part of the way that runs back over
-folded faces takes as much off the distance that has been covered as any other adds to it, and a
-node goes where its distance is covered for good.
+Over folded faces a straight trace runs forward, backward and forward again. Nodes in between would
+reverse the curve twice. So segments that run backward over folded faces count with negative length,
+and a node is placed at the last point of the leg with its share of the length.
 """
 
 from __future__ import annotations
@@ -17,17 +16,17 @@ from ..progress import checkpoint
 from .curve_nodes import CurveSurface
 
 FEWEST_OF_A_LEG = 6
-"""Nodes of a leg at least, with the control point at its start."""
+"""Least number of nodes of a leg, including the control point at its start."""
 
 REACH = 3.0
-"""How far before and behind one looks for where a curve is heading, in mean edge lengths."""
+"""Half length of curve over which its direction is measured, in mean edge lengths."""
 
 SHORTEST_TURN = 1.0 / 16.0
-"""The same for a short curve, as a share of it."""
+"""Limit of that half length, as a share of the curve."""
 
 
 def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
-    """Lengths of a polyline up to each of its points, and of all of it, shape (s + 1,)."""
+    """Arc length at each point of a polyline, and at its end, shape (s + 1,)."""
     steps = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     return np.concatenate([[0.0], np.cumsum(steps if closed else steps[:-1])])
 
@@ -40,7 +39,7 @@ def node_arcs(
     count: int,
     closed: bool,
 ) -> tuple[FloatArray, IntArray]:
-    """How far along a polyline its nodes go.
+    """Arc lengths of the nodes of a polyline.
 
     Parameters
     ----------
@@ -50,9 +49,9 @@ def node_arcs(
     arc : (s + 1,) float array
         Its `arc_lengths`.
     control_place : (k,) int array
-        Where in it the control points are, ascending.
+        Indices of the control points in it, ascending.
     count : int
-        About how many nodes.
+        Approximate number of nodes.
     closed : bool
 
     Returns
@@ -60,7 +59,7 @@ def node_arcs(
     (n,) float array
         Arc lengths, ascending.
     (k,) int array
-        Which of the nodes are the control points.
+        Indices of the control points among the nodes.
     """
     place = np.append(control_place, len(polyline)) if closed else control_place
     bounds = arc[place]
@@ -75,7 +74,7 @@ def node_arcs(
         checkpoint()
         part = slice(place[number], place[number + 1] + 1)
         here = slice(control_nodes[number] + 1, control_nodes[number] + counts[number])
-        at[here] = _covered_for_good(arc[part], back[part][:-1], share[here])
+        at[here] = _last_arcs(arc[part], back[part][:-1], share[here])
     if not closed:
         at, control_nodes = np.append(at, bounds[-1]), np.append(control_nodes, len(at))
     return at, control_nodes
@@ -84,9 +83,9 @@ def node_arcs(
 def _runs_back(
     surface: CurveSurface, polyline: SurfacePoints, arc: FloatArray, closed: bool
 ) -> BoolArray:
-    """Segments over folded faces against the way that the curve is heading, shape (s + 1,).
+    """Segments over folded faces against the direction of the curve, shape (s + 1,).
 
-    With a dummy at the end, so that it can be cut where the arc lengths are.
+    The last entry is a dummy, so that it can be sliced as the arc lengths are.
     """
     mesh = surface.mesh
     back = np.zeros(len(arc), dtype=bool)
@@ -109,15 +108,15 @@ def _runs_back(
     return back
 
 
-def _covered_for_good(arc: FloatArray, back: BoolArray, share: FloatArray) -> FloatArray:
-    """Arc lengths on a leg after which shares of its distance, within (0, 1), are never left.
+def _last_arcs(arc: FloatArray, back: BoolArray, share: FloatArray) -> FloatArray:
+    """The last arc length on a leg at each share, within (0, 1), of its net length.
 
     Parameters
     ----------
     arc : (s + 1,) float array
         At the ends of its segments.
     back : (s,) bool array
-        Segments that run back.
+        Segments that run backward.
     share : (n,) float array
         Ascending.
     """

@@ -1,10 +1,9 @@
-"""A curve that is exactly on the mesh, and the nodes along it that move.
+"""A polyline exactly on the mesh, with the nodes that move it.
 
-The polyline is what counts: each of its segments lies in one face. Nodes are points of it, at
-about equal distances. When they move, the stretches between them are drawn anew by straight traces
-over the faces. A stretch that cannot be drawn, or that would cross another, keeps its two nodes
-where they were and stays as it is; so whatever is asked for, the result is a simple curve through
-the same control points in the same order.
+Each segment of the polyline lies in one face. Nodes are about equally spaced points of it. When
+they move, the polyline between them is retraced by straight traces over the faces. Where a trace
+fails or crosses another, its two nodes and the polyline between them stay as they were. So the
+result is always a simple curve through the same control points in the same order.
 """
 
 from __future__ import annotations
@@ -26,32 +25,32 @@ from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .node_spacing import arc_lengths, node_arcs
 
 DETOUR = 1.5
-"""Longest way between two nodes, relative to their distance in space; a longer one is lost."""
+"""Longest trace between two nodes, relative to their distance in space; longer ones fail."""
 
 SAME_PLACE = 1e-5
-"""Distance, relative to the curve's length, at which an old point gives way to a new node."""
+"""Distance, relative to the curve's length, within which a new node replaces an old point."""
 
 SHORT = 0.05
-"""Longest segment, relative to the mean step from node to node, that a result goes without.
+"""Length, relative to the mean distance between nodes, below which a result omits a segment.
 
-A tube drawn along the curve would show it as a notch.
+A tube along the curve would show a shorter segment as a notch.
 """
 
 
 @dataclass(frozen=True)
 class NodedCurve:
-    """A polyline on the mesh with its nodes; the first point is a node.
+    """A polyline on the mesh and its nodes; the first point is a node.
 
     Attributes
     ----------
     nodes : Nodes
         n nodes; all but the control points lie strictly inside faces.
     control_nodes : (k,) int array
-        Which of them are the control points, in order.
+        Indices of the control points among them, in order.
     polyline : SurfacePoints
         Each point in the face of the segment after it.
     node_place : (n,) int array
-        Where in the polyline each node is, ascending.
+        Index of each node in the polyline, ascending.
     """
 
     nodes: Nodes
@@ -66,7 +65,7 @@ class NodedCurve:
 
     @property
     def length(self) -> float:
-        """From node to node, in mesh units."""
+        """Sum of the distances between neighbouring nodes, in mesh units."""
         return float(self.nodes.lengths.sum())
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
@@ -77,7 +76,7 @@ class NodedCurve:
 
 
 def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
-    """The polyline as a result, where that leaves it simple without nodes close beside edges.
+    """The polyline without nodes close to edges, if it stays simple; otherwise all of it.
 
     The neighbours of a node inside a face can be joined in the same face.
     """
@@ -98,14 +97,14 @@ def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
 
 
 def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> NodedCurve:
-    """Put nodes on a curve that passes its control points in order.
+    """Place nodes on a curve that passes its control points in order.
 
     Parameters
     ----------
     surface : CurveSurface
     curve : SurfaceCurve
     count : int
-        About how many nodes.
+        Approximate number of nodes.
     """
     first = int(curve.control_index[0])
     faces, barycentric = np.roll(curve.faces, -first), np.roll(curve.barycentric, -first, axis=0)
@@ -115,7 +114,7 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
 
 
 def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
-    """Another number of nodes, or the same at equal distances, on the same polyline."""
+    """A new number of equally spaced nodes on the same polyline."""
     at_controls = curve.node_place[curve.control_nodes]
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
@@ -123,9 +122,9 @@ def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve
 def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
     """Fine nodes on a smooth curve through the coarse ones of the same polyline.
 
-    Between two coarse nodes the polyline is straight, so all of its turning is at a quarter of the
-    fine nodes, and costs four times as much there. A cubic spline through the coarse nodes says
-    how far the fine ones have to move across.
+    Between coarse nodes the polyline is straight, so with four times as many nodes it bends only
+    at a quarter of them, at four times the cost. A cubic spline through the coarse nodes gives the
+    moves of the fine nodes along their conormals.
 
     Parameters
     ----------
@@ -138,14 +137,14 @@ def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> Node
     Returns
     -------
     NodedCurve
-        Simple; nodes that could not move are where they were, all if a leg has no length.
+        Simple; nodes that could not move stay, all of them if a leg has no length.
     """
     at, total = _arc_lengths(surface.mesh, coarse)
     through = coarse.nodes.positions
     if coarse.closed:
         at, through = np.append(at, total), np.concatenate([through, through[:1]])
     if (np.diff(at) <= 0.0).any():
-        return fine  # A leg of no length has no slope.
+        return fine  # No slope on a leg without length.
     chord = np.diff(through, axis=0) / np.diff(at)[:, None]
     slope = 0.5 * (np.concatenate([chord[:1], chord]) + np.concatenate([chord, chord[-1:]]))
     if coarse.closed:
@@ -167,30 +166,21 @@ def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
 def moved_along_conormals(
     surface: CurveSurface, nodes: Nodes, step: FloatArray
 ) -> tuple[Nodes, BoolArray, int]:
-    """Nodes moved across the curve by lengths along `Nodes.conormals`, (n,).
-
-    Returns
-    -------
-    Nodes
-    (n,) bool array
-        Which came to a boundary and stayed beside it.
-    int
-        How many faces the node that passed most of them has passed.
-    """
+    """Nodes moved by signed lengths, (n,), along `Nodes.conormals`; otherwise as `shifted`."""
     return shifted(surface, nodes, nodes.conormals * np.sign(step)[:, None], np.abs(step))
 
 
 def shifted(
     surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
 ) -> tuple[Nodes, BoolArray, int]:
-    """Nodes moved on the surface, with nothing drawn between them.
+    """Nodes moved over the surface; the polyline between them is not traced.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
     direction : (n, 3) float array
-        Unit vectors about tangent to the surface, anything where the length is zero.
+        Unit vectors approximately tangent to the surface; ignored where the length is zero.
     length : (n,) float array
         Zero at control points.
 
@@ -198,9 +188,9 @@ def shifted(
     -------
     Nodes
     (n,) bool array
-        Which came to a boundary and stayed beside it.
+        Nodes that reached a boundary and stopped beside it.
     int
-        How many faces the node that passed most of them has passed.
+        Greatest number of faces that a node has passed.
     """
     going = np.flatnonzero(length)
     targets, stuck, passed = trace_from(
@@ -221,9 +211,9 @@ def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:
 def traced_through(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes, still: BoolArray | None = None
 ) -> NodedCurve | None:
-    """The curve through nodes at new places, simple or not; None where it cannot be drawn.
+    """The curve traced through nodes at new places, simple or not; None if a trace fails.
 
-    Between two nodes that are `still`, (n,), it stays as it is.
+    Between two nodes that are `still`, (n,), the polyline is kept.
     """
     kept = np.zeros(len(nodes.positions), dtype=bool)
     if still is not None:
@@ -239,23 +229,14 @@ def traced_through(
 def straight_traces(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
-    """The polyline of straight traces between nodes at new places.
-
-    Returns
-    -------
-    SurfacePoints
-    (n,) int array
-        Where in it each node is.
-    (n,) bool array
-        Nodes after which no way to the next one was found; there is nothing between them.
-    """
+    """The polyline of straight traces between nodes at new places; see `_traced_polyline`."""
     return _traced_polyline(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
 
 
 def retraced(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes
 ) -> tuple[NodedCurve, BoolArray]:
-    """The curve through nodes at new places where that leaves it simple, the old one elsewhere.
+    """The curve retraced through nodes at new places wherever it stays simple.
 
     Parameters
     ----------
@@ -263,13 +244,13 @@ def retraced(
     curve : NodedCurve
         Simple.
     nodes : Nodes
-        n nodes, the control points where they are.
+        n nodes; control points have not moved.
 
     Returns
     -------
     NodedCurve
     (n,) bool array
-        Nodes that had to stay where they were.
+        Nodes that kept their old places.
     """
     old, new = curve.nodes.places, nodes.places
     stays = np.zeros(len(old), dtype=bool)
@@ -301,7 +282,7 @@ def _with_nodes(
     count: int,
     closed: bool,
 ) -> NodedCurve:
-    """Insert nodes at equal distances on each leg and drop what was no more than a node."""
+    """Insert equally spaced nodes on each leg and drop old points that were only nodes."""
     mesh, n = surface.mesh, len(polyline)
     arc = arc_lengths(polyline.positions(mesh), closed)
     at, control_nodes = node_arcs(surface, polyline, arc, control_place, count, closed)
@@ -316,7 +297,7 @@ def _with_nodes(
     barycentric[control_nodes] = polyline.barycentric[control_place]
     places = SurfacePoints(faces, barycentric)
 
-    # Old points remain between the nodes, but no point of a face where a node is now.
+    # Old points between the nodes remain, except points inside faces at the place of a node.
     inside = (polyline.barycentric > 0.0).all(axis=1)
     nodes_along = np.append(at, arc[-1])
     ahead = np.searchsorted(nodes_along, arc[:n]).clip(max=len(at))
@@ -325,7 +306,7 @@ def _with_nodes(
     dropped = inside & (nearest < SAME_PLACE * arc[-1])
     dropped[control_place] = True
     old = np.flatnonzero(~dropped)
-    # A node comes after the point where its segment begins, also where it has the same place.
+    # A node follows the start of its segment, even if both are at the same place.
     segment[control_nodes] = control_place
     before = np.concatenate([segment, old])
     order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
@@ -338,7 +319,7 @@ def _with_nodes(
 def _traced_polyline(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
-    """The polyline through nodes at new places.
+    """The polyline traced through nodes at new places.
 
     Parameters
     ----------
@@ -347,15 +328,15 @@ def _traced_polyline(
     nodes : Nodes
         n nodes at new places.
     kept : (n,) bool array
-        Nodes after which the polyline stays as it is; they and the next ones have not moved.
+        Nodes after which the polyline is kept; they and the next ones have not moved.
 
     Returns
     -------
     SurfacePoints
     (n,) int array
-        Where in it each node is.
+        Index of each node in it.
     (n,) bool array
-        Nodes after which no way to the next one was found.
+        Nodes from which the trace to the next one failed; the polyline has no points between them.
     """
     places = nodes.places
     n = len(places)
@@ -366,7 +347,7 @@ def _traced_polyline(
     parts = [_kept_stretches(curve, np.flatnonzero(~changed))]
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
-    # A way starts inside a face, which a control point need not.
+    # A trace starts inside a face; control points may lie elsewhere, so it then runs backward.
     for backwards in (False, True):
         here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
@@ -382,7 +363,7 @@ def _traced_polyline(
 
 
 Stretches = tuple[IntArray, SurfacePoints]
-"""Points of stretches between nodes, each with the node before it; that node comes first."""
+"""Points of the polyline, each with the node before it; that node is the first point."""
 
 
 def _kept_stretches(curve: NodedCurve, nodes: IntArray) -> Stretches:
@@ -401,10 +382,10 @@ def _traced_stretches(
     ends: tuple[IntArray, IntArray],
     backwards: bool,
 ) -> tuple[Stretches, BoolArray]:
-    """Straight traces from nodes to the ones after them, drawn from there if backwards."""
+    """Straight traces from nodes to the next ones, traced in reverse if backwards."""
     mesh = surface.mesh
     start, end = reversed(ends) if backwards else ends
-    # A mesh need not be oriented: both normals count as pointing to the same side.
+    # On an unoriented mesh, turn both normals to the same side.
     agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[start] + agree * normals[end]
     traces = trace_between(mesh, places[start], places[end], plane, DETOUR, surface.folded)
@@ -414,8 +395,8 @@ def _traced_stretches(
         order = np.argsort(owner, kind="stable")
         points = joined([first, crossings])
         return (owner[order], points[order]), traces.reached
-    # In reverse, a crossing belongs to the face that the way came from, and the node before all
-    # of them to the face where it ended.
+    # In reverse, a crossing belongs to the face before it on the trace, and the first node to the
+    # face where the trace ended.
     begins = np.searchsorted(traces.pair, np.arange(len(nodes)))
     ends_at = np.searchsorted(traces.pair, np.arange(len(nodes)), side="right")
     came_from = np.roll(crossings.faces, 1)
@@ -425,7 +406,7 @@ def _traced_stretches(
     last_face[passes] = crossings.faces[ends_at[passes] - 1]
     reverse = np.arange(len(crossings))[::-1]
     crossings = in_faces(mesh, crossings, came_from)[reverse]
-    # A trace that got lost did not end beside its node, whose coordinates are then ignored.
+    # Where a trace failed, the coordinates of its node are meaningless and ignored.
     node_points = in_faces(mesh, places[end], last_face)
     owner = np.concatenate([nodes, nodes[traces.pair][reverse]])
     order = np.argsort(owner, kind="stable")

@@ -1,17 +1,17 @@
 """Relax a curve on the surface until its own energy converges: the schedule of the relaxation.
 
-A level set is as fine as its mesh, and two strands of it a few edges apart block each other. It
-decides where the curve runs. From there nodes move on the surface until the energy of Eq. 6 and 7,
-taken along the curve, converges (`elastic_energy`).
+A level set determines the course of the curve, but only at the resolution of the mesh, and strands
+a few edges apart block each other. From there nodes move over the surface until the energy of Eq. 6
+and 7 along the curve converges (`elastic_energy`).
 
 Few nodes move far in a step, many resolve detail; so the number of nodes rises by levels. An
-iteration is a few steps of the nodes (`levenberg_marquardt`), after which the curve is traced, and
-strands push each other: a node whose segment could not be traced, or would cross another, stays for
-that iteration. So every state in between is a simple curve.
+iteration takes a few steps of the nodes (`levenberg_marquardt`) and then retraces the curve. Nodes
+whose trace fails or would cross another stay for that iteration, so the curve is simple after every
+iteration. A contact term repels strands.
 
-A curve that has nearly converged, as one whose control point was dragged, may do without that: its
-nodes move freely, and it is traced once they have converged. If it then crosses itself, it is
-relaxed again from the start, simple throughout.
+A curve that has nearly converged, such as one with a dragged control point, can defer this: its
+nodes move without contact, and it is traced after convergence. If it then crosses itself, it is
+relaxed again from the start with a trace in every iteration.
 """
 
 from __future__ import annotations
@@ -52,31 +52,31 @@ from .noded_curve import (
 
 @dataclass(frozen=True)
 class RelaxationConfig:
-    """How the schedule runs.
+    """Settings of the schedule.
 
     Attributes
     ----------
     levels : tuple of int
         Numbers of nodes, rising.
     stepping : StepConfig
-        How the steps of an iteration are taken.
+        Settings of the steps of an iteration.
     least_decrease : float
-        Decrease of the energy, relative to the bending, that ends the last level,
+        Decrease of the energy in an iteration, relative to the bending, below which the last level
+        has converged.
     least_decrease_before : float
-        and those before.
+        The same for the levels before.
     stretch : float
-        Ratio of the longest to the shortest step of a leg at which nodes are spaced anew.
+        Ratio of the longest to the shortest step of a leg above which nodes are respaced.
     iterations : int
-        The cap, over all levels of one attempt.
+        Cap over all levels of one attempt.
     most_iterations : int
-        The cap over all attempts.
+        Cap over all attempts.
     work : float
-        The cap on `Work` of one attempt.
+        Cap on the `Work` of one attempt.
     defer_tracing : bool
-        Whether to try first without tracing the curve after every iteration.
+        Whether a first attempt traces the curve only after convergence.
     taut : float
-        Factor of the tension in a pass with the fewest nodes before all others, which there is
-        where this is above 1.
+        Above 1, an additional first pass with the fewest nodes multiplies the tension by this.
     """
 
     levels: tuple[int, ...] = (128, 512)
@@ -92,38 +92,41 @@ class RelaxationConfig:
 
 
 GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, taut=30.0)
-"""Where a map attracts: a lane has to be found while nodes are few, since many hardly move.
+"""Settings for maps with lanes: the curve must find a lane with few nodes, since many hardly move.
 
-Few nodes take long steps along the surface until they converge. Such steps would inflate a fold of
-the start to a bow from lane to lane, a local minimum far from the lowest energy; under 30 times the
-tension, which a lane still withstands, folds are pulled straight.
+Few nodes take long steps. These may inflate a fold of the start into an arc from lane to lane, a
+local minimum far above the lowest energy. 30 times the tension removes folds first, and lanes still
+hold the curve.
 """
 
 RELEASES = 2
-"""Times in a level that nodes which could not follow are tried again after convergence."""
+"""Times per level that held nodes are released after convergence."""
 
 HELD_TRIES = 1
-"""Times that an iteration is tried again without the nodes that could not follow."""
+"""Times that an iteration is repeated with nodes held that could not be retraced."""
 
 SURELY = 0.1
-"""Share of the least decrease below which a step is not tried: damping makes forecasts small."""
+"""Predicted decrease, relative to the least decrease, below which no step is tried.
+
+Damping makes predictions too small.
+"""
 
 MOST_STALLED = 4
-"""Iterations in a row without a new least energy that end a level.
+"""Consecutive iterations without a new least energy that end a level.
 
-On folds and needles spacing the nodes anew may raise the energy by more than steps lower it.
+On folds and needles, respacing the nodes may raise the energy by more than steps lower it.
 """
 
 STRAIGHT = 2e-3
-"""Share of bending in the energy below which a curve is straight enough not to go on for it."""
+"""Least bending, as a share of the energy, in the scale of the convergence test."""
 
 SMALL_MOVE = 0.1
-"""Moves that do not disturb the spacing, in mean steps."""
+"""Largest moves that do not disturb the spacing, in mean distances between nodes."""
 
 
 @dataclass(frozen=True)
 class Relaxed:
-    """Where a relaxation ended.
+    """Result of a relaxation.
 
     Attributes
     ----------
@@ -138,10 +141,10 @@ class Relaxed:
     iterations : int
         Of all attempts.
     status : Status
-        `CONVERGED`, `ITERATION_LIMIT` or `CANCELLED`; `UNRELAXED` where strands of the start are so
-        close to one another that nodes on it would touch.
+        `CONVERGED`, `ITERATION_LIMIT` or `CANCELLED`; `UNRELAXED` if strands of the start are too
+        close together to place nodes on it without contact.
     collided : bool
-        Whether the curve crossed itself where it was not traced after every iteration.
+        Whether the curve crossed itself after an attempt with deferred tracing.
     """
 
     curve: SurfaceCurve
@@ -174,9 +177,9 @@ def relax(
         Divides the tension.
     config : RelaxationConfig
     watch : callable, optional
-        Called with the fraction of an attempt's cap that is done and the nodes' positions, (n, 3),
-        after every iteration; relaxation stops when it returns False. It also stops, with the
-        curve as it was last traced, where `progress` says so.
+        Called after every iteration with the iterations done, as a fraction of the cap, and the
+        positions of the nodes, (n, 3); relaxation stops when it returns False. It also stops, with
+        the last traced curve, when `progress.checkpoint` raises `CancelledError`.
     """
     if isinstance(start, NodedCurve):
         first, start = start, start.surface_curve(surface.mesh)
@@ -202,7 +205,7 @@ def relax(
 
 
 def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
-    """Greatest ratio of the longest to the shortest step of one leg."""
+    """Greatest ratio of the longest to the shortest step on a leg."""
     lengths = nodes.lengths
     first = control_nodes[control_nodes < len(lengths)]
     longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
@@ -213,9 +216,9 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
 class _State:
     """A curve between two iterations, with its energy linearised."""
 
-    curve: NodedCurve  # as it was last traced
+    curve: NodedCurve  # as last traced
     here: Linearised
-    held: BoolArray  # (n,) nodes that could not follow
+    held: BoolArray  # (n,) nodes that must not move
     stepping: Stepping
 
     @property
@@ -227,7 +230,7 @@ class _State:
 
     @property
     def may_fall(self) -> float:
-        """By how much the least damped step is going to lower the energy."""
+        """Predicted decrease of the least damped step."""
         return self.here.may_fall(self.free, self.stepping.config)
 
 
@@ -235,12 +238,12 @@ class _State:
 class _Iteration:
     """Steps that lowered the energy, traced."""
 
-    curve: NodedCurve  # as it was last traced
+    curve: NodedCurve  # as last traced
     nodes: Nodes
     energy: float
-    held: BoolArray  # (n,) nodes that could not follow
-    damping: float  # for the next one
-    farthest: float  # move, in mean steps from node to node
+    held: BoolArray  # (n,) nodes that could not move
+    damping: float  # for the next iteration
+    farthest: float  # move, in mean distances between nodes
 
 
 class _LostError(Exception):
@@ -266,10 +269,10 @@ class _Attempt:
         self.last_iteration = min(iterations + config.iterations, config.most_iterations)
         self.work = Work(config.work)
         self.status = Status.CONVERGED
-        self.traced = start  # the last state, if it is stopped at once
+        self.traced = start  # the result if cancelled
 
     def run(self) -> NodedCurve | None:
-        """Relax the curve level by level; None where it could not be traced."""
+        """Relax the curve level by level; None if it cannot be traced."""
         config, curve = self.config, self.traced
         passes = [(level, 1.0) for level in config.levels]
         if config.taut > 1.0:
@@ -289,7 +292,7 @@ class _Attempt:
         return curve
 
     def _level(self, curve: NodedCurve, level: int, least: float, taut: float) -> NodedCurve:
-        """Iterations with one number of nodes until the energy falls by less than a share."""
+        """Iterate with one number of nodes until the decrease of the energy is below the least."""
         config, least_damping = self.config, self.config.stepping.least_damping(level)
         damping = least_damping
         curve = self.traced = self._respaced(curve, level)
@@ -328,7 +331,7 @@ class _Attempt:
             if done is None or before - done.energy <= least * scale:
                 if releases == RELEASES or not held.any():
                     break
-                # Converged with nodes that once could not follow: perhaps they can now.
+                # Converged with held nodes: release them, as they may be able to move now.
                 releases, damping = releases + 1, least_damping
                 held = np.zeros(len(held), dtype=bool)
             moved = done is not None and done.farthest > SMALL_MOVE
@@ -344,7 +347,7 @@ class _Attempt:
         return _State(curve, linearised(self.surface, nodes, weights), held, stepping)
 
     def _iteration(self, state: _State, damping: float) -> _Iteration | None:
-        """Steps from a curve, traced if it is to stay simple; None when none lowers the energy."""
+        """Steps from a curve, retraced unless deferred; None if no step lowers the energy."""
         free, stepping = state.free, state.stepping
         tries = 0
         while True:
@@ -367,14 +370,14 @@ class _Attempt:
             damping = moved.damping * DAMPING_FACTOR
 
     def _traced(self, curve: NodedCurve, nodes: Nodes) -> NodedCurve:
-        """The curve through its nodes, which may have moved since it was last traced."""
+        """The curve traced through its nodes if they have moved since the last trace."""
         changed = curve if nodes is curve.nodes else traced_through(self.surface, curve, nodes)
         if changed is None:
             raise _LostError
         return changed
 
     def _respaced(self, curve: NodedCurve, level: int) -> NodedCurve:
-        """Nodes at about equal distances; where they would make strands touch, those it has."""
+        """Respace the nodes, unless that would make strands touch."""
         alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
         if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
             return curve
@@ -384,7 +387,7 @@ class _Attempt:
         return changed if alike else self._rounded(curve, changed)
 
     def _rounded(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
-        """The fine nodes on a smooth curve through the coarse ones, if that bends less."""
+        """Move fine nodes to a smooth curve through the coarse ones, if that bends less."""
         if len(fine.nodes.positions) < len(coarse.nodes.positions):
             return fine
         changed = rounded(self.surface, coarse, fine)

@@ -1,4 +1,4 @@
-"""Strands of a curve that come close to each other, and the push that keeps them apart."""
+"""Contact between strands of a curve: where they are close, and the term that repels them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ..geometry.array_types import FloatArray, IntArray
 from .curve_nodes import Nodes
 
 CLEARANCE = 2.0
-"""Distance between strands, in mean steps, below which they push each other."""
+"""Distance between strands, in mean distances between nodes, below which they repel."""
 
 ALONG = 4.0
 """Least distance along the curve between two nodes of different strands, in clearances."""
 
 SAME_SIDE = 0.3
-"""Least cosine between two normals; the other side of a thin part is near in space only."""
+"""Least cosine between two normals; excludes strands on opposite sides of a thin part."""
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Pairs of near nodes of different strands.
+    """Pairs of close nodes of different strands.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Contacts:
 
 
 def contacts_between(nodes: Nodes) -> Contacts:
-    """Which nodes of different strands are closer than the clearance."""
+    """Pairs of nodes of different strands that are closer than the clearance."""
     clearance = CLEARANCE * float(nodes.lengths.mean())
     pairs = cKDTree(nodes.positions).query_pairs(clearance, output_type="ndarray")
     arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])

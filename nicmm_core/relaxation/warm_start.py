@@ -1,7 +1,8 @@
-"""Start from the curve before: its control points move, and the curve beside them with them.
+"""Start from the previous curve: its control points move, and nearby nodes move with them.
 
-A point that is dragged takes the nearby nodes along, less and less with their distance, so that
-relaxation starts from a curve without a kink. It works for small moves; others start anew.
+The shift of a node decreases smoothly with its distance from the control point, so that relaxation
+starts from a curve without a kink. This works for small moves only; for others a new curve is
+designed.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ WARM = RelaxationConfig(
     least_decrease=1e-3,
     defer_tracing=True,
 )
-"""Relaxation from there: the curve has enough nodes and has nearly converged.
+"""Settings of the relaxation: the curve has enough nodes and has nearly converged.
 
-Nothing is traced on the way, so that an iteration is one step.
+Tracing is deferred, so an iteration is one step.
 """
 
 LONGEST_MOVE = 0.1
 """Farthest that a control point may have moved, relative to the curve's length."""
 
 TAKEN_ALONG = 4.0
-"""Distance along the curve up to which nodes move with a control point, in moves."""
+"""Arc length within which nodes follow a control point, relative to its move."""
 
 
 def moved_along(
@@ -50,7 +51,7 @@ def moved_along(
     Returns
     -------
     NodedCurve or None
-        Simple; None where the moves are too far for that.
+        Simple; None where the moves are too large for that.
     """
     mesh = surface.mesh
     nodes, at_controls = curve.nodes, curve.control_nodes
@@ -68,7 +69,7 @@ def moved_along(
     still = length == 0.0
     still[going] = False
     places = SurfacePoints(faces, barycentric)
-    # A stretch that once could not be drawn straight stays as it is where nothing moves.
+    # Between nodes that do not move the polyline is kept: a straight trace may fail there.
     changed = traced_through(surface, curve, nodes_at(surface, places, curve.closed), still)
     if changed is None or not is_simple(surface, changed):
         return None
@@ -76,7 +77,7 @@ def moved_along(
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:
-    """How far each node is taken along, (n, 3): by the control points before and after it."""
+    """Shift of each node by the moves of nearby control points, (n, 3)."""
     total = float(nodes.lengths.sum())
     arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])[: len(nodes.positions)]
     shift = np.zeros((len(arc), 3))
