@@ -1,4 +1,4 @@
-"""From control points to a simple initial path on the surface, split where vertices are too few.
+"""A simple initial path through the control points, with virtual splits where vertices are too few.
 
-`initial_loop` is the way in.
+`initial_loop` is the entry point.
 """

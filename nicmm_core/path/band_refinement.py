@@ -1,8 +1,8 @@
 """Virtual refinement of the mesh along the initial loop.
 
-φ is linear in every face, so a curve on a coarse mesh would show each face as a straight piece and
-could hardly bend. Edges near the loop that are long for its length are halved virtually, the
-longest first, so that the curve has room and pieces enough on any mesh. The surface stays as it is.
+φ is linear in every face, so a curve on a coarse mesh has few straight segments and can hardly
+bend. Edges near the loop that are long relative to it are bisected virtually, the longest first, so
+that the curve has enough segments on any mesh. The surface does not change.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 
 PIECES = 64
-"""Edges near the loop are at most its length over this number, for a level set that is a result."""
+"""Length of the loop over the longest edge near it, where the level set is the result."""
 
 PIECES_TO_START = 32
-"""The same for a level set from which a relaxed curve only starts."""
+"""The same where the level set is only the start of a relaxation."""
 
 BAND_SHARE = 0.05
-"""Half width of the refined band, relative to the loop's length.
+"""Half width of the refined band, relative to the length of the loop.
 
-It holds what the curve may move. Farther out, the longest edge grows with twice the distance.
+The curve moves within it. Farther out, the longest edge allowed is twice the distance to the band.
 """
 
 MOST_SPLITS = 3_000
-"""Edges that are halved at most; needle-shaped faces side by side would ask for many times more.
+"""Most edges bisected; adjacent needles would need many times more.
 
-The longest edges come first, so that stopping leaves the band evenly coarser.
+The longest edges come first, so stopping early leaves an evenly coarser band.
 """
 
 
 def refine_along(
     split: SplitMesh, component: int, loop: list[int], closed: bool = True, pieces: int = PIECES
 ) -> tuple[list[int], float]:
-    """Halve long edges near a path of edges.
+    """Bisect long edges near a path of edges.
 
     Parameters
     ----------
@@ -51,15 +51,15 @@ def refine_along(
     closed : bool
         Whether the last vertex is joined to the first.
     pieces : int
-        Into how many the edges near the path divide its length at least.
+        Length of the path over the longest edge near it.
 
     Returns
     -------
     list of int
-        The same path with the vertices that now lie on it.
+        Vertices of the path after the splits.
     float
-        Size of the path's zigzag: the mean length of its edges before, but no more than the
-        longest edge after.
+        Size of the zigzag of the path: the mean length of its edges before the splits, at most the
+        longest edge length allowed after them.
     """
     points = np.array([split.position(vertex) for vertex in loop])
     if closed:
@@ -70,8 +70,8 @@ def refine_along(
     tree = cKDTree(_samples(points, longest))
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Lengths of edges, and which are too long for their distance from the loop."""
-        # Rounded, so that equal edges stay equal however the model is turned.
+        """Lengths of edges, and whether they are too long at their distance from the loop."""
+        # Rounded, so that edges of equal length stay equal under rotations of the model.
         size = np.round(np.linalg.norm(start - end, axis=1) / longest, 6) * longest
         distance, _ = tree.query(0.5 * (start + end))
         return size, (size > longest) & (distance < half_width + 0.5 * size)
@@ -111,7 +111,7 @@ def refine_along(
 
 
 def _samples(points: FloatArray, spacing: float) -> FloatArray:
-    """Points along a polyline, no farther apart than the spacing."""
+    """Samples of a polyline, no farther apart than the spacing."""
     points, following = points[:-1], points[1:]
     count = np.ceil(np.linalg.norm(following - points, axis=1) / spacing).astype(int).clip(min=1)
     return np.concatenate(

@@ -1,8 +1,8 @@
 """The initial path (section 3.1): mesh edges through the control points, closed or open.
 
-Plain shortest paths between consecutive points share edges and cross, and then no signed
-distance belongs to them. Here each path avoids every vertex that an earlier one took, and where
-vertices are too few it runs through the midpoints of edges, which are then split virtually.
+Shortest paths between consecutive points may share edges or cross, and then have no signed
+distance. Here each path avoids all vertices of earlier paths. Where vertices are too few it passes
+through midpoints of edges, which are then split virtually.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ class InitialLoop:
     Attributes
     ----------
     vertices : (l,) int array
-        Working vertices in order, the first of a closed path not repeated at the end. No two of
-        them are joined by an edge that is not part of the path.
+        Working vertices in order, the first of a closed path not repeated at the end. An edge
+        between two of them is always an edge of the path.
     control_vertices : (k,) int array
-        The working vertex of each control point, in the order visited.
+        The working vertices of the control points, in order along the path.
     order : (k,) int array
-        Which of the caller's control points each of them is.
+        Their indices among the caller's control points.
     edge_length : float
-        Mean length of the edges at the loop: the h that band and delta are measured in.
+        Mean length h of the edges at the loop, the unit of the widths of band and delta.
     zigzag : float
-        Length of the steps in which the loop follows the mesh, which smoothing has to remove.
+        Length of the steps of the loop along the mesh, which smoothing has to remove.
     closed : bool
     """
 
@@ -56,7 +56,7 @@ class InitialLoop:
     closed: bool = True
 
     def neighbours(self, place: int) -> list[int]:
-        """Vertices before and after the one at a place of the path."""
+        """The previous and the next vertex at an index of the path."""
         places = [place - 1, place + 1]
         if self.closed:
             return [int(self.vertices[i % len(self.vertices)]) for i in places]
@@ -72,7 +72,7 @@ def build_initial_loop(
     via_points: ViaPoints | None = None,
     pieces: int = PIECES,
 ) -> tuple[WorkingMesh, InitialLoop]:
-    """Insert the control points and join them by edge paths that do not touch one another.
+    """Insert the control points and join them by edge paths without contact.
 
     Parameters
     ----------
@@ -82,12 +82,12 @@ def build_initial_loop(
     order : {"given", "shortest"}
         Visit the points as given, or in the shortest order.
     phi_fea : (V,) float array, optional
-        φ_fea at the input vertices. Lengths count times its square, as the curve's does in Eq. 7,
-        so the loop goes round obstacles and along alignment from the start.
+        φ_fea at the input vertices. Lengths are weighted by its square, as in Eq. 7, so the loop
+        avoids obstacles and follows alignment from the start.
     closed : bool
         Whether the path returns from the last point to the first.
     via_points : mapping, optional
-        From the index of a control point to points that the path passes on its way to the next.
+        From the index of a control point to points on the path from there to the next one.
     pieces : int
         How finely the mesh is refined along the path, see `refine_along`.
 
@@ -100,10 +100,10 @@ def build_initial_loop(
     Raises
     ------
     UnreachableError
-        If no simple path visits the points in this order, or only one that winds round itself too
-        often. The message names an order that works, if one is found.
+        If no simple path visits the points in this order, or only one with too many windings. The
+        message names an order that works, if one is found.
     ArgumentError
-        If via points name no leg.
+        If a key of the via points is not the index of a leg.
     ControlPointError
         If a via point cannot be used.
     """
@@ -138,13 +138,13 @@ def build_initial_loop(
 
 
 class _Tours:
-    """Orders in which a curve may visit control points, each found when it is first asked for."""
+    """Orders in which a curve may visit control points, each computed on first use."""
 
     def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
         self._mesh, self._points, self.closed = mesh, points, closed
 
     def of(self, order: str) -> Iterator[IntArray]:
-        """The orders that answer a request, the best one first."""
+        """The orders to try for a request, the best one first."""
         if order == "given":
             yield self.given
         else:
@@ -172,7 +172,7 @@ class _Tours:
 
     @cached_property
     def _on_mesh(self) -> tuple[WorkingMesh, IntArray, FloatArray]:
-        """A mesh that has all points as vertices, these, and distances along its edges."""
+        """A mesh with all points as vertices, these vertices, and distances along edges."""
         split = SplitMesh(self._mesh)
         controls = split.insert_points(self._points)
         component = int(self._mesh.face_component[self._points.faces[0]])
@@ -183,9 +183,9 @@ class _Tours:
 
 
 def boundary_loops(faces: IntArray) -> list[IntArray]:
-    """Loops of vertices along the boundary of a manifold, the surface on the same side of each.
+    """Loops of vertices along the boundary of a manifold, directed with the surface on one side.
 
-    On a surface that cannot be oriented each loop has a direction of its own.
+    On a non-orientable surface the direction of each loop is arbitrary.
     """
     oriented = igl.bfs_orient(faces)[0]
     sides = oriented[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -217,7 +217,7 @@ def _advice(
     phi_fea: FloatArray | None,
     via: bool,
 ) -> str:
-    """What to change, tried before it is said.
+    """What to change, after trying it.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _advice(
     visited : (k,) int array
         The order that does not work.
     via : bool
-        Whether it may work without the via points.
+        Whether there are via points, so that the same order may work without them.
     """
     tried = [] if via else [visited.tolist()]
     for order in (tours.given, tours.shortest, tours.along_boundaries):
@@ -259,7 +259,7 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
     path = loop.vertices
     following = np.roll(path, -1)
     if not loop.closed:
-        following[-1] = path[-2]  # the last point lies on the segment before it
+        following[-1] = path[-2]  # the last point lies on the last segment
     sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = len(working.vertices)
     keys = np.sort(sides, axis=1) @ [size, 1]
@@ -276,11 +276,11 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
 
 
 def _separate_strands(split: SplitMesh, loop: list[int], closed: bool) -> None:
-    """Give both sides of the loop vertices of their own wherever two strands are neighbours.
+    """Insert vertices between neighbouring strands of the loop.
 
-    An edge that joins two loop vertices without being part of the loop is split, and so is a face
-    whose three edges all are. Afterwards the two sides of the loop are components of the
-    remaining vertices, so flood fill can tell them apart.
+    An edge between two loop vertices that is not an edge of the loop is split, and so is a face
+    whose three edges belong to the loop. Then the two sides of the loop are different components of
+    the remaining vertices, and flood fill can tell them apart.
     """
     on_loop = set(loop)
     onward = loop[1:] + loop[:1] if closed else loop[1:]

@@ -1,4 +1,4 @@
-"""The graph that legs are looked for in: vertices and edge midpoints of a part of a split mesh."""
+"""The search graph of legs: vertices and edge midpoints of a part of a split mesh."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..geometry.mesh import Mesh, side_keys
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]
-"""A vertex of the split mesh, or an edge of it for its midpoint."""
+"""A vertex of the split mesh, or an edge, which stands for its midpoint."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Patch:
     edges : (E, 2) int array
         Sorted.
     on_rim, branching : (E,) bool array
-        Edges of one face, and of more than two.
+        Edges with one face, and with more than two.
     positions : (n + E, 3) float array
         Of the nodes.
     weight : (n + E,) float array
-        Squared phi_fea at the nodes.
+        Factor of lengths at the nodes, see `leg_search.length_factor`.
     arcs : (a, 2) int array
     through_midpoints : (a,) bool array
     """
@@ -53,7 +53,7 @@ class Patch:
 
     @cached_property
     def lengths(self) -> FloatArray:
-        """Lengths of the arcs, weighted by phi_fea, shape (a,)."""
+        """Weighted lengths of the arcs, shape (a,)."""
         return self.step_lengths(self.arcs)
 
     def step_lengths(self, steps: IntArray) -> FloatArray:
@@ -63,31 +63,31 @@ class Patch:
         return apart * (0.5 * (self.weight[start] + self.weight[end]))
 
     def graph(self, lengths: FloatArray) -> sparse.csr_array:
-        """The arcs as a symmetric matrix; one with an infinite length cannot be passed."""
+        """The arcs as a symmetric matrix; arcs of infinite length are blocked."""
         arc, indices, indptr = self._structure
         return sparse.csr_array((lengths[arc], indices, indptr), shape=(self.size, self.size))
 
     @cached_property
     def _structure(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The arc of each matrix entry, then the entries' columns and where rows start."""
+        """The arc and the column of each matrix entry, and the start of each row."""
         arc = np.arange(len(self.arcs))
         rows, columns = np.concatenate([self.arcs, self.arcs[:, ::-1]]).T
         entries = sparse.coo_array(
             (np.concatenate([arc, arc]), (rows, columns)), shape=(self.size, self.size)
         )
-        # Two faces with the same corners give arcs twice, whose numbers must not be added.
+        # Two faces with the same corners give arcs twice; their numbers must not be summed.
         entries.has_canonical_format = True
         checkpoint()
         matrix = entries.tocsr()
         return matrix.data, matrix.indices, matrix.indptr
 
     def places(self, vertices: IntArray) -> IntArray:
-        """Nodes of vertices of the split mesh, without those that are not here."""
+        """Nodes of vertices of the split mesh, omitting vertices outside this part."""
         place = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
         return place[self.vertices[place] == vertices]
 
     def node(self, place: int) -> Node:
-        """The vertex, or the edge of the midpoint, that a node is."""
+        """The vertex, or the edge of the midpoint, of a node."""
         if place < len(self.vertices):
             return int(self.vertices[place])
         start, end = self.vertices[self.edges[place - len(self.vertices)]]
@@ -103,7 +103,7 @@ def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
 def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
     """Fans of faces about the vertices.
 
-    Faces belong to one fan of a vertex when edges at that vertex lead from one to the other.
+    Faces at a vertex belong to the same fan if edges at that vertex connect them.
 
     Returns
     -------

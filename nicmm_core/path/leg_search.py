@@ -1,7 +1,7 @@
-"""The shortest way of one leg: Dijkstra over the vertices and edge midpoints that are free.
+"""The shortest path of one leg: Dijkstra's algorithm over free vertices and edge midpoints.
 
-The midpoints join every face to its neighbours across all edges that are not part of a path or of
-the boundary. So there is a way wherever the surface is still connected, however few its vertices.
+Midpoints connect every face to its neighbours across all edges that do not belong to a path or the
+boundary. So a leg exists wherever the remaining surface is connected, however few vertices it has.
 """
 
 from __future__ import annotations
@@ -19,58 +19,58 @@ from .leg_graph import Node, Patch, nonmanifold_vertices
 from .virtual_splits import SplitMesh
 
 MIDPOINT_DETOUR = 2.0
-"""Length of a way through edge midpoints, relative to the same length along edges.
+"""Cost of a length through edge midpoints, relative to the same length along edges.
 
 Above 1 so that the mesh is split only where edges alone would make a long detour.
 """
 
 STRAND_PENALTY = 4.0
-"""How much longer a way right beside an earlier path counts.
+"""Relative cost added to lengths right beside an earlier path.
 
-Two strands of a loop then pass a thin limb on opposite sides instead of side by side, which
-leaves the level set room on both sides.
+Two strands of a loop then pass a thin limb on opposite sides, which leaves room for the level set
+between them.
 """
 
 BRANCH_FACTOR = 20.0
-"""How much longer a way counts through places where the surface is no manifold.
+"""Factor of lengths at non-manifold vertices and edges.
 
-They can be passed once only and belong to several sheets, so they are left to a curve that has no
-other way.
+These belong to several sheets and can be passed only once, so a leg uses them only where it must.
 """
 
 LEAST_WEIGHT = 1.0 / 3.0
-"""Least factor that alignment gives to a length: a leg goes that much out of its way for a lane.
+"""Least factor that alignment gives to a length, which limits the detour a leg takes for a lane.
 
-At 0.1 legs that run elsewhere come over to a lane as to a motorway, and two share one; at 0.5 more
-lanes are left aside that lie 5 % of the diagonal beside a leg.
+At 0.1 distant legs are attracted to a lane, and two legs share one; at 0.5 legs ignore more of the
+lanes that are 5 % of the diagonal away.
 """
 
 FIRST_REACH = 3.0
-"""Length up to which a leg is looked for first, relative to the distance of its ends in space."""
+"""Length limit of the first search, relative to the distance between the ends in space."""
 
 REACH_GROWTH = 2.0
+"""Factor of the length limit from one search to the next."""
 
 WHOLE_SHARE = 0.5
-"""Share of the faces beyond which a part of the surface is no cheaper to search than the whole."""
+"""Share of the faces above which the whole component is searched."""
 
 
 def length_factor(phi_fea: FloatArray) -> FloatArray:
-    """What a length counts for where φ_fea has these values, any shape."""
+    """Factor of lengths at values of φ_fea, any shape."""
     return np.maximum(phi_fea**2, LEAST_WEIGHT)
 
 
 @dataclass(frozen=True)
 class BlockedElements:
-    """What a leg has to keep off.
+    """What a leg must avoid.
 
     Attributes
     ----------
     vertices : (q,) int array
-        Vertices that are not free: on other legs, or to be visited later.
+        Vertices on other legs, and waypoints of other legs.
     edges : (p, 2) int array
-        Edges of the other legs, which may not be crossed.
+        Edges of other legs, which must not be crossed.
     ends : (e,) int array
-        Vertices where a finished stretch of the path ends, so that the next leg goes on from there.
+        Vertices where only one leg ends so far, from which another leg continues.
     """
 
     vertices: IntArray
@@ -80,13 +80,13 @@ class BlockedElements:
 
 @dataclass(frozen=True)
 class Leg:
-    """A way from one vertex to another.
+    """A path from one vertex to another.
 
     Attributes
     ----------
     nodes : list of Node
     length : float
-        Weighted by phi_fea, without what counts longer only in the search.
+        Weighted by φ_fea, without the penalties of the search.
     """
 
     nodes: list[Node]
@@ -101,13 +101,13 @@ class LegSearch:
     mesh : Mesh
         The input mesh.
     split : SplitMesh
-        Its splits; they may go on between searches.
+        Its splits; more may be added between searches.
     component : (F,) bool array
         The input faces of the component.
     phi_fea : (V,) float array or None
         φ_fea at the input vertices.
     clearance : float
-        Distance within which a leg avoids the others.
+        Distance within which legs repel each other.
     """
 
     def __init__(
@@ -134,10 +134,10 @@ class LegSearch:
             self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
 
     def shortest(self, source: int, target: int, obstacles: BlockedElements) -> Leg | None:
-        """The shortest free leg; None when there is none.
+        """The shortest free leg; None if there is none.
 
-        Only the part of the surface is searched where a leg up to some length can be, then a
-        larger one until there is a leg: it is the shortest on the whole surface.
+        The search covers the part of the surface that a leg of limited length can reach, and is
+        repeated with greater limits. The leg found is the shortest on the whole surface.
         """
         start, end = self._split.position(source), self._split.position(target)
         apart = np.linalg.norm(self._mesh.vertices - start, axis=1)
@@ -156,7 +156,7 @@ class LegSearch:
             reach *= REACH_GROWTH
 
     def are_joinable(self, pairs: list[tuple[int, int]], obstacles: BlockedElements) -> bool:
-        """Whether each pair of vertices has a way, every one for itself."""
+        """Whether each pair of vertices, on its own, can be joined."""
         patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
         free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
@@ -204,7 +204,7 @@ class LegSearch:
         return Leg([patch.node(place) for place in places], length)
 
     def _whole(self) -> Patch:
-        """The component, kept until something is split."""
+        """The component, cached until something is split."""
         if self._kept is None or self._kept[0] != self._split.n_faces:
             self._kept = self._split.n_faces, self._patch(self._component)
         return self._kept[1]
@@ -212,10 +212,10 @@ class LegSearch:
     def _patch(self, inside: BoolArray) -> Patch:
         """Graph of the living faces in some input faces.
 
-        Arcs are edges, halves of edges, and the three lines between midpoints in every face. Lines
-        from a vertex to the midpoint opposite are left out: with them, splitting the edges of a
-        path one after the other would not always leave the path's own lines as edges. The edges of
-        the boundary have no arcs: a path along it would cut off what lies beyond.
+        Arcs are edges, half edges, and the three lines between midpoints in every face. Lines from
+        a vertex to the opposite midpoint are omitted: with them, splitting the edges of a path one
+        by one would not always produce its own lines as edges. Boundary edges have no arcs: a path
+        along the boundary would separate what lies beyond.
         """
         vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
         checkpoint()
@@ -259,15 +259,15 @@ class LegSearch:
         )
 
     def _free(self, patch: Patch, obstacles: BlockedElements, ends: IntArray) -> BoolArray:
-        """Nodes that a leg between two ends may use: off the boundary and the obstacles."""
+        """Nodes that a leg between two ends may use: not on the boundary or on obstacles."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
-        # Where fans of faces meet in nothing but a vertex of the boundary, it is the only way.
+        # A boundary vertex where fans of faces meet may be the only connection between them.
         free[np.setdiff1d(patch.edges[patch.on_rim], self._pinched_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.places(obstacles.vertices)] = False
         if len(obstacles.edges):
-            # The midpoint of an edge of a path would cross it.
+            # A leg through the midpoint of an edge of a path would cross the path.
             size = self._split.n_vertices
             keys = patch.vertices[patch.edges] @ [size, 1]
             on_path = np.isin(keys, np.sort(obstacles.edges, axis=1) @ [size, 1])
@@ -276,7 +276,7 @@ class LegSearch:
         return free
 
     def _branch_factor(self, patch: Patch) -> FloatArray | None:
-        """How much longer each node counts, or None on a manifold."""
+        """Factor of lengths at each node, or None on a manifold."""
         pinched = self._pinched_here(patch)
         if not (len(pinched) or patch.branching.any()):
             return None
@@ -300,10 +300,9 @@ class LegSearch:
         return result
 
     def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:
-        """Cut short a way that runs along an edge and also passes its midpoint.
+        """Shorten a path that runs along an edge and also passes its midpoint.
 
-        Where way counts as longer beside other legs than a little farther off, such a way may be
-        the shortest.
+        Such a path may be the shortest where the penalty beside other legs varies strongly.
         """
         at = {place: number for number, place in enumerate(places)}
         for place in places:
@@ -323,11 +322,10 @@ class LegSearch:
 def _closeness(
     graph: sparse.csr_array, taken: IntArray, ends: IntArray, clearance: float
 ) -> FloatArray:
-    """How close each node is to those taken: 1 beside them, 0 from the clearance on.
+    """Closeness of each node to blocked nodes: 1 beside them, 0 from the clearance on.
 
-    Around the ends of the path so far only the side that the path lies on is close: there the
-    nearest taken node is not the end itself. So the curve goes on through its control points
-    instead of turning back at them.
+    Around an end of the path, only nodes whose nearest blocked node is not the end itself count as
+    close. So the curve continues through its control points instead of turning back.
     """
     checkpoint()
     to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)

@@ -1,9 +1,8 @@
-"""The legs of the initial path, laid one after the other beside those that are there.
+"""The legs of the initial path, found one after the other without crossings.
 
-An arc, or several that are apart, never separate a connected surface without boundary. So legs can
-be laid there one after the other in any order of the points, each round those before it. A leg that
-joins two points of the boundary does separate it; such legs come last, and one is kept only if it
-leaves all others possible.
+Disjoint arcs never separate a connected surface without boundary. So legs can be found there in any
+order, each around those before it. A leg between two boundary points does separate the surface;
+such legs come last, and each is kept only if all remaining legs are still possible.
 """
 
 from __future__ import annotations
@@ -17,16 +16,16 @@ from .leg_search import BlockedElements, Leg, LegSearch
 from .virtual_splits import SplitMesh
 
 MOST_PATH_SPLITS = 12_000
-"""Virtual splits after which a path is given up: each winding needs more than the one before."""
+"""Most virtual splits of a path: each winding needs more than the one before."""
 
 
 class CrossingError(UnreachableError):
-    """A leg has no way that does not cross the others.
+    """A leg cannot be joined without crossing other legs.
 
     Attributes
     ----------
     leg : int
-        The place in the path of the point that it starts at.
+        Index in the path of the point where it starts.
     """
 
     def __init__(self, leg: int) -> None:
@@ -35,7 +34,7 @@ class CrossingError(UnreachableError):
 
 
 class Legs:
-    """The legs of a path through waypoints that have been laid so far.
+    """The legs of a path through waypoints that have been found so far.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ class Legs:
     Attributes
     ----------
     count : int
-        Legs in all.
+        Number of legs.
     """
 
     def __init__(
@@ -70,7 +69,7 @@ class Legs:
 
     @property
     def length(self) -> float:
-        """Length of what is laid, weighted by phi_fea."""
+        """Length of the legs found, weighted by φ_fea."""
         return sum(self._length.values())
 
     @property
@@ -81,13 +80,13 @@ class Legs:
         return path if closed else [*path, self._waypoints[-1]]
 
     def unhindered_lengths(self, straight: float) -> FloatArray:
-        """Length that each leg would have if there were no others, shape (count,).
+        """Length of each leg without the others, shape (count,).
 
         Parameters
         ----------
         straight : float
-            Ratio to the distance of its ends in space up to which nothing has hindered a leg that
-            is laid.
+            Length of a leg, relative to the distance between its ends in space, up to which its own
+            length is taken.
         """
         nothing = np.zeros(0, dtype=np.int64)
         free = BlockedElements(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
@@ -105,21 +104,21 @@ class Legs:
         return lengths
 
     def find_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
-        """Lay every leg; False when the path has become longer than it may be.
+        """Find every leg; False if the path becomes longer than the limit.
 
         Parameters
         ----------
         sequence : (count,) int array, optional
-            All legs in the order in which they are laid, by default that of the path; earlier ones
-            are more direct.
+            Order in which legs are found, by default that of the path; earlier ones are more
+            direct.
         most_length : float
 
         Raises
         ------
         CrossingError
-            If a leg has no way beside the others.
+            If a leg would cross the others.
         UnreachableError
-            If the path winds round itself too often.
+            If the path has too many windings.
         """
         legs = list(range(self.count)) if sequence is None else sequence.tolist()
         safe, separating = self._by_separation(legs)
@@ -138,7 +137,7 @@ class Legs:
         return True
 
     def _find_one_of(self, separating: list[int]) -> int:
-        """Lay the first leg after which all others are still possible, and say which it is."""
+        """Find the first leg after which all others are still possible; return its index."""
         for leg in separating:
             found = self._find(leg)
             if found is None:
@@ -146,14 +145,15 @@ class Legs:
             self._keep(leg, found)
             if self._all_possible([other for other in separating if other != leg]):
                 return leg
-            # What was split for it stays split.
+            # Its splits remain.
             del self._paths[leg], self._length[leg]
         raise CrossingError(separating[0])
 
     def _by_separation(self, sequence: list[int]) -> tuple[list[int], list[int]]:
-        """Legs that join what was apart, all of the boundary being one, and the others.
+        """Legs that join different groups of points, and legs that close a cycle.
 
-        Without boundary only the last leg of a closed path is one of the others.
+        All boundary points are one group. Without boundary only the last leg of a closed path
+        closes a cycle.
         """
         on_rim = {vertex for vertex in self._waypoints if self._is_on_rim(vertex)}
         group = {vertex: -1 if vertex in on_rim else vertex for vertex in self._waypoints}
@@ -201,7 +201,7 @@ class Legs:
         )
 
     def _loose(self) -> IntArray:
-        """Waypoints that one leg has reached."""
+        """Waypoints at which exactly one leg ends."""
         reached = [vertex for leg in self._paths for vertex in self.ends(leg)]
         vertices, count = np.unique(np.array(reached, dtype=np.int64), return_counts=True)
         return vertices[count == 1]
@@ -213,10 +213,10 @@ class Legs:
         )
 
     def _open_corners(self, vertex: int) -> None:
-        """Split the faces at a waypoint of the boundary that no leg could leave or enter by.
+        """Split faces at a boundary waypoint in which no leg could start or end.
 
-        A face between two edges of the boundary, or between one and a leg, has no edge at that
-        vertex that a path may take.
+        A face whose two edges at the waypoint belong to the boundary or to legs has no free edge
+        there.
         """
         if not self._is_on_rim(vertex):
             return
@@ -232,10 +232,10 @@ class Legs:
 
 
 def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
-    """Split the edges whose midpoints a path uses; the path as vertices, each joined to the next.
+    """Split the edges whose midpoints a path uses; return the path as vertices.
 
-    Where a path passes all three edges of a face, a line from an earlier midpoint may lie across
-    a later step; there the diagonal of the two faces is exchanged.
+    Where a path passes all three edges of a face, an edge from an earlier split may cross a later
+    step; it is flipped.
     """
     path = [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
     for start, end in zip(path[:-1], path[1:], strict=True):
@@ -248,5 +248,5 @@ def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
 
 
 def _beside(path: list[int], vertex: int) -> list[int]:
-    """Vertices before and after one that is at an end of a path; none if it is not."""
+    """Neighbours on a path of a vertex at its ends; empty for other vertices."""
     return [path[1]] * (path[0] == vertex) + [path[-2]] * (path[-1] == vertex)

@@ -1,8 +1,8 @@
-"""A simple path through points in their order: several are laid, and the shortest is taken.
+"""A simple path through points in their order: the shortest of several tries.
 
-Every leg goes round those laid before it, so which ones come first decides how often the path winds
-round itself. With many points in an order that jumps back and forth this changes the length many
-times over, and no rule finds the best.
+Every leg passes around earlier legs, so the sequence in which legs are found determines how often
+the path winds around itself. With many points in an order that jumps back and forth, the length
+varies many times over, and no rule finds the best sequence.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ STRAND_CLEARANCE = 0.1
 """Distance, in square roots of the component's area, within which a path avoids earlier ones."""
 
 ROOMY = 25
-"""Number of points above which that distance shrinks with the distance between the points."""
+"""Number of points above which that distance decreases with the spacing of the points."""
 
 LONG = 1.3
-"""Length of a path, relative to its legs without obstacles, above which other paths are tried."""
+"""Length of a path, relative to its legs without the others, above which more are tried."""
 
 MOST_TRIES = 6
-"""Paths that are laid at most, to find a shorter one."""
+"""Most paths tried to find a shorter one."""
 
 MOST_TRIES_WHILE_CROSSING = 14
-"""Paths that are laid at most as long as legs of each would cross."""
+"""Most paths tried while each has crossing legs."""
 
 MOST_SPLITS_TO_TRY = 40_000
-"""Virtual splits, of all paths that are laid, after which no other is tried."""
+"""Total virtual splits of all tries after which no other path is tried."""
 
 SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0
-"""How far a try changes which legs come first: standard deviation of the logarithm of lengths."""
+"""Random change of the sequence of legs: standard deviation of the logarithm of lengths."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Path:
     ----------
     split : SplitMesh
     vertices : list of int
-        The first one of a closed path is not repeated.
+        The first vertex of a closed path is not repeated.
     waypoints : (k,) int array
-        Vertices of the path that had to be visited, in order.
+        Vertices of the points, in order.
     length : float
-        Weighted by phi_fea.
+        Weighted by φ_fea.
     """
 
     split: SplitMesh
@@ -63,26 +63,26 @@ class Path:
 
 
 def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
-    """A simple path through points in their order, on a mesh that is split for it virtually.
+    """A simple path through points in their order, with virtual splits of the mesh.
 
-    The legs are laid as the points follow one another. If that makes a path much longer than its
-    legs have to be, short legs are laid first, then with random changes of what comes first.
+    Legs are found in the order of the points first. If the path is much longer than its legs have
+    to be, short legs come first, then random variations of that sequence are tried.
 
     Parameters
     ----------
     mesh : Mesh
     points : SurfacePoints
-        Different ones on one component.
+        Distinct points on one component.
     phi_fea : (V,) float array or None
-        φ_fea at the input vertices; lengths count times its square.
+        φ_fea at the input vertices; lengths are weighted by its square.
     closed : bool
 
     Raises
     ------
     CrossingError
-        If a leg has no way beside the others.
+        If a leg would cross the others.
     UnreachableError
-        If every path winds round itself too often.
+        If every path has too many windings.
     """
     component = mesh.face_component == mesh.face_component[points.faces[0]]
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
@@ -102,7 +102,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
         try:
             done = legs.find_all(sequence, np.inf if best is None else best.length)
         except UnreachableError as error:
-            # Winding too often says no more than that; crossing, that no path may exist.
+            # A path with too many windings exists; after a crossing, perhaps none does.
             if failure is None or not isinstance(error, CrossingError):
                 failure = error
         if done:
@@ -125,7 +125,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
 
 
 def separate(split: SplitMesh, waypoints: IntArray) -> None:
-    """Split the edges that join two waypoints, so that no two of them are neighbours."""
+    """Split edges between waypoints, so that no two waypoints are neighbours."""
     wanted = {int(waypoint) for waypoint in waypoints}
     for waypoint in sorted(wanted):
         for face in sorted(split.faces_around(waypoint)):

@@ -1,7 +1,7 @@
-"""Via points: they steer the initial path on its way from one control point to the next.
+"""Via points: they steer the initial path between consecutive control points.
 
-They say on which side of the surface, or which way round a handle, a curve shall run. Only the
-initial path passes them; the curve does not interpolate them.
+They select the homotopy class of the curve, such as the side of a limb or the direction around a
+handle. Only the initial path passes through them; the curve does not interpolate them.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ..geometry.surface_points import (
 )
 
 ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
-"""From the index of a control point to the points on the way from there to the next one."""
+"""From the index of a control point to the points between it and the next one."""
 
 OFF_BOUNDARY = 0.2
-"""How far a via point on the boundary is drawn towards the middle of its face."""
+"""Share by which a via point on the boundary is moved towards the centroid of its face."""
 
 LocatedViaPoints = dict[int, SurfacePoints]
-"""The same, checked and as faces and barycentrics."""
+"""The same, checked, as faces and barycentric coordinates."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Waypoints:
     points : SurfacePoints
     is_control : (k,) bool array
     names : list of str
-        What the caller knows each of them by.
+        Their names in messages.
     """
 
     points: SurfacePoints
@@ -50,14 +50,14 @@ class Waypoints:
 
 
 def names_of(controls: IntArray) -> list[str]:
-    """What messages call control points."""
+    """Names of control points in messages."""
     return [f"control_points[{index}]" for index in controls]
 
 
 def located_via_points(
     mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
 ) -> LocatedViaPoints:
-    """Via points as faces and barycentrics, by the index of the control point before them.
+    """Via points as faces and barycentric coordinates, by the index of the control point before.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def located_via_points(
     via_points : mapping
         From the index of a control point to points in any form that control points may have.
     order : str
-        Via points need "given": otherwise the legs are not known beforehand.
+        Via points need "given": otherwise the legs are not known in advance.
     closed : bool
         The last control point of an open path has no leg.
 
     Raises
     ------
     ArgumentError
-        If ``via_points`` is no mapping from indices of legs, or the order is not the given one.
+        If ``via_points`` is not a mapping from indices of legs, or the order is not "given".
     ControlPointError
         If a via point is out of range or off the surface.
     """
@@ -85,8 +85,8 @@ def located_via_points(
         )
     if via_points and order != "given":
         raise ArgumentError(
-            f'via_points needs order="given", not {order!r}: which points follow one another is '
-            "not known before"
+            f'via_points needs order="given", not {order!r}: otherwise consecutive points are not '
+            "known in advance"
         )
     last = len(points) - 1 if closed else len(points) - 2
     for key in via_points:
@@ -104,14 +104,14 @@ def located_via_points(
 def with_via_points(
     mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
 ) -> Waypoints:
-    """Put via points between control points, and check them.
+    """Merge via points with control points, and check them.
 
-    Arguments and errors are those of `located_via_points`, and
+    Arguments and errors are those of `located_via_points`, and:
 
     Raises
     ------
     ControlPointError
-        If a via point is the same as another point.
+        If a via point coincides with another point.
     UnreachableError
         If a via point lies on another component.
     """
@@ -132,9 +132,9 @@ def with_via_points(
 
 
 def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> SurfacePoints:
-    """Some of the points drawn into their faces where they are on the boundary.
+    """Move some of the points off the boundary, into their faces.
 
-    A curve that only passes near them must not touch it.
+    The path must not touch the boundary at a via point.
     """
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
     on_rim[mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]] = True
@@ -145,12 +145,12 @@ def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> Su
 
 
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
-    """Via points as the command line has them, ``"1:57,80"`` for each leg.
+    """Parse the via points of the command line, ``"1:57,80"`` for each leg.
 
     Raises
     ------
     ArgumentError
-        If a text is another one, or names a leg that another one has named.
+        If a text has another form, or a leg is named twice.
     """
     via_points: dict[int, list[int]] = {}
     for text in texts:

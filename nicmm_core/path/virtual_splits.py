@@ -1,8 +1,8 @@
 """Virtual splits (section 3.1, Fig. 1): the mesh M' that has every control point as a vertex.
 
-The input mesh is never changed. `SplitMesh` lays new vertices and faces over it, and
-`SplitMesh.assemble` turns the part that matters, one connected component, into plain arrays
-whose every vertex and face knows where in the input mesh it lies.
+The input mesh is never changed. `SplitMesh` adds vertices and faces to it, and `SplitMesh.assemble`
+returns one connected component as arrays, with the location of every vertex and face in the input
+mesh.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 
 Weights = dict[int, float]
-"""A point of the surface as input vertices and their weights; absent vertices weigh exactly 0."""
+"""A point of the surface as weights of input vertices; absent vertices have weight 0."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class WorkingMesh:
         Row i holds the weights of the input vertices at vertex i, so that
         ``vertices == interpolation @ mesh.vertices``.
     input_vertex : (n,) int array
-        The input vertex that each vertex is, or -1 for an inserted one.
+        The input vertex of each vertex, or -1 if it was inserted.
     """
 
     vertices: FloatArray
@@ -68,7 +68,7 @@ class WorkingMesh:
 
     @cached_property
     def on_boundary(self) -> BoolArray:
-        """Which vertices lie on an edge that only one face has, shape (n,)."""
+        """Vertices of edges with only one face, shape (n,)."""
         edges, count = self._unique_edges
         result = np.zeros(len(self.vertices), dtype=bool)
         result[edges[count == 1]] = True
@@ -84,8 +84,8 @@ class WorkingMesh:
 class SplitMesh:
     """The input mesh under virtual splits of faces and edges.
 
-    Vertices keep their input indices and new ones follow; so do faces. Costs follow the number
-    of splits, not the size of the mesh.
+    Vertices and faces keep their input indices, and new ones follow. The cost depends on the number
+    of splits, not on the size of the mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -108,7 +108,7 @@ class SplitMesh:
         return int(a), int(b), int(c)
 
     def weights(self, vertex: int) -> Weights:
-        """A vertex as input vertices and weights."""
+        """A vertex as weights of input vertices."""
         n_input = len(self._mesh.vertices)
         return self._new_weights[vertex - n_input] if vertex >= n_input else {vertex: 1.0}
 
@@ -121,7 +121,7 @@ class SplitMesh:
         return self._faces_around[vertex]
 
     def position(self, vertex: int) -> FloatArray:
-        """Where a vertex is in space, shape (3,)."""
+        """Position of a vertex, shape (3,)."""
         n_input = len(self._mesh.vertices)
         return (
             self._new_positions[vertex - n_input]
@@ -130,7 +130,7 @@ class SplitMesh:
         )
 
     def positions(self, vertices: IntArray) -> FloatArray:
-        """Where several vertices are, shape (q, 3)."""
+        """Positions of several vertices, shape (q, 3)."""
         n_input = len(self._mesh.vertices)
         result = self._mesh.vertices[np.minimum(vertices, n_input - 1)]
         for place in np.flatnonzero(vertices >= n_input).tolist():
@@ -169,7 +169,7 @@ class SplitMesh:
         Returns
         -------
         (k,) int array
-            The vertex that each point has become.
+            The vertex of each point.
         """
         return np.array(
             [
@@ -180,16 +180,16 @@ class SplitMesh:
         )
 
     def split_edge(self, start: int, end: int) -> int:
-        """Insert the midpoint of an edge and halve the faces beside it."""
+        """Insert the midpoint of an edge and bisect the faces at it."""
         return self._split_edge_at(start, end, _mixed(self.weights(start), self.weights(end), 0.5))
 
     def join(self, first: int, second: int) -> bool:
-        """Make an edge between the two vertices opposite a common edge inside an input face.
+        """Join two vertices opposite a common edge inside an input face by flipping that edge.
 
         Returns
         -------
         bool
-            Whether they are joined now; they may have been before.
+            Whether they are joined by an edge afterwards.
         """
         if second in self.neighbours(first):
             return True
@@ -221,7 +221,7 @@ class SplitMesh:
         -------
         WorkingMesh
         (number of vertices,) int array
-            The working vertex of each vertex of this mesh, or -1 when it is on another component.
+            The working vertex of each vertex of this mesh, or -1 on another component.
         """
         mesh = self._mesh
         kept = np.flatnonzero(self._alive & (mesh.face_component == component))
@@ -280,7 +280,7 @@ class SplitMesh:
     def _locate(
         self, input_face: int, input_corners: tuple[int, int, int], barycentric: FloatArray
     ) -> tuple[int, FloatArray]:
-        """Find the living face inside an input face that holds a point, and its coordinates."""
+        """The living face inside an input face that contains a point, and its coordinates there."""
         best: tuple[int, FloatArray] = (input_face, barycentric)
         if self._alive[input_face]:
             return best
@@ -317,7 +317,7 @@ class SplitMesh:
         return middle
 
     def _living_new_faces(self) -> tuple[IntArray, IntArray]:
-        """Corners and input face of the faces that splits have made and that are left."""
+        """Corners and input faces of the living faces created by splits."""
         new = np.flatnonzero(np.frombuffer(bytes(self._new_alive), dtype=bool))
         faces = np.array(self._new_faces, dtype=np.int64).reshape(-1, 3)
         parents = np.array(self._new_parents, dtype=np.int64)
@@ -359,7 +359,7 @@ class SplitMesh:
 
 
 def _mixed(first: Weights, second: Weights, fraction: float) -> Weights:
-    """The point at ``fraction`` of the way from one point to another."""
+    """The point at a fraction of the segment from one point to another."""
     mixed = {vertex: (1.0 - fraction) * weight for vertex, weight in first.items()}
     for vertex, weight in second.items():
         mixed[vertex] = mixed.get(vertex, 0.0) + fraction * weight

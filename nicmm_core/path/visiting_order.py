@@ -1,7 +1,7 @@
 """The order in which a loop visits its control points: a short cyclic or open tour.
 
-The shortest one may be impossible where points lie on boundaries. `order_along_boundaries` gives
-one that is not.
+The shortest tour may be impossible where points lie on boundaries; `order_along_boundaries` gives
+a possible one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ EXACT_UP_TO = 9
 """Tours of more points are improved by exchanges instead of being optimal (2^k states)."""
 
 LONGEST_MOVE = 3
-"""Points that are moved to another place of the tour together, at most."""
+"""Most consecutive points moved together to another position in the tour."""
 
 
 def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
@@ -31,9 +31,9 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
     Returns
     -------
     (k,) int array
-        Optimal for up to `EXACT_UP_TO` points (Held and Karp 1962); beyond, the nearest
-        neighbour's tour improved until no reversal of a stretch (2-opt, Croes 1958) and no move of
-        up to three points to another place (Or 1976) shortens it.
+        Optimal for up to `EXACT_UP_TO` points (Held and Karp 1962). Beyond, the nearest-neighbour
+        tour, improved until no reversal of a section (2-opt, Croes 1958) and no move of up to three
+        points (Or 1976) shortens it.
     """
     if not closed:
         # An open tour is a closed one through an extra point at distance zero from all.
@@ -47,17 +47,17 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
 def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: bool) -> IntArray:
     """A short order in which a simple curve can visit points, some of which lie on boundaries.
 
-    A thin strip about a tree that joins all points has a simple curve as its boundary. Where the
-    tree comes to a boundary of the surface, it can run along it, and visits the points there one
-    after the other in the direction of the boundary.
+    The boundary of a thin strip around a tree through all points is a simple curve. Where the tree
+    reaches a boundary of the surface, the curve can follow it and visit the points there in the
+    direction of the boundary.
 
     Parameters
     ----------
     distance : (k, k) float array
         Symmetric distances along the surface.
     loops : list of (b,) int array
-        Points on each loop of the boundary in its direction: the surface on the same side of all
-        loops, where it can be oriented.
+        Points on each boundary loop in its direction, with the surface on the same side of all
+        loops if it is orientable.
     closed : bool
         Whether the tour returns to its start.
 
@@ -78,7 +78,7 @@ def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: 
 
 
 def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArray:
-    """A tour with a cyclic chain of points put, whole, where it costs least."""
+    """A tour with a cyclic chain of points inserted as a whole where it costs least."""
     last = np.roll(chain, 1)  # of the chain that starts at each of its points
     following = np.roll(tour, -1)
     cost = distance[np.ix_(tour, chain)] + distance[np.ix_(following, last)]
@@ -129,8 +129,8 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
 
 
 def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
-    """The tour after the best exchange again and again, starting at point 0."""
-    # Below rounding an exchange could undo itself for ever.
+    """The tour after repeated best exchanges, starting at point 0."""
+    # Gains below rounding could make exchanges cycle.
     least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
     while True:
         checkpoint()
@@ -145,7 +145,7 @@ def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
 
 
 def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, int]:
-    """What reversing the stretch from i + 1 to j saves, and the best i and j."""
+    """The best gain of reversing the section from i + 1 to j, with i and j."""
     following = np.roll(tour, -1)
     leg = distance[tour, following]
     gain = leg[:, None] + leg[None] - distance[np.ix_(tour, tour)]
@@ -156,11 +156,11 @@ def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, in
 
 
 def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
-    """What moving a few points to another leg saves at best, and the tour after it."""
+    """The best gain of moving a few points to another leg, and the tour after it."""
     k = len(tour)
     best, moved = 0.0, tour
     for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
-        # Row i: the points moved are those at i … i + count - 1; column j: to the leg after j.
+        # Row i: move points i … i + count - 1; column j: to the leg after point j.
         checkpoint()
         before, first = np.roll(tour, 1), tour
         last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
