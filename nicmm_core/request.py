@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from .geometry.array_types import FloatArray
+from .geometry.numbering import Renumbered
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
 
@@ -52,6 +53,18 @@ class Request:
         """All points, by the argument that they come from."""
         via = {f"via_points[{key}]": points for key, points in self.via_points.items()}
         return {"control_points": self.points, **via}
+
+
+def renumbered_request(there: Renumbered, request: Request) -> Request:
+    """A request on the original of a renumbered mesh as one on that."""
+    via_points = {key: there.points(points) for key, points in request.via_points.items()}
+    return replace(
+        request,
+        points=there.points(request.points),
+        via_points=via_points,
+        obstacles=there.values(request.obstacles),
+        alignment=there.values(request.alignment),
+    )
 
 
 def same_request(one: Request, other: Request) -> bool:

@@ -16,6 +16,7 @@ from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
+from .geometry.numbering import Renumbered, renumbered
 from .level_set import variational
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
@@ -32,7 +33,7 @@ from .relaxation.elastic_energy import FEATURE_TENSION
 from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import WARM
-from .request import Request
+from .request import Request, renumbered_request
 from .start import Resumable, moved_start
 from .status import Status
 
@@ -142,12 +143,14 @@ class SurfaceDesigner:
 
     def _start_from_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
-        found = infer(self.mesh, request)
+        there = self._renumbered
+        found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
         # A level set may touch itself where the mesh is too coarse; the path does not.
-        one = zeros.is_simple_curve(self.mesh, request.closed)
+        one = zeros.is_simple_curve(there.mesh, request.closed)
+        curve = zeros.curves[0] if one else path_curve(there.mesh, problem.working, problem.loop)
         return _Start(
-            curve=zeros.curves[0] if one else path_curve(self.mesh, problem.working, problem.loop),
+            curve=there.curve(curve),
             visited=problem.loop.order,
             surface=self._curve_surface(request),
             unit=problem.unit,
@@ -242,6 +245,10 @@ class SurfaceDesigner:
     @cached_property
     def _surface(self) -> CurveSurface:
         return curve_surface(self.mesh)
+
+    @cached_property
+    def _renumbered(self) -> Renumbered:
+        return renumbered(self.mesh)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:

@@ -21,6 +21,7 @@ from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
+from ..geometry.numbering import frame_coordinates, renumbered, uniform_hash
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..repair.degenerate_faces import flat_faces, with_areas
@@ -37,6 +38,9 @@ NORMAL_WEIGHT = 0.6
 Opposite normals differ by 2, which counts as more than the least distance; so the two sides of a
 plate or of a thin limb get separate seeds.
 """
+
+TIE_BREAK = 1e-6
+"""Greatest change of an edge's length, relative to it, for each of its ends."""
 
 SLAB = 150_000
 """Vertices of a slab; a run of Dijkstra's algorithm over them takes about 0.1 s.
@@ -138,8 +142,10 @@ def build_coarse_mesh(
     checkpoint()
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
     distance = PACKING * np.sqrt(areas.sum() / count)
-    seed = _seeds(mesh, vertex_normals, areas, CANDIDATES * count, distance)
-    graph = _edge_graph(mesh)
+    # The place of a vertex decides what chance would, and not its number.
+    chance = uniform_hash(frame_coordinates(mesh))
+    seed = _seeds(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
+    graph = _edge_graph(mesh, chance)
     cell = _nearest_seeds(mesh.vertices, graph, seed, MARGIN * distance)
     if (cell[faces] < 0).any():
         cell = _nearest_seeds(mesh.vertices, graph, seed, np.inf)
@@ -150,12 +156,14 @@ def build_coarse_mesh(
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
         raise MeshError("the cells of the coarse mesh meet in no face")
-    return CoarseMesh(_mesh_with_areas(mesh.vertices[seed], corners[np.sort(first)]), seed, cell)
+    there = renumbered(Mesh(mesh.vertices[seed], corners[first]))
+    cell = np.where(cell < 0, -1, there.number[cell])
+    return CoarseMesh(_with_areas(there.mesh), seed[np.argsort(there.number)], cell)
 
 
-def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
+def _with_areas(mesh: Mesh) -> Mesh:
     """A mesh without degenerate faces: on a grid, three seeds may be collinear."""
-    mesh = Mesh(vertices, faces)
+    vertices, faces = mesh.vertices, mesh.faces
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
     flat = flat_faces(vertices, faces, short)
     if not flat.any():
@@ -164,9 +172,13 @@ def _mesh_with_areas(vertices: FloatArray, faces: IntArray) -> Mesh:
     return Mesh(origin + with_areas(vertices - origin, faces, short, flat), faces)
 
 
-def _edge_graph(mesh: Mesh) -> sparse.csr_array:
-    """Lengths of the edges, each stored once, shape (V, V)."""
+def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
+    """Lengths of the edges, each stored once, shape (V, V).
+
+    They are changed by a little, so that no two paths on a grid are equally long.
+    """
     length = edge_lengths(mesh.vertices, mesh.edges)
+    length *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
     size = len(mesh.vertices)
     return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
 
@@ -206,13 +218,17 @@ def _nearest_seeds(
 
 
 def _seeds(
-    mesh: Mesh, normals: FloatArray, areas: FloatArray, n_candidates: int, distance: float
+    mesh: Mesh,
+    normals: FloatArray,
+    areas: FloatArray,
+    chance: FloatArray,
+    n_candidates: int,
+    distance: float,
 ) -> IntArray:
-    """Vertices at least a distance apart, ascending."""
-    generator = np.random.default_rng(0)
+    """Vertices at least a distance apart, ascending; ``chance`` is a number in (0, 1) for each."""
     there = np.flatnonzero(areas > 0.0)
     # The smallest exponential times: a sample weighted by area, without replacement.
-    times = generator.exponential(size=len(there)) / areas[there]
+    times = -np.log(chance[there]) / areas[there]
     checkpoint()
     candidates = there[np.argsort(times)[:n_candidates]]
     scaled = np.concatenate(

@@ -6,6 +6,7 @@ import igl
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.numbering import principal_frame
 from ..progress import checkpoint
 
 BASE_CHANNELS = 8
@@ -33,15 +34,11 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
     The network sees coordinates; in this frame a turned or moved model gives the same ones, and
     so the same curve, unless its axes are undetermined as a ball's are.
     """
-    centroids = vertices[faces].mean(axis=1)
-    share = face_areas / face_areas.sum()
-    centre = share @ centroids
-    offset = centroids - centre
-    _, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
+    frame = principal_frame(vertices, faces, face_areas)
     # An axis has no sign of its own: it points to where the surface reaches farther.
-    axes = axes * np.where(share @ (offset @ axes) ** 3 < 0.0, -1.0, 1.0)
+    axes = frame.axes * np.where(frame.skewness < 0.0, -1.0, 1.0)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    return (vertices - centre) @ axes
+    return (vertices - frame.centre) @ axes
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

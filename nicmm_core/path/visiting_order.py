@@ -19,7 +19,10 @@ LONGEST_MOVE = 3
 
 
 def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
-    """Order that makes the tour through all points short, starting at point 0.
+    """Order that makes the tour through all points short.
+
+    It starts at the point that is farthest from all others, and goes to the nearer of its
+    neighbours first: the numbers of the points make no difference.
 
     Parameters
     ----------
@@ -35,10 +38,22 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
         tour, improved until no reversal of a section (2-opt, Croes 1958) and no move of up to three
         points (Or 1976) shortens it.
     """
-    if not closed:
+    by_remoteness = np.argsort(-distance.sum(axis=1), kind="stable")
+    distance = distance[np.ix_(by_remoteness, by_remoteness)]
+    if closed:
+        tour = _tour(distance)
+        if distance[0, tour[-1]] < distance[0, tour[1]]:
+            tour = np.roll(tour[::-1], 1)
+    else:
         # An open tour is a closed one through an extra point at distance zero from all.
-        padded = np.pad(distance, ((1, 0), (1, 0)))
-        return shortest_order(padded, closed=True)[1:] - 1
+        tour = _tour(np.pad(distance, ((1, 0), (1, 0))))[1:] - 1
+        if tour[0] > tour[-1]:
+            tour = tour[::-1]
+    return by_remoteness[tour]
+
+
+def _tour(distance: FloatArray) -> IntArray:
+    """A short cyclic tour through all points, starting at point 0."""
     if len(distance) <= EXACT_UP_TO:
         return _held_karp(distance)
     return _improved(distance, _nearest_neighbour(distance))
