@@ -2,9 +2,8 @@
 
 φ is linear in every working face, so its zero set crosses each face in one straight segment and
 the polyline lies on the surface by construction. Control points are vertices where φ is exactly
-zero. A vertex that the contour passes closely counts as zero too, where that only draws a few tiny
-segments together into one point. At any other vertex a value of 0 is read as just positive, or the
-contour would shatter there.
+zero. A vertex close to the contour counts as zero too, if that only collapses a few tiny segments
+into one point. At any other vertex a value of 0 counts as positive, or the contour would branch.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from .sign_bundle import SignBundle, local_signs
 from .vertex_links import VertexLinks
 
 PASSING_MARGIN = 0.03
-"""The contour goes through a vertex if it crosses every edge there within this share of it."""
+"""The contour snaps to a vertex if it crosses all edges there within this fraction of them."""
 
 CROSSING_MARGIN = 1e-6
-"""Closest that a crossing comes to the end of its edge, as a fraction of the edge.
+"""Least distance of a crossing from the ends of its edge, as a fraction of the edge.
 
-Keeps neighbouring points of the polyline apart where φ is almost zero at a vertex.
+Separates neighbouring points of the polyline where φ is almost zero at a vertex.
 """
 
 
@@ -55,13 +54,13 @@ def extract_curves(
     control_vertices : (k,) int array
         Working vertices of the control points, in the order visited, no two of them neighbours.
     bundle : SignBundle, optional
-        How the faces read the values of their corners.
+        Signs with which faces read the values of their corners.
 
     Returns
     -------
     list of SurfaceCurve
-        Those with most control points first, then the longest. A curve that ends at the mesh's
-        boundary, or at an end of the bundle, is open.
+        Those with most control points first, then the longest. A curve that ends at the boundary of
+        the mesh, or at an end of the bundle, is open.
     """
     passed = _passed_vertices(working, field, control_vertices, bundle)
     through = np.concatenate([control_vertices, passed])
@@ -89,9 +88,9 @@ def _passed_vertices(
     control_vertices: IntArray,
     bundle: SignBundle | None,
 ) -> IntArray:
-    """Vertices that the contour passes so closely that it may go through them.
+    """Vertices to which the contour snaps.
 
-    They are simple, and no two of them or of them and the control vertices are neighbours.
+    They are simple, and neither neighbours of each other nor of control vertices.
     """
     sign = signs_with_zeros(field, control_vertices)
     _, ends = _crossings(working.faces, sign, bundle)
@@ -120,7 +119,7 @@ def segment_ends(
     sign: IntArray,
     bundle: SignBundle | None = None,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Faces that the zero set crosses, and where its segment in each of them starts and ends.
+    """Faces that the zero set crosses, with both ends of its segment in each.
 
     Parameters
     ----------
@@ -159,7 +158,7 @@ def _segments(
     Returns
     -------
     nodes : (p, 2) int array
-        The working edge that φ changes sign on, smaller index first, or a zero vertex twice.
+        The working edge on which φ changes sign, smaller index first, or a zero vertex twice.
     segments : (s, 2) int array
         Node indices.
     segment_face : (s,) int array
@@ -193,17 +192,17 @@ def _crossings(
 
 
 def _crossing_fraction(field: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
-    """How far from the first end of an edge φ is zero, as a share of the edge; 0 at a vertex."""
+    """Position of the zero of φ on an edge, as a fraction from its first end; 0 at a vertex."""
     here, there = np.abs(field[first]), np.abs(field[second])
     fraction = here / np.maximum(here + there, np.finfo(np.float64).tiny)
     return np.where(first == second, 0.0, fraction)
 
 
 def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
-    """Join segments into paths: (nodes, segments in between, closed), each node used once.
+    """Join segments into paths: (nodes, segments in between, closed), each segment used once.
 
-    Where more than two segments meet, a path ends; on a manifold that happens only at
-    vertices that two strands pass.
+    A path ends where more than two segments meet; on a manifold that happens only at vertices that
+    two strands pass.
     """
     at_node: list[list[int]] = [[] for _ in range(n_nodes)]
     for segment, (a, b) in enumerate(segments.tolist()):
@@ -239,7 +238,7 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
 def _from_first_control(
     chain: IntArray, along: IntArray, nodes: IntArray, control_vertices: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Start a closed chain at its first control point and walk towards the second."""
+    """Start a closed chain at its first control point, directed towards the second."""
     where = _positions_in(nodes[chain], control_vertices)
     where = where[where >= 0]
     if not len(where):
@@ -251,14 +250,14 @@ def _from_first_control(
 
 
 def _runs_backwards(nodes: IntArray, control_vertices: IntArray) -> bool:
-    """Whether an open chain meets its last control point first."""
+    """Whether an open chain passes its last control point first."""
     where = _positions_in(nodes, control_vertices)
     where = where[where >= 0]
     return len(where) > 1 and bool(where[0] > where[-1])
 
 
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
-    """Index among the nodes of each control vertex, -1 when it is none of them, shape (k,)."""
+    """Index of each control vertex among the nodes, -1 if it is not one of them, shape (k,)."""
     at_vertex = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
     found = {int(nodes[i, 0]): int(i) for i in at_vertex}
     return np.array([found.get(int(vertex), -1) for vertex in control_vertices], dtype=np.int64)

@@ -16,9 +16,8 @@ BASE_CHANNELS = 8
 def control_indicator(response: FloatArray) -> FloatArray:
     """φ_p: 1 at the control points and falling to 0 around them (Eq. 1), shape (n,).
 
-    Eq. 1 has 1 at single vertices and 0 at their neighbours. To a network that sees one vertex at
-    a time that is a spike, and its size on the surface shrinks with the mesh; so each point's 1
-    spreads as a smooth field instead.
+    Eq. 1 has 1 at single vertices and 0 at their neighbours: a spike whose size depends on the
+    mesh. The network sees one vertex at a time, so a smooth field replaces each spike.
 
     Parameters
     ----------
@@ -31,8 +30,8 @@ def control_indicator(response: FloatArray) -> FloatArray:
 def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> FloatArray:
     """Positions about the surface's centroid, along its principal axes, shape (n, 3).
 
-    The network sees coordinates; in this frame a turned or moved model gives the same ones, and
-    so the same curve, unless its axes are undetermined as a ball's are.
+    In this frame the input, and so the curve, does not depend on rotation or translation of the
+    model, unless the axes are undetermined, as those of a ball.
     """
     frame = principal_frame(vertices, faces, face_areas)
     # An axis has no sign of its own: it points to where the surface reaches farther.

@@ -16,10 +16,10 @@ from .sign_bundle import SignBundle, corner_matrix
 from .sparse_solver import DEGENERATE
 
 MOLLIFICATION = 1e-8
-"""By how much two sides of a face are longer than the third at least, in mean edge lengths.
+"""Least excess of two sides of a face over the third, in mean edge lengths.
 
-Cotangents come from lengths, where less is lost to rounding. It is that of angles of about a
-hundredth of a degree.
+It corresponds to angles of about 0.01°; cotangents are computed from lengths, with less rounding
+error.
 """
 
 
@@ -37,12 +37,12 @@ class FiniteElements:
     stiffness : (n, n) sparse array
         Cotangent stiffness: positive semidefinite, zero on constants.
     laplacian : (n, n) sparse array
-        Pointwise Laplacian, ``-stiffness / vertex_areas``; zero rows where asked, as on the
-        boundary, where the stiffness holds the flux through it and not a second derivative.
+        Pointwise Laplacian, ``-stiffness / vertex_areas``. Rows of some vertices are zero, such as
+        those on the boundary, where the stiffness contains the boundary flux.
     centroid : (m, n) sparse array
         Value of a linear function at the centroid of each face.
     plain_centroid : (m, n) sparse array
-        The same for ordinary functions, where φ is read with signs.
+        The same for ordinary functions, without the signs of a bundle.
     """
 
     face_areas: FloatArray
@@ -55,11 +55,11 @@ class FiniteElements:
 
 
 def mollified(lengths: FloatArray) -> FloatArray:
-    """Lengths of the edges of faces with which every face has an area, shape (m, 3).
+    """Edge lengths of faces, increased so that every face has an area, shape (m, 3).
 
-    The same length is added to all edges, the least with which two sides of every face are longer
-    than the third by `MOLLIFICATION` (Sharp and Crane, "A Laplacian for nonmanifold triangle
-    meshes", 2020). On meshes without slivers that is none.
+    The same length is added to all edges: the least with which two sides of every face exceed the
+    third by `MOLLIFICATION` (Sharp and Crane, "A Laplacian for nonmanifold triangle meshes", 2020).
+    On meshes without slivers it is zero.
     """
     slack = lengths.sum(axis=1) - 2.0 * lengths.max(axis=1)
     return lengths + max(0.0, MOLLIFICATION * float(lengths.mean()) - float(slack.min()))
@@ -78,9 +78,9 @@ def build_finite_elements(
     vertices : (n, 3) float array
     faces : (m, 3) int array
     without_laplacian : (n,) bool array
-        Vertices whose row of the Laplacian is left zero, as on the boundary.
+        Vertices whose rows of the Laplacian are zero, such as those on the boundary.
     bundle : SignBundle, optional
-        How the faces read the values of their corners.
+        Signs with which faces read the values of their corners.
     """
     n_vertices, n_faces = len(vertices), len(faces)
     face_areas = triangle_areas(vertices, faces)

@@ -1,11 +1,11 @@
-"""The energy of a curve (Eq. 2–8), a named function for each term, on the working mesh.
+"""The energy of a curve on the working mesh (Eq. 2–8), one function per term.
 
-Every length is in units of the square root of the surface's area, so that no term depends on the
-unit or the size of the model. The integrals are sums over faces: with the Voronoi area of vertex
-i in triangle t taken as |t|/3 (Eq. 8), the three corners of a face add up to its area, and every
-integrand is taken at the centroid.
+Lengths are in units of the square root of the surface's area, so that no term depends on the unit
+or the size of the model. The integrals are sums over faces: the Voronoi area of vertex i in
+triangle t is taken as |t|/3 (Eq. 8), so the three corners of a face add up to its area, and every
+integrand is evaluated at the centroid.
 
-The terms are written once for NumPy arrays and for tensors: they use what both have in common.
+The functions accept NumPy arrays and tensors.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ Operator = Callable[[Array], Array]
 DELTA_WIDTH = 1.0
 """σ of the Gaussian for the Dirac delta, in mean edge lengths.
 
-The least that the centroids of a mesh still sample: the delta then covers the band of three edge
-lengths in which the paper judges convergence.
+The least width that centroids sample: the delta then covers the band of three edge lengths in
+which the paper tests convergence.
 """
 
 
 MOST_BENDING = 0.25
-"""Most that the smoothness term may weigh in the energy at φ₀."""
+"""Greatest weighted smoothness term at φ₀."""
 
 
 @dataclass(frozen=True)
 class LossWeights:
     """The λ of Eq. 2.
 
-    The paper's λ_int = 5000, λ_smooth = 500 and λ_fea carry no unit. Lengths here are in square
-    roots of the surface's area, where 500 would shrink φ to nothing, since a smaller slope lowers
-    (Δφ)² and widens the Gaussian. λ_smooth, a length, is 500 for a unit 50,000 times smaller; 0.01
-    is about the largest value that leaves |∇φ| near 1 beside the curve. λ_fea, an inverse length,
-    acts as a tension too; at 0.3 alignment holds the curve against its bending and at 0.1 not.
+    The paper gives λ_int = 5000, λ_smooth = 500 and λ_fea without a unit. Here lengths are in
+    square roots of the surface's area. In this unit λ_smooth = 500 would flatten φ to zero, since a
+    smaller slope lowers (Δφ)² and widens the Gaussian. λ_smooth is a length; 0.01 is about the
+    largest value with |∇φ| near 1 beside the curve. λ_fea, an inverse length, also acts as a
+    tension; alignment holds the curve against bending at 0.3, but not at 0.1.
     """
 
     sdf: float = 1.0
@@ -51,7 +51,7 @@ class LossWeights:
 
 @dataclass(frozen=True)
 class EnergySurface:
-    """What the energy needs of a surface: n vertices, m faces.
+    """Operators of the energy on a surface with n vertices and m faces.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class EnergySurface:
 
 
 def energy_surface(problem: Problem) -> EnergySurface:
-    """The surface of a problem as NumPy arrays; `tensors.surface_tensors` has it as tensors."""
+    """The surface of a problem as NumPy arrays; see `tensors.surface_tensors` for tensors."""
     elements = problem.elements
     phi_fea = problem.feature_map
     return EnergySurface(
@@ -91,7 +91,7 @@ def energy_surface(problem: Problem) -> EnergySurface:
 
 
 def root_delta(value: Array, width: float) -> Array:
-    """√G_σ(φ), written without a root, whose slope is infinite where G underflows to zero."""
+    """√G_σ(φ), without a square root, whose derivative is infinite where G underflows."""
     return math.e ** (-0.25 * (value / width) ** 2) / math.sqrt(width * math.sqrt(2.0 * math.pi))
 
 
@@ -165,10 +165,10 @@ def loss_terms(surface: EnergySurface, phi: Array) -> dict[str, Array]:
 
 
 def balanced(weights: LossWeights, problem: Problem) -> LossWeights:
-    """Lower λ_smooth where the bending of φ₀ would outweigh its slope.
+    """Lower λ_smooth where bending would outweigh the level-set term at φ₀.
 
-    A flat φ costs ½ in Eq. 3 and nothing in Eq. 6. Where bending costs about as much, as with many
-    points or a large smoothness, the least energy would be no curve at all.
+    A flat φ costs ½ in Eq. 3 and nothing in Eq. 6. If bending costs as much, as with many points or
+    a large smoothness, the minimum would be a flat φ without a curve.
     """
     bending = float(smoothness_loss(energy_surface(problem), problem.initial_distance))
     if weights.smooth * bending <= MOST_BENDING:

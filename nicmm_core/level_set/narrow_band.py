@@ -1,9 +1,9 @@
 """The energy on a narrow band about the curve, with its Gauss–Newton system.
 
-The unknowns are φ at the vertices of the band's faces, without the control points, where φ is
-zero. The level-set term acts on all faces of the band. Bending and feature terms act only on faces
-whose corners have all of their faces inside: a Laplacian that lacks some would act as if φ were
-zero there, and pull spurious curves along the rim.
+The unknowns are φ at the vertices of the band's faces except control points, where φ is zero. The
+level-set term acts on all faces of the band. The bending and feature terms act only on faces whose
+corners have all their faces in the band: an incomplete Laplacian would treat φ outside as zero and
+attract spurious curves along the rim.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .losses import (
 from .problem import Problem
 
 MASS_SHARE = 0.01
-"""Share of the mass matrix, per squared edge length, in the damping; it holds what floats free."""
+"""Factor of the mass matrix over h² in the damping; it makes the system definite."""
 
 
 @dataclass(frozen=True)
 class NarrowBand:
-    """Operators of u unknowns on b faces, c of them with complete surroundings.
+    """Operators of u unknowns on b faces, c of which have complete neighbourhoods.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class NarrowBand:
     feature_map : (c,) float array or None
         φ_fea at centroids.
     damping : (u, u) sparse array
-        Stiffness with a little mass: the norm that damps a step.
+        Stiffness with a small mass term: the norm of the damping.
     delta_width : float
         σ of the Gaussian for the Dirac delta.
     """
@@ -65,7 +65,7 @@ class NarrowBand:
 
 @dataclass(frozen=True)
 class Residuals:
-    """The energy at one φ as half a sum of squares, and what its derivatives need.
+    """Residuals of the energy at one φ, and the values that its derivatives need.
 
     Attributes
     ----------
@@ -92,13 +92,13 @@ class Residuals:
 
 
 def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) -> NarrowBand:
-    """The faces whose centroid is nearer than the half width to the zero set.
+    """The faces whose centroids are within the half width of the zero set.
 
     Parameters
     ----------
     problem : Problem
     field : (n,) float array
-        About a signed distance, in units of the problem.
+        Approximately a signed distance, in units of the problem.
     half_width : float
     """
     elements, faces = problem.elements, problem.working.faces
@@ -153,11 +153,11 @@ def gauss_newton_system(
 ) -> tuple[sparse.csr_array, FloatArray]:
     """Positive semidefinite Hessian (u, u) and gradient (u,) of the energy.
 
-    To JᵀJ of all residuals comes what the curvature of |∇φ|² adds where it is positive, in faces
-    with a slope above 1; elsewhere it would make the Hessian indefinite.
+    JᵀJ of all residuals, plus the second derivative of |∇φ|² in faces with a slope above 1;
+    elsewhere it would make the Hessian indefinite.
     """
     n_faces = len(band.face_areas)
-    # Row f holds 2 ∇φ of face f, so that its product with the gradient is that of |∇φ|².
+    # Row f holds 2 ∇φ of face f; times the gradient operator it is the derivative of |∇φ|².
     components = (np.tile(np.arange(n_faces), 3), np.arange(3 * n_faces))
     along = sparse.csr_array((2.0 * residuals.gradient, components))
     slope = along @ band.gradient

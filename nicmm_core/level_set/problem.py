@@ -1,7 +1,7 @@
-"""One design problem, ready for the network: everything up to the features, in one place.
+"""One design problem, ready for the network.
 
-This is the paper's pipeline as far as section 3.1: control points, initial loop, signed distance
-and input features. Pretraining and prediction both start from it.
+This is the paper's pipeline up to section 3.1: control points, initial loop, signed distance and
+input features. Pretraining, inference and fine-tuning start from it.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from .topology import keep_topology
 SMOOTHING_LENGTH = 1.5
 """ℓ of the smoothing of φ₀ at smoothness 1, in steps of the initial loop.
 
-Less leaves the zigzag of the edge path in the curve; more makes thin regions vanish, where the
-topology then falls back on the jagged distance.
+A smaller value leaves the zigzag of the edge path in the curve. With a larger one thin regions
+vanish, and the topology then falls back on the unsmoothed distance.
 """
 
 
 END_RADIUS = 3.0
-"""Distance from an end of an open curve, in edge lengths, within which bending does not count.
+"""Distance from an end of an open curve, in edge lengths, within which bending is ignored.
 
-φ is a cone about the end, whose Laplacian grows without bound and says nothing of the curve.
+φ is a cone about the end, whose Laplacian is unbounded.
 """
 
 
 PATH_SHARE, SMOOTHED_SHARE = 0.6, 0.9
-"""About how much of the time is over when the path is there, and when φ₀ is."""
+"""Approximate shares of the time until the path is found, and until φ₀ is."""
 
 
 @dataclass(frozen=True)
@@ -58,18 +58,18 @@ class Problem:
     working : WorkingMesh
         In the input mesh's units.
     unit : float
-        Square root of the area of the working mesh, the unit of all that follows.
+        Square root of the area of the working mesh, the unit of all following lengths.
     vertices : (n, 3) float array
         Positions about the surface's centroid, along its principal axes.
     bundle : SignBundle or None
-        How the faces read φ, where the curve is open or bounds no region.
+        Signs with which faces read φ, if the curve is open or bounds no region.
     elements : FiniteElements
     loop : InitialLoop
     distance : (n,) float array
         Signed distance to the initial loop.
     smoother : Smoother
     initial_distance : (n,) float array
-        φ₀: the distance smoothed. Its zero set is one simple loop through the control points.
+        φ₀, the smoothed distance. Its zero set is one simple loop through the control points.
     feature_map : (n,) float array or None
         φ_fea.
     features : (n, 8) or (n, 9) float array
@@ -90,7 +90,7 @@ class Problem:
 
     @property
     def edge_length(self) -> float:
-        """Mean length h of the edges at the initial loop, relative to the unit."""
+        """Mean length h of the edges at the initial loop, in the unit of the problem."""
         return self.loop.edge_length / self.unit
 
 
@@ -105,7 +105,7 @@ def build_problem(
     via_points: ViaPoints | None = None,
     pieces: int = PIECES,
 ) -> Problem:
-    """Everything that comes before the network.
+    """Build the problem from control points to input features.
 
     Parameters
     ----------
@@ -116,13 +116,13 @@ def build_problem(
     obstacles, alignment : (V,) float array or None
         Weights in [0, 1] at the input mesh's vertices.
     smoothness : float
-        Multiplies the weight of bending in the smoothing of φ₀, the fourth power of its length.
+        Factor of the bending in the smoothing of φ₀, and so of the fourth power of its length.
     closed : bool
         Whether the curve returns from the last point to the first.
     via_points : mapping, optional
-        From the index of a control point to points that steer the initial path from there.
+        From the index of a control point to points on the path from there to the next one.
     pieces : int
-        How finely the mesh is refined along the path, see `path.band_refinement`.
+        Refinement of the mesh along the path, see `path.band_refinement`.
 
     Raises
     ------

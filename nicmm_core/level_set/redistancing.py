@@ -1,11 +1,11 @@
 """Signed distance to the zero set of a field, near that zero set.
 
-The heat method gives distances to vertices; a solver that moves the curve needs distances to the
-curve itself, between the vertices, again and again and only beside it. Vertices of the faces that
-the curve crosses take their distance to its segments. From there it spreads by Kimmel and Sethian's
-update ("Computing geodesic paths on manifolds", 1998), a plane wave across each triangle, which is
-repeated on all faces beside the last change instead of one vertex after the other. Cost follows
-the band and not the mesh.
+The heat method gives distances to vertices; a solver that moves the curve repeatedly needs
+distances to the curve itself, only near it. Vertices of the faces that the curve crosses get their
+distance to its segments. It propagates from there by Kimmel and Sethian's update ("Computing
+geodesic paths on manifolds", 1998), a plane wave across each triangle, which is repeated on all
+faces at the last changes instead of vertex by vertex. The cost depends on the band, not on the
+mesh.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from .sign_bundle import SignBundle
 from .signed_distance import LEAST_DISTANCE
 
 SETTLED = 1e-6
-"""Improvements of a distance below this, in edge lengths, are not passed on."""
+"""Decreases of a distance below this, in edge lengths, are not propagated."""
 
 OFTEN = 100
-"""Times that a distance has been lowered from which on it follows from smaller ones only.
+"""Number of decreases of a distance after which only smaller distances may lower it.
 
-Fifty were the most on SHREC16's meshes with their virtual splits. In a ring of needles each may
-lower the next by less and less for thousands of rounds.
+At most 50 occurred on the SHREC16 meshes with virtual splits. In a ring of needles, each may lower
+the next by ever smaller amounts for thousands of rounds.
 """
 
 
 @dataclass(frozen=True)
 class DistanceSurface:
-    """What distances need of a mesh: n vertices, m faces.
+    """A mesh for distances: n vertices, m faces.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class DistanceSurface:
         1 where a face has a vertex.
     edge_length : float
     bundle : SignBundle or None
-        How the faces read the values of their corners.
+        Signs with which faces read the values of their corners.
     """
 
     vertices: FloatArray
@@ -79,12 +79,12 @@ def redistanced(
     zero_vertices : (k,) int array
         Vertices that the zero set passes; they stay zero.
     limit : float
-        Distances are not followed farther than this; beyond, the result is constant.
+        Distances are not propagated beyond this; there the result is constant.
 
     Returns
     -------
     (n,) float array
-        The field itself where it has no zero set.
+        The field itself if it has no zero set.
     """
     sign = signs_with_zeros(field, zero_vertices)
     distance = _distance_at_the_curve(surface, field, sign)
@@ -101,7 +101,7 @@ def redistanced(
 def _distance_at_the_curve(
     surface: DistanceSurface, field: FloatArray, sign: IntArray
 ) -> FloatArray:
-    """Distance of the vertices of crossed faces to the segments in the faces about them."""
+    """Distance of the vertices of crossed faces to the segments in the faces around them."""
     crossed, start, end = segment_ends(surface.vertices, surface.faces, field, sign, surface.bundle)
     touching = surface.faces_around[:, crossed]
     face, segment = sparse.coo_array(touching.T @ touching).coords
@@ -114,7 +114,7 @@ def _distance_at_the_curve(
 
 
 def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Distance of each point to its segment, all of shape (p, 3)."""
+    """Distance of each point to its segment, shape (p,); arguments have shape (p, 3)."""
     along = end - start
     squared = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
     share = np.clip(((points - start) * along).sum(axis=1) / squared, 0.0, 1.0)
@@ -122,7 +122,7 @@ def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray)
 
 
 def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
-    """Lower distances, in place, by waves from the vertices that have one, up to the limit."""
+    """Propagate finite distances over the surface, in place, up to the limit."""
     settled = np.isfinite(distance)  # at the curve they are exact
     changed = np.flatnonzero(settled)
     least_gain = SETTLED * surface.edge_length
@@ -152,11 +152,11 @@ def _wave_arrival(
     second: IntArray,
     waits: BoolArray,
 ) -> FloatArray:
-    """Distance at a corner from those at the other two, inf where neither has one.
+    """Distance at a corner from those at the other two, inf where neither is finite.
 
     With linear distances on the opposite edge the wave is plane. Where it would have to enter
-    through another edge, the nearer of both corners counts. A corner with an obtuse angle may be
-    nearer than the farther of the other two; one that waits is no nearer than that.
+    through another edge, the shorter path along an edge counts. At an obtuse angle a corner may be
+    nearer than the farther of the other two, but not one that waits.
     """
     side = vertices[second] - vertices[first]
     length = np.linalg.norm(side, axis=1)

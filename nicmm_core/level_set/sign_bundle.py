@@ -1,16 +1,16 @@
-"""Signs that let a level set be an open curve, or a loop that does not bound.
+"""Signs with which a level set can be an open curve, or a loop that does not bound.
 
-The zero set of a function always separates the surface. A section of a sign bundle need not: in
-every face each corner reads its vertex's value with a sign, and neighbouring faces agree up to a
-common sign on the edge between them. Walking round an end of an open curve, or once along a torus
-across its meridian, the value comes back with the opposite sign.
+The zero set of a function always separates the surface. The zero set of a section of a sign bundle
+(a line bundle with signs ±1) need not: in every face each corner reads the value of its vertex with
+a sign, and neighbouring faces agree up to a common sign on the edge between them. Around an end of
+an open curve, or along a closed path that crosses a meridian of a torus once, the value returns
+with the opposite sign.
 
-The bundle used here is trivial away from the initial path. Its faces on one side of the path read
-the path's own vertices as they are and those on the other side with a minus, so that |φ₀|, positive
-on both sides, is a function that changes its sign across the path. Then every vertex takes the sign
-of the side that it is nearest to, which makes φ a smooth signed function about the path, and moves
-the places where signs differ far from it. Nothing but the signs of corners enters the operators,
-the topology and the contour.
+The bundle used here is trivial away from the initial path. Faces on one side of the path read the
+vertices of the path with a plus and faces on the other side with a minus, so that |φ₀| becomes a
+section that changes sign across the path. Then every vertex takes the sign of the side to which it
+is nearest. This makes φ a smooth signed function near the path, and moves the sign changes far from
+it. Only the signs of corners enter the operators, the topology and the contour.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from ..progress import checkpoint
 
 @dataclass(frozen=True)
 class SignBundle:
-    """How the faces read the values of their corners.
+    """Signs with which faces read the values of their corners.
 
     Attributes
     ----------
     corner_sign : (m, 3) int array
         ±1 by face and corner.
     side : (n,) int array
-        The sign that the distance to the path gets at each vertex.
+        Sign of the distance to the path at each vertex.
     ends : (e,) int array
-        Vertices where an open path ends: two of them, or none.
+        The two ends of an open path; empty for a closed one.
     """
 
     corner_sign: IntArray
@@ -58,7 +58,7 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
         checkpoint()
         around = at_corners[[vertex]].indices // 3
         side_of = _sides(faces, around, vertex, loop.neighbours(place))
-        # Sides at one vertex of the path go on as those at the next one.
+        # Make the sides at one vertex of the path consistent with those at the next.
         shared = [face for face in side_of if face in before]
         turn = side_of[shared[0]] * before[shared[0]] if shared else 1
         before = {face: turn * face_side for face, face_side in side_of.items()}
@@ -72,7 +72,7 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
 def _sides(
     faces: IntArray, around: IntArray, vertex: int, path_neighbours: list[int]
 ) -> dict[int, int]:
-    """±1 for each face at a vertex of the path, changing across the path's edges there."""
+    """±1 for each face at a vertex of the path, with a change across the edges of the path."""
     at_spoke: dict[int, list[int]] = {}
     for face in around.tolist():
         for other in faces[face].tolist():
@@ -94,7 +94,7 @@ def _sides(
 
 
 def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray) -> IntArray:
-    """The side of the path that each vertex is nearest to, +1 on the path, shape (n,)."""
+    """The nearest side of the path for each vertex, +1 on the path, shape (n,)."""
     n_vertices = len(working.vertices)
     on_path = np.zeros(n_vertices, dtype=bool)
     on_path[loop.vertices] = True
@@ -125,12 +125,12 @@ def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray
 
 
 def local_signs(sign: IntArray, faces: IntArray, bundle: SignBundle | None) -> IntArray:
-    """Signs of values at vertices as the faces read them, shape (m, 3)."""
+    """Signs at the corners of faces, from signs at vertices, shape (m, 3)."""
     return sign[faces] if bundle is None else bundle.corner_sign * sign[faces]
 
 
 def corner_matrix(faces: IntArray, n_vertices: int, bundle: SignBundle | None) -> sparse.csr_array:
-    """What the corners of the faces read of the vertices, shape (3 m, n)."""
+    """Matrix from values at vertices to values at corners of faces, shape (3 m, n)."""
     values = np.ones(faces.size) if bundle is None else bundle.corner_sign.ravel().astype(float)
     entries = (values, (np.arange(faces.size), faces.ravel()))
     return sparse.csr_array(sparse.coo_array(entries, shape=(faces.size, n_vertices)))

@@ -1,4 +1,4 @@
-"""The initial signed distance φ₀ (section 3.1): heat method for size, flood fill for sign."""
+"""The initial signed distance (section 3.1): heat method for the distance, flood fill for signs."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .finite_elements import FiniteElements
 from .sparse_solver import factorise
 
 LEAST_DISTANCE = 1e-3
-"""Least distance of a vertex off the loop, in mean edge lengths; the heat method may give zero."""
+"""Least distance of a vertex off the loop, in mean edge lengths; the heat method may give 0."""
 
 
 POISSON_SHIFT = 1e-8
-"""Share of the mass matrix in the Poisson system, which alone leaves a constant undetermined."""
+"""Factor of the mass matrix in the Poisson system, which is singular without it."""
 
 
 def signed_distance(
     elements: FiniteElements, loop: InitialLoop, edge_length: float, side: IntArray
 ) -> FloatArray:
-    """Distance to the initial path along the surface with the sign of each vertex's side.
+    """Geodesic distance to the initial path, with the sign of each side.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def signed_distance(
     edge_length : float
         Mean edge length in the unit of the elements.
     side : (n,) int array
-        ±1, anything on the path.
+        ±1; ignored on the path.
 
     Returns
     -------
@@ -49,15 +49,15 @@ def signed_distance(
 def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> FloatArray:
     """Distance to source vertices by the heat method (Crane et al. 2017), shape (n,).
 
-    Heat flows from the sources for a short time, its gradient is brought to unit length, and the
-    distance is the function whose gradient comes nearest to that.
+    Heat diffuses from the sources for a short time, its gradient is normalised, and the distance is
+    the function whose gradient is closest to that in the least-squares sense.
 
     Parameters
     ----------
     elements : FiniteElements
     sources : (l,) int array
     time : float
-        Of the flow; the square of the mean edge length is usual.
+        Of the diffusion; usually the square of the mean edge length.
     """
     mass = sparse.diags_array(elements.vertex_areas)
     heat = np.zeros(len(elements.vertex_areas))
@@ -65,7 +65,7 @@ def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> F
     heat = factorise(mass + time * elements.stiffness).solve(heat)
     gradient = (elements.gradient @ heat).reshape(3, -1)
     length = np.linalg.norm(gradient, axis=0)
-    # Where no heat arrives within the range of numbers there is no direction either.
+    # Where the heat underflows to zero, there is no direction.
     direction = -gradient / np.where(length > 0.0, length, 1.0)
     flux = elements.gradient.T @ (elements.face_areas * direction).ravel()
     area = elements.vertex_areas.sum()
@@ -79,8 +79,8 @@ def bounding_side(
 ) -> IntArray | None:
     """-1 inside a closed path, +1 outside and 0 on it, by flood fill, shape (n,).
 
-    Inside is the side with the smaller area. None where the path bounds no region, as one round a
-    torus's tube.
+    Inside is the side with the smaller area. None if the path bounds no region, such as a meridian
+    of a torus.
     """
     n_vertices = len(working.vertices)
     on_loop = np.zeros(n_vertices, dtype=bool)
@@ -99,7 +99,7 @@ def bounding_side(
 
 
 def _regions_across(working: WorkingMesh, loop: InitialLoop, region: IntArray) -> IntArray:
-    """Pairs of regions that face each other across an edge of the loop, shape (p, 2)."""
+    """Pairs of regions on opposite sides of an edge of the loop, shape (p, 2)."""
     n_vertices = len(working.vertices)
     edges = np.sort(np.stack([loop.vertices, np.roll(loop.vertices, -1)], axis=1), axis=1)
     sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -115,7 +115,7 @@ def _regions_across(working: WorkingMesh, loop: InitialLoop, region: IntArray) -
 
 
 def _two_colouring(region: IntArray, first: IntArray, second: IntArray) -> IntArray | None:
-    """Give regions across the loop opposite signs; None when that cannot be done."""
+    """Opposite signs for regions across the loop; None if there is a contradiction."""
     across: dict[int, set[int]] = {}
     for one, other in zip(first.tolist(), second.tolist(), strict=True):
         across.setdefault(one, set()).add(other)

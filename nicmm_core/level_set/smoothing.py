@@ -1,9 +1,9 @@
 """Smoothing of a field that keeps it zero at the control points.
 
-The initial loop zigzags along edges and has corners at the control points, and so has the
-distance to it. A network that sees one vertex at a time cannot undo that, so φ₀ is smoothed
-before it becomes a feature. The same factorisation later makes the network's φ exactly zero at
-the control points by the least bending.
+The initial loop zigzags along edges and has corners at the control points, and so does the distance
+to it. A network that sees one vertex at a time cannot remove them, so φ₀ is smoothed before it
+becomes an input. The same factorisation gives the correction of least bending that makes the
+network's φ exactly zero at the control points.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .finite_elements import FiniteElements
 from .sparse_solver import Factors, factorise
 
 MOST_ENTRIES = 150
-"""Products of entries of L, for each vertex, up to which A is formed; about 50 are usual."""
+"""Products of entries of L per vertex up to which A is assembled; about 50 are usual."""
 
 AT_ONCE = 8
-"""Systems that are solved together; many at once would be one long call."""
+"""Right sides solved together; more would delay a cancellation."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Smoother:
         return self.interpolating(self.factor.solve(self.vertex_areas * field))
 
     def interpolating(self, field: FloatArray) -> FloatArray:
-        """The field made exactly zero at the control points by the least change."""
+        """The field with the least correction that makes it zero at the control points."""
         corrected = field - self.response @ field[self.control_vertices]
         corrected[self.control_vertices] = 0.0
         return corrected
@@ -63,8 +63,8 @@ def build_smoother(
 ) -> Smoother:
     """Factorise the smoothing operator for a length ℓ in the unit of the elements.
 
-    Detail shorter than about 2 π ℓ disappears. Where the elements read φ with signs, ``plain`` are
-    those of ordinary functions, which the responses to the control points are.
+    Detail shorter than about 2 π ℓ is removed. If the elements use a sign bundle, ``plain`` are the
+    elements of ordinary functions, for the responses to the control points.
     """
     factor = _factorised(elements, length)
     response_factor = factor if plain is None else _factorised(plain, length)
@@ -81,10 +81,10 @@ def build_smoother(
 
 @dataclass(frozen=True)
 class MixedFactors:
-    """The same as a system of twice the size that has no products of rows.
+    """Factors of A as an equivalent system of twice the size, without products of L.
 
     With ψ = ℓ² M⁻¹ L φ, A φ = f is ``M φ + ℓ² L ψ = f`` and ``ℓ² L φ - M ψ = 0``. It is symmetric
-    and quasi-definite, so that no order of elimination needs pivots (Vanderbei 1995).
+    and quasi-definite, so no elimination order needs pivoting (Vanderbei 1995).
     """
 
     factors: Factors
@@ -95,7 +95,7 @@ class MixedFactors:
 
 
 def _factorised(elements: FiniteElements, length: float) -> Factors | MixedFactors:
-    """A⁻¹; a vertex of thousands of edges would fill millions of the entries of A."""
+    """Factors of A, by the mixed system if vertices of high valence would fill A."""
     valence = np.diff(elements.stiffness.indptr)
     if (valence**2).sum() <= MOST_ENTRIES * len(valence):
         return factorise(_bending_operator(elements, length))
@@ -103,7 +103,7 @@ def _factorised(elements: FiniteElements, length: float) -> Factors | MixedFacto
 
 
 def mixed_factors(elements: FiniteElements, length: float) -> MixedFactors:
-    """A⁻¹ by the mixed system."""
+    """Factors of A by the mixed system."""
     mass, coupling = sparse.diags_array(elements.vertex_areas), length**2 * elements.stiffness
     system = sparse.block_array([[mass, coupling], [coupling, -mass]], format="csr")
     return MixedFactors(factorise(system))

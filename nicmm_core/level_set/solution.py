@@ -1,4 +1,4 @@
-"""What a solver found, whichever it was."""
+"""The result of a level-set solver."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..status import Status
 
 @dataclass(frozen=True)
 class Solution:
-    """Level-set values and how they were reached.
+    """A level set, its losses and its status.
 
     Attributes
     ----------
     field : (n,) float array
         φ of the iteration with the least loss, in units of the problem.
     terms : dict of str to float
-        The unweighted terms of the loss there.
+        The unweighted terms of its loss.
     losses : list of float
         Total loss of every iteration.
     status : Status
@@ -33,5 +33,5 @@ class Solution:
 
     @property
     def iterations(self) -> int:
-        """Number of iterations done."""
+        """Number of iterations."""
         return len(self.losses)

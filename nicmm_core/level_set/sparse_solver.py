@@ -18,12 +18,12 @@ DEGENERATE = (
 )
 
 PREORDERED_FROM = 4000
-"""Unknowns from which a bandwidth-reducing order pays before the fill-reducing one."""
+"""Unknowns from which a bandwidth-reducing order is applied before the fill-reducing one."""
 
 
 @dataclass(frozen=True)
 class Factors:
-    """LU factors of a matrix whose rows and columns stand in another order."""
+    """LU factors of a matrix with permuted rows and columns."""
 
     factors: linalg.SuperLU
     order: IntArray | None
@@ -40,16 +40,16 @@ class Factors:
 def factorise(matrix: sparse.sparray) -> Factors:
     """LU factors of a symmetric positive definite matrix, without pivoting off the diagonal.
 
-    SciPy has no sparse Cholesky; with an ordering for symmetric patterns its LU is about five
-    times faster than with the default one. Unlike Cholesky it also survives the rounding that
-    makes a system of very thin triangles barely indefinite. SuperLU takes long over large matrices
-    whose order is that of a subdivided mesh: 42 s for the Laplacian of 64,000 vertices, and 0.35 s
-    after a reverse Cuthill–McKee ordering, with the same fill.
+    SciPy has no sparse Cholesky factorisation. With an ordering for symmetric patterns its LU is
+    about five times faster than with the default one. Unlike Cholesky it also handles systems of
+    very thin triangles that rounding makes slightly indefinite. SuperLU is slow on large matrices
+    in the order of a subdivided mesh: 42 s for the Laplacian of 64,000 vertices, and 0.35 s after a
+    reverse Cuthill–McKee ordering, with the same fill.
 
     Raises
     ------
     MeshError
-        If the matrix is singular or not finite, as faces without area make it.
+        If the matrix is singular or not finite, as with faces without area.
     """
     if not np.isfinite(matrix.data).all():
         raise MeshError(DEGENERATE)

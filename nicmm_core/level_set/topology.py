@@ -1,12 +1,12 @@
-"""Keep the zero set one loop.
+"""Keep the topology of the zero set: one loop.
 
-A level set is free to split, merge and miss points (the paper's Fig. 16), and on thin limbs it
-often does. Flipping the sign of one vertex keeps the zero set's topology exactly when the signs
-round its link form one positive and one negative run: a simple vertex. Starting from the signs of
-a field whose zero set is one simple loop through the control points, every vertex that the
-solution wants on the other side is flipped as soon as it is simple. When all can be, the solution
-is isotopic to the start: one simple loop through the control points in the same order. Where some
-cannot, the solution falls back on the start, blended over a few edges.
+A level set can split, merge and miss points (the paper's Fig. 16), and often does on thin limbs.
+Flipping the sign of one vertex preserves the topology of the zero set exactly if the signs around
+its link form one positive and one negative run: a simple vertex. The start is a field whose zero
+set is one simple loop through the control points. Each vertex with another sign in the solution is
+flipped as soon as it is simple. If all can be flipped, the solution is isotopic to the start: one
+simple loop through the control points in the same order. Around the others, the solution is blended
+with the start over a few edges.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ from .sign_bundle import SignBundle
 from .vertex_links import VertexLinks
 
 FALLBACK_RADIUS = 4.0
-"""Distance from a vertex that breaks the topology within which the start replaces the solution,
-in edge lengths at the loop; the blend reaches as far as twice that again."""
+"""Radius around a topology-breaking vertex within which the start replaces the solution.
+
+In edge lengths at the loop; the blend ends at three times that.
+"""
 
 FALLBACK_GROWTH = 1.3
 """Growth of that radius from one attempt to the next."""
@@ -42,7 +44,7 @@ def keep_topology(
     wanted: FloatArray,
     bundle: SignBundle | None = None,
 ) -> tuple[FloatArray, int]:
-    """Follow a field as far as its zero set stays isotopic to that of the start.
+    """Follow a field wherever its zero set stays isotopic to that of the start.
 
     Parameters
     ----------
@@ -53,15 +55,15 @@ def keep_topology(
     wanted : (n,) float array
         The field to follow, in the same unit.
     bundle : SignBundle, optional
-        How the faces read the values of their corners.
+        Signs with which faces read the values of their corners.
 
     Returns
     -------
     (n,) float array
-        ``wanted`` wherever nothing forbids it, else a blend of both.
+        ``wanted`` if it keeps the topology, otherwise a blend of both.
     int
-        Number of vertices of ``wanted`` whose sign breaks the topology; 0 means that the field
-        is returned as it came.
+        Number of vertices whose sign in ``wanted`` breaks the topology; 0 if ``wanted`` is
+        returned.
     """
     links = VertexLinks(working, bundle)
     control_vertices = loop.control_vertices
@@ -83,7 +85,7 @@ def keep_topology(
 def breaking_vertices(
     links: VertexLinks, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
 ) -> IntArray:
-    """Vertices that no sequence of simple flips brings to the side where they are wanted.
+    """Vertices whose wanted sign no sequence of simple flips reaches.
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def breaking_vertices(
     Returns
     -------
     (q,) int array
-        None when the zero set of ``wanted`` is isotopic to that of ``start``.
+        Empty if the zero set of ``wanted`` is isotopic to that of ``start``.
     """
     sign = signs_with_zeros(start, control_vertices)
     goal = signs_with_zeros(wanted, control_vertices)
@@ -115,7 +117,7 @@ def breaking_vertices(
         if any(links.sign_changes(v, sign) != changes_at_control[v] for v in controls_around):
             sign[vertex] = -goal[vertex]
             continue
-        # A flip can free its neighbours and, beside a control point, those of the point.
+        # A flip can make neighbours simple and, beside a control point, those of the point.
         freed = set(around).union(*(links.neighbours(v) for v in controls_around))
         for other in sorted(freed):
             if sign[other] != goal[other] and not queued[other]:
@@ -130,6 +132,6 @@ def _distance_from(working: WorkingMesh, sources: IntArray) -> FloatArray:
 
 
 def _smooth_step(fraction: FloatArray) -> FloatArray:
-    """0 up to 0, 1 from 2 on, and a smooth rise between."""
+    """A smooth step from 0 at 0 to 1 at 2."""
     t = np.clip(0.5 * fraction, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)

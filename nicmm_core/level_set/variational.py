@@ -1,11 +1,11 @@
-"""The variational method: the same energy with φ at every vertex of a narrow band as unknowns.
+"""The variational method: the same energy, with φ at the vertices of a narrow band as unknowns.
 
-The paper measures itself against Zhang et al. ("Versatile curve design by level set with quadratic
-convergence", 2024), whose code is not public; this is as strong a method of that kind as we know.
-Every iteration is a damped Gauss–Newton step in the band about the present curve, after which φ
-becomes the signed distance to the new curve. That frees the curve from the ridges of the former
-distance, which would hold it where it was. A vertex whose change of side would split the curve, or
-lead it off a control point, is held for one step, so that the curve stays one loop throughout.
+The paper compares with Zhang et al. ("Versatile curve design by level set with quadratic
+convergence", 2024), whose code is not public; this is the strongest method of that kind known to
+us. Every iteration takes a damped Gauss–Newton step in the band around the current curve and then
+replaces φ by the signed distance to the new curve. Otherwise the ridges of the old distance would
+hold the curve back. A vertex whose change of sign would split the curve, or detach it from a
+control point, is held for one step, so the curve is always one loop.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from .vertex_links import VertexLinks
 
 @dataclass(frozen=True)
 class VariationalConfig:
-    """How the solver runs; lengths are in mean edge lengths at the curve.
+    """Settings of the solver; lengths are in mean edge lengths at the curve.
 
     Attributes
     ----------
     half_width : float
-        Of the band. The bending term reaches 3, where its Gaussian ends; wider bands reach over
-        the ridge between two strands of the curve more often.
+        Of the band. The Gaussian of the bending term ends at 3; wider bands more often cross the
+        ridge between two strands of the curve.
     longest_move : float
-        Farthest that φ beside the curve changes in a step; the band must hold the new curve.
+        Greatest change of φ near the curve in a step; the band must contain the new curve.
     beside : float
-        Distance within which that counts.
+        Distance to the curve within which that limit applies.
     damping : float
         Weight of the step's norm at the start, relative to λ_sdf.
     least_damping : float
     patience : int
-        Iterations over which the least loss so far must stay still,
+        Converged when the least loss falls by less than the tolerance in this many iterations
+        (the paper's section 4.5, as for the tolerance).
     tolerance : float
-        and how still. Both are the paper's (section 4.5).
     iterations : int
-        The cap.
+        Cap.
     trials : int
-        Damped or held steps that may be tried in one iteration.
+        Most trial steps in one iteration.
     """
 
     half_width: float = 4.0
@@ -67,10 +67,10 @@ class VariationalConfig:
 
 
 LEAST_GAIN = 1e-3
-"""Least share of the predicted decrease that a step must reach; else it is damped more."""
+"""Least decrease of an accepted step, relative to the predicted decrease."""
 
 GOOD_GAIN, POOR_GAIN = 0.75, 0.25
-"""Shares above and below which the damping falls or rises."""
+"""Relative decreases above which damping falls, and below which it rises."""
 
 
 def solve(
@@ -87,8 +87,8 @@ def solve(
     weights : LossWeights
     config : VariationalConfig
     watch : callable, optional
-        Called with the fraction of the cap that is done and φ after every iteration; the solver
-        stops when it returns False.
+        Called after every iteration with the iterations done, as a fraction of the cap, and the
+        best φ; the solver stops when it returns False.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def solve(
 
 
 def _is_still(least: list[float], config: VariationalConfig) -> bool:
-    """Whether the least loss so far has not changed for some iterations."""
+    """Whether the least loss has converged."""
     if len(least) <= config.patience:
         return False
     return least[-1 - config.patience] - least[-1] < config.tolerance
@@ -151,7 +151,7 @@ def gauss_newton_step(
     Returns
     -------
     (n,) float array or None
-        The new φ; None when no step lowers the energy.
+        The new φ; None if no step lowers the energy.
     float
         Damping for the next step.
     """
@@ -177,7 +177,7 @@ def gauss_newton_step(
         if not predicted > 0.0:
             return None, damping
         gain = (residuals.energy - evaluate(band, weights, values + step).energy) / predicted
-        if not gain > LEAST_GAIN:  # also when it is no number
+        if not gain > LEAST_GAIN:  # also if it is NaN
             damping *= 4.0
             continue
         if gain > GOOD_GAIN:

@@ -1,7 +1,7 @@
-"""The link of a vertex, and whether the vertex is simple for a field's signs.
+"""Links of vertices, and whether a vertex is simple for the signs of a field.
 
-A vertex is simple when the signs round it form one positive and one negative run. Then the zero set
-passes its star in one strand, whatever the sign of the vertex itself.
+A vertex is simple if the signs around its link form one positive and one negative run. Then the
+zero set crosses its star in one strand, whatever the sign of the vertex itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .sign_bundle import SignBundle
 
 
 class VertexLinks:
-    """Vertices round each vertex in order, found when first asked for."""
+    """The link of each vertex in order, computed on first use."""
 
     def __init__(self, working: WorkingMesh, bundle: SignBundle | None = None) -> None:
         corners = working.faces.ravel()
@@ -31,14 +31,14 @@ class VertexLinks:
         return [v for v in np.unique(faces).tolist() if v != vertex]
 
     def is_simple(self, vertex: int, sign: IntArray) -> bool:
-        """Whether one positive and one negative run make up the link."""
+        """Whether the signs around the link form one positive and one negative run."""
         link = self._ordered(vertex)
         return link is not None and self.sign_changes(vertex, sign) == (2 if link[1] else 1)
 
     def sign_changes(self, vertex: int, sign: IntArray) -> int:
-        """Changes of sign round the link, zeros passed over; -1 where the link is no simple path.
+        """Sign changes around the link without its zeros; -1 if the link is not a simple path.
 
-        A control vertex in the link is a zero, where the curve passes the link itself.
+        A control vertex in the link is a zero, where the curve crosses the link.
         """
         if vertex in self._ends:
             return self._sign_changes_round_end(vertex, sign)
@@ -53,7 +53,7 @@ class VertexLinks:
         return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
 
     def _relative_signs(self, vertex: int) -> dict[int, int]:
-        """Signs with which neighbours are read where the vertex itself is read as it is."""
+        """Signs of neighbours relative to that of the vertex, by the bundle."""
         if self._corner_sign is None:
             return {}
         relative: dict[int, int] = {}
@@ -64,7 +64,7 @@ class VertexLinks:
         return relative
 
     def _sign_changes_round_end(self, vertex: int, sign: IntArray) -> int:
-        """Faces at an end of an open curve whose other corners lie on different sides."""
+        """Number of faces at an end of an open curve whose other corners differ in sign."""
         around = self._faces_at(vertex)
         assert self._corner_sign is not None  # ends are those of a bundle
         local = self._corner_sign[around] * sign[self._faces[around]]
@@ -75,7 +75,7 @@ class VertexLinks:
         return self._by_vertex[self._start[vertex] : self._start[vertex + 1]]
 
     def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
-        """The link as a path and whether it closes; None when the surface branches here."""
+        """The link as a path and whether it is closed; None at a non-manifold vertex."""
         if vertex not in self._link:
             self._link[vertex] = self._trace(vertex)
         return self._link[vertex]

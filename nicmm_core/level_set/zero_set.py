@@ -1,4 +1,4 @@
-"""The curve that a level set describes: one loop through the points, taken out as a polyline."""
+"""The zero set of a level set as a polyline: one loop through the control points."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ZeroSet:
     field : (n,) float array
         φ, exactly zero at the control points.
     breaking_vertices : int
-        Vertices whose sign had to be changed to keep one loop.
+        Number of vertices whose sign had to change to keep one loop.
     curves : list of SurfaceCurve
     """
 
@@ -46,7 +46,7 @@ class ZeroSet:
 def zero_set(
     mesh: Mesh, problem: Problem, field: FloatArray, keeps_topology: bool = False
 ) -> ZeroSet:
-    """Make φ exactly zero at the control points and one loop, and take its contour.
+    """Make φ exactly zero at the control points and its zero set one loop; extract the contour.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def zero_set(
         The mesh that the problem was built on.
     problem : Problem
     field : (n,) float array
-        φ as a solver leaves it.
+        φ from a solver.
     keeps_topology : bool
-        Whether the solver has seen to both already.
+        Whether the solver has ensured both already.
     """
     breaking = 0
     if not keeps_topology:
@@ -73,12 +73,12 @@ def zero_set(
 
 
 def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
-    """The zero set, or that of φ₀ or of the initial path, whichever is shortest by the map.
+    """The zero set, that of φ₀ or that of the initial path's distance: the shortest by the map.
 
-    Lengths count as they do for the path, less in a lane and more in an obstacle. A level set that
-    has found a better way is no longer than the path that it was made from. One that is longer has
-    gone astray: near sharp edges, where maps are most of all, it may swing round an end of an open
-    curve or round a corner of the surface, and so may φ₀.
+    Lengths are weighted as for the path, less in a lane and more in an obstacle. A good level set
+    is not longer than the path from which it was made. A longer one is wrong: near sharp edges,
+    where maps are common, it may loop around an end of an open curve or a corner of the surface,
+    and so may φ₀.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
 
 
 def _length_by_map(mesh: Mesh, problem: Problem, curve: SurfaceCurve) -> float:
-    """Length of a curve where every part counts as for the initial path, in mesh units."""
+    """Length of a curve, weighted as for the initial path, in mesh units."""
     assert problem.feature_map is not None
     known = problem.working.input_vertex >= 0
     phi_fea = np.ones(len(mesh.vertices))

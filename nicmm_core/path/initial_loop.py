@@ -89,7 +89,7 @@ def build_initial_loop(
     via_points : mapping, optional
         From the index of a control point to points on the path from there to the next one.
     pieces : int
-        How finely the mesh is refined along the path, see `refine_along`.
+        Refinement of the mesh along the path, see `refine_along`.
 
     Returns
     -------
