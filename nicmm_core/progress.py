@@ -1,12 +1,11 @@
-"""How far a design is: what the caller is shown, and whether to go on.
+"""Progress of a design and its cancellation.
 
-Time goes by in many places, from the search for a path to the relaxation, and in any of them the
-caller may have had enough. So whatever may take long calls `checkpoint` again and again; it costs
-little more than reading a clock. Who listens belongs to the design that is running in this thread
-and not to the signatures of all stages: `watched` says who it is.
+Any stage may take long, from the search for a path to the relaxation. So all of them call
+`checkpoint` often, which costs little more than reading a clock. `watched` sets the progress
+function of the design running in this context, so that stages need no parameter for it.
 
-A checkpoint may leave by `CancelledError`. It stands where nothing is half changed that outlives
-the design.
+`checkpoint` may raise `CancelledError`. Call it only where data that outlive the design are
+consistent.
 """
 
 from __future__ import annotations
@@ -21,24 +20,24 @@ import numpy as np
 from .geometry.array_types import FloatArray
 
 Progress = Callable[[float, FloatArray], object]
-"""Called with the fraction done and the points of the curve so far, (n, 3); False stops."""
+"""Called with the fraction done and the points of the current curve, (n, 3); False cancels."""
 
 INTERVAL = 0.1
-"""Least seconds between two calls of a caller's progress function.
+"""Least time between two calls of a progress function, in seconds.
 
-A few times a second, and often enough that a wish to stop is heard within 0.2 seconds.
+A cancellation takes effect within 0.2 s.
 """
 
 SHOWING = 10.0
-"""Least time between two sets of points, relative to what finding the former took."""
+"""Least time between two evaluations of the points, relative to the duration of the last one."""
 
 
 class CancelledError(Exception):
-    """The caller wants no more; for use inside, the result of a design says so by its status."""
+    """The caller has cancelled. Internal: the status of a design reports it to the caller."""
 
 
 class _Watch:
-    """A progress function, when it was called and what it has been told."""
+    """A progress function with the time of its next call and its last arguments."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -48,12 +47,12 @@ class _Watch:
         self._shown = self._stopped = False
         self._next_call = time.perf_counter() + INTERVAL
         self._next_points = 0.0
-        # The part of the whole that is being done, and where its points are in space.
+        # The current subrange of the whole, and the offset of its points in space.
         self.low, self.high = 0.0, 1.0
         self.offset = np.zeros(3)
 
     def ask(self, done: float | None, points: Callable[[], FloatArray] | None) -> None:
-        """Call the function if it is time to; raise CancelledError where it has said False."""
+        """Call the function if it is due; raise CancelledError if it has returned False."""
         if self._stopped:
             raise CancelledError
         if done is not None:
@@ -62,7 +61,7 @@ class _Watch:
             self._pending = points
         now = time.perf_counter()
         new = self._pending is not None and now >= self._next_points
-        # What is the first curve is shown at once.
+        # The first curve is shown at once.
         if now < self._next_call and (self._shown or not new):
             return
         self._next_call = now + INTERVAL
@@ -71,7 +70,7 @@ class _Watch:
             self._points, self._shown = find() + self.offset, True
             after = time.perf_counter()
             self._next_points = after + SHOWING * (after - now)
-        # A copy, with which the caller may do as it likes.
+        # A copy, which the caller may modify.
         answer = self._progress(self._fraction, self._points.copy())
         self._stopped = isinstance(answer, bool | np.bool_) and not answer
         self._next_call = time.perf_counter() + INTERVAL
@@ -84,7 +83,7 @@ _watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
 
 @contextlib.contextmanager
 def watched(progress: Progress | None) -> Iterator[None]:
-    """Tell a function, or nobody, of what is done in this block, and stop when it says False."""
+    """Report progress within this block to a function, or to none; False cancels."""
     token = _watch.set(None if progress is None else _Watch(progress))
     try:
         yield
@@ -93,14 +92,14 @@ def watched(progress: Progress | None) -> Iterator[None]:
 
 
 def checkpoint(done: float | None = None, points: Callable[[], FloatArray] | None = None) -> None:
-    """A place at which a design may be cancelled.
+    """Report progress, and cancel the design if the caller has asked for it.
 
     Parameters
     ----------
     done : float, optional
-        Fraction of the present part that is done.
+        Fraction of the current subrange that is done.
     points : callable, optional
-        Gives the points of the curve so far, (n, 3); called when they are to be shown.
+        Returns the points of the current curve, (n, 3); called only when they are shown.
 
     Raises
     ------
@@ -114,7 +113,7 @@ def checkpoint(done: float | None = None, points: Callable[[], FloatArray] | Non
 
 @contextlib.contextmanager
 def subrange(start: float, end: float) -> Iterator[None]:
-    """What is done in this block is one part of what is being done, by fractions of it."""
+    """Map progress within this block to a subrange of the current range, by fractions."""
     watch = _watch.get()
     if watch is None:
         yield
@@ -130,7 +129,7 @@ def subrange(start: float, end: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def displaced(offset: FloatArray) -> Iterator[None]:
-    """Points of this block are shown as far away as the offset, (3,)."""
+    """Show the points of this block displaced by an offset, (3,)."""
     watch = _watch.get()
     if watch is None:
         yield

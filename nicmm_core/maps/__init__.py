@@ -1,1 +1,1 @@
-"""Maps of what curves avoid and follow: found on a mesh by itself, and as φ_fea of Eq. 7."""
+"""Maps of obstacles and alignment: weights from a mesh, and φ_fea of Eq. 7."""

@@ -1,7 +1,7 @@
-"""Weights for `alignment` and `obstacles` from a mesh itself, or from data on it (section 3.3).
+"""Weights for `alignment` and `obstacles` from a mesh or from data on it (section 3.3).
 
-Each function returns one weight in [0, 1] for every vertex, (V,), as painting would. What a weight
-does is the same for all of them; see `level_set.features`.
+Each function of a map returns one weight in [0, 1] per vertex, (V,), as painting would; see
+`maps.guidance` for their effect.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from ..geometry.mesh import Mesh, unique_edges
 from ..relaxation.curve_nodes import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
-"""Angle between the normals of two faces from which their edge is sharp."""
+"""Angle between the normals of two faces, in radians, from which their edge is sharp."""
 
 USUAL, STRIKING = 0.5, 0.95
-"""Quantiles of curvature over the area where a map begins and where it is 1, by default."""
+"""Quantiles of curvature, by area, with weight 0 and weight 1 by default."""
 
 LEAST_CONTRAST = 2.0
-"""Ratio of these two curvatures at least, so that nothing stands out of a ball."""
+"""Least ratio of these two curvatures, so that a ball has no weights."""
 
 HUB = 64
-"""Neighbours of a vertex beyond which rings do not go on through it: they would have everything."""
+"""Valence above which rings do not extend through a vertex, since they would be too large."""
 
 UNDETERMINED = 1e-8
-"""Eigenvalues of a fit, relative to the largest, below which its neighbours say nothing."""
+"""Relative eigenvalues of a fit below which a direction counts as undetermined."""
 
 
 def principal_curvatures(mesh: Mesh) -> FloatArray:
     """Principal curvatures at the vertices, shape (V, 2), in 1/length, the larger one first.
 
-    Quadrics are fitted to the heights of two rings of neighbours over the tangent plane, the
-    nearer ones counting more. Signs are to either side, since a mesh need not be oriented. Where
-    neighbours are too few for a direction, the surface counts as flat there.
+    Quadrics are fitted to the heights of two rings of neighbours over the tangent plane, with more
+    weight on nearer ones. Signs are arbitrary, since a mesh need not be oriented. In directions
+    without enough neighbours the surface counts as flat.
 
     Parameters
     ----------
     mesh : Mesh
-        Any; open, unoriented and branching surfaces too.
+        It may be open, unoriented or non-manifold.
     """
-    # Not `igl.principal_curvature`, which breaks off on small meshes and needs an orientation.
+    # Not `igl.principal_curvature`, which fails on small meshes and needs an orientation.
     centre, neighbour = _rings(mesh)
     normals = unsigned_normals(mesh)
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
@@ -59,7 +59,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     size = np.bincount(centre, distance, len(mesh.vertices)) / np.maximum(count, 1)
     apart = distance > tolerances.COINCIDENT * mesh.diagonal
     centre, offset, distance = centre[apart], offset[apart], distance[apart]
-    # In units of the neighbourhood, so that all fits are conditioned alike.
+    # Lengths relative to the neighbourhood, so that all fits are conditioned equally.
     u, v, height = (
         (offset * axis[centre]).sum(axis=1) / size[centre] for axis in (first, second, normals)
     )
@@ -67,7 +67,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     height *= size[centre] / distance
     fit = _least_squares(terms, height, centre, len(mesh.vertices))
     a, b, c, d, e = fit.T / np.maximum(size, tolerances.TINY) ** np.array([[1, 1, 1, 0, 0]]).T
-    # The surface (u, v, h) has these fundamental forms at its origin.
+    # From the fundamental forms of the surface (u, v, h) at its origin.
     slope = 1.0 + d * d + e * e
     root = np.sqrt(slope)
     mean = ((1.0 + d * d) * c - 2.0 * d * e * b + (1.0 + e * e) * a) / (2.0 * slope * root)
@@ -77,17 +77,17 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
 
 
 def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = None) -> FloatArray:
-    """Where the surface is strongly curved: on ridges, in grooves and along sharp edges.
+    """Weights where the surface is strongly curved: on ridges, in grooves and along sharp edges.
 
-    The weight is the greater of both principal curvatures, without its sign, between two limits.
+    The weight is linear in the greater absolute principal curvature between two limits.
 
     Parameters
     ----------
     mesh : Mesh
     low, high : float, optional
-        Curvatures, in 1/length, at which the weight begins and at which it is 1. By default what
-        half of the surface has, and what a twentieth exceeds, but at least twice that; so a
-        ball, a tube and a plane have nothing that stands out.
+        Curvatures with weight 0 and with weight 1, in 1/length. By default the median over the
+        area, and the 95 % quantile but at least twice the median; so a ball, a tube and a plane
+        have no weights.
 
     Returns
     -------
@@ -122,14 +122,13 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     ----------
     mesh : Mesh
     angle : float
-        Between the normals of the two faces of an edge, in radians, from which it is sharp; 0 in
-        a plane. The orientation of faces is ignored.
+        Angle between the normals of the two faces of an edge, in radians, from which it is sharp;
+        0 in a plane. The orientation of faces is ignored.
 
     Returns
     -------
     (n, 2) int array
-        Vertices of edges of two faces or more; edges of the boundary are not sharp, nor is a face
-        without area a reason to be.
+        Vertices of the edges. Boundary edges are not sharp, and faces without area are ignored.
 
     Raises
     ------
@@ -147,7 +146,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     low, high, face, forward = low[solid], high[solid], face[solid], forward[solid]
     order = np.lexsort((high, low))
     low, high, face, forward = low[order], high[order], face[order], forward[order]
-    # At an edge of more than two faces, each with the next one.
+    # At an edge with more than two faces, pairs of consecutive faces.
     same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
     one, other = face[:-1][same], face[1:][same]
     turned = np.where(forward[:-1][same] == forward[1:][same], -1.0, 1.0)
@@ -162,8 +161,8 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
 def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
     """1 at the ends of sharp edges and 0 elsewhere, shape (V,); see `sharp_edges`.
 
-    A map has weights at vertices only. Where all three corners of a face lie on sharp edges, as
-    everywhere on a box of twelve triangles, the face counts as a whole; subdivide such a mesh.
+    A map has weights at vertices only. If all corners of a face lie on sharp edges, as on a box of
+    twelve triangles, the whole face has weight 1; subdivide such a mesh.
     """
     return edge_map(mesh, sharp_edges(mesh, angle))
 
@@ -175,12 +174,12 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
     ----------
     mesh : Mesh
     edges : (n, 2) array_like of int
-        Vertices of edges of faces of the mesh; none at all are fine.
+        Vertices of edges of the mesh; may be empty.
 
     Raises
     ------
     ArgumentError
-        If they have another shape, or are no edges of the mesh.
+        If they have another shape, or are not edges of the mesh.
     """
     pairs = _checked_pairs(edges, len(mesh.vertices))
     size = len(mesh.vertices)
@@ -189,8 +188,8 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
     if foreign.any():
         first = int(foreign.argmax())
         raise ArgumentError(
-            f"edges[{first}] = {pairs[first].tolist()} is no edge of a face ({foreign.sum()} are "
-            "none); pass pairs of vertices that a side of a face joins"
+            f"edges[{first}] = {pairs[first].tolist()} is not an edge of a face ("
+            f"{foreign.sum()} are not); pass pairs of vertices that a side of a face joins"
         )
     weights = np.zeros(size)
     weights[pairs] = 1.0
@@ -200,7 +199,7 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
 def value_map(
     mesh: Mesh, values: ArrayLike, low: float | None = None, high: float | None = None
 ) -> FloatArray:
-    """Values at the vertices, as of a texture or an attribute, as weights.
+    """Weights from values at the vertices, such as a texture or an attribute.
 
     Parameters
     ----------
@@ -209,17 +208,17 @@ def value_map(
         In any unit.
     low, high : float, optional
         Values with weight 0 and with weight 1, linear between and constant beyond; ``low`` may be
-        the larger one. By default the least and the greatest value of vertices that faces use.
+        the larger one. By default the least and the greatest value at vertices of faces.
 
     Returns
     -------
     (V,) float array
-        All zero where the limits are left out and all values are the same.
+        All zero if the limits are omitted and all values are equal.
 
     Raises
     ------
     ArgumentError
-        If values are missing or no numbers, or the limits are the same.
+        If values are missing or not finite, or the limits are equal.
     """
     checked = checked_vertex_values("values", values, mesh, "value")
     bad = ~np.isfinite(checked)
@@ -235,14 +234,14 @@ def value_map(
         raise ArgumentError(
             f"low and high are both {start:g}; pass the values with weight 0 and with weight 1"
         )
-    # Halves, since the difference of two large numbers may be none.
+    # Halves, since the difference of two large numbers may overflow.
     return np.clip((0.5 * checked - 0.5 * start) / (0.5 * end - 0.5 * start), 0.0, 1.0)
 
 
 def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Pairs of a vertex and one in the two rings round it, both (p,), by the first.
+    """Pairs of a vertex and one in its two rings, both (p,), sorted by the first.
 
-    Fewer rings do not over-determine a quadric; more would round off what is to be found.
+    One ring does not overdetermine a quadric; more would smooth out the features.
     """
     start, end = unique_edges(mesh.faces)[0].T
     size = len(mesh.vertices)
@@ -257,17 +256,17 @@ def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
 
 
 def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: int) -> FloatArray:
-    """Solutions of many small least-squares problems, the shortest where one has several.
+    """Solutions of many small least-squares problems, of least norm if not unique.
 
     Parameters
     ----------
     terms : (k, p) float array
-        What each equation multiplies the k unknowns of its problem with.
+        Coefficients of each equation for the k unknowns of its problem.
     right : (p,) float array
     row : (p,) int array
-        The problem of each equation.
+        Index of the problem of each equation.
     count : int
-        Problems.
+        Number of problems.
 
     Returns
     -------
@@ -284,7 +283,7 @@ def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: i
 
 
 def _quantiles_by_area(mesh: Mesh, values: FloatArray, shares: list[float]) -> list[float]:
-    """Values at vertices that some shares of the area do not exceed."""
+    """Quantiles of values at vertices, weighted by area."""
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), len(mesh.vertices))
     order = np.argsort(values, kind="stable")
     below = np.cumsum(area[order])

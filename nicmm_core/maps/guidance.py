@@ -1,17 +1,17 @@
-"""φ_fea (section 3.3): what weights of obstacles and alignment mean to every method.
+"""φ_fea (section 3.3) from weights of obstacles and alignment, for all methods.
 
-The paper spreads a Gaussian about every feature vertex, with its weight as the standard deviation,
-and adds them with signs to a neutral baseline. Eq. 7 then squares that map. Here
+The paper places a Gaussian at every feature vertex, with its weight as the standard deviation, and
+adds them with signs to a neutral baseline. Eq. 7 then squares that map. Here
 
     φ_fea² = 1 + 15 G_obstacles − G_alignment:
 
-the Gaussians are those of the square, which is what counts. Were they those of the map, its square
-would have a bottom of fourth order along a lane, in which a curve finds no hold. The strongest
-Gaussian of each kind counts and not their sum, so that a region is no stronger for having more
-vertices. Widths are relative to the surface and not to its edges, so a finer mesh has the same map.
+the Gaussians belong to the square, which enters the energy. Otherwise the square would have a
+minimum of fourth order along a lane, too flat to hold a curve. The strongest Gaussian of each kind
+counts, not their sum, so the number of vertices in a region does not matter. Widths are relative to
+the surface, so a finer mesh has the same map.
 
-Obstacles repel from every painted vertex. Alignment attracts to the ridge of what is painted, the
-vertices that are deepest inside; otherwise a curve would stop at the rim of a broad region.
+Obstacles repel from every painted vertex. Alignment attracts to the ridge of a painted region, its
+deepest vertices; otherwise a curve would stop at the rim of a broad region.
 """
 
 from __future__ import annotations
@@ -29,41 +29,41 @@ from ..progress import checkpoint
 BASELINE = 1.0
 """φ_fea where nothing is painted.
 
-With it the square keeps the order that the text asks for, alignment < neutral < obstacle; a map of
-both signs would repel from alignment too.
+The square then has the order required by the paper, alignment < neutral < obstacle; the square of
+a map with both signs would make alignment repel too.
 """
 
 OBSTACLE = 15.0
-"""What an obstacle of weight 1 adds to the square: a detour of up to 16 times is taken."""
+"""Addition to the square by an obstacle of weight 1: a detour of up to 16 times is accepted."""
 
 ALIGNMENT_WIDTH = 0.025
 """Standard deviation for an alignment weight of 1, in square roots of the component's area.
 
-A curve feels a lane up to about twice that far, which is some 4 % of a model's diagonal.
+A lane attracts a curve within about twice that, some 4 % of a model's diagonal.
 """
 
 OBSTACLE_WIDTH = 0.015
-"""The same for obstacles, which have to be left behind and not to be found."""
+"""The same for obstacles; narrower, since they need not attract from a distance."""
 
 CUT = 3.0
-"""Standard deviations at which a Gaussian ends."""
+"""Radius of a Gaussian, in standard deviations."""
 
 DEPTH = 0.1
-"""Depth inside a painted region, in the same unit, beyond which it is as good as its ridge."""
+"""Depth inside a painted region, in the same unit, from which vertices count as ridge."""
 
 RIDGE = 0.5
 """Slope of the depth towards any neighbour below which a vertex is on the ridge.
 
-It is 1 between rim and ridge, about 0.87 where no edge points straight inwards, and less where two
-sides of the rim are equally near.
+The slope is 1 between rim and ridge, about 0.87 if no edge points straight inwards, and less where
+two sides of the rim are equally near.
 """
 
 LEVELS = 5
-"""Steps into which weights are rounded up; each has its own width."""
+"""Number of levels to which weights are rounded up; each has its own width."""
 
 
 def component_unit(mesh: Mesh, face: int) -> float:
-    """Square root of the area of the component that a face belongs to, the unit of widths."""
+    """Square root of the area of the component of a face, the unit of widths."""
     component = mesh.face_component == mesh.face_component[face]
     return float(np.sqrt(mesh.face_areas[component].sum()))
 
@@ -77,9 +77,9 @@ def feature_map(
     ----------
     mesh : Mesh
     obstacles, alignment : (V,) float array of weights in [0, 1], or None
-        A weight is the height of its Gaussian, and scales its width.
+        A weight scales the height and the width of its Gaussian.
     unit : float
-        Length that the widths are relative to, in mesh units: see `component_unit`.
+        Unit of the widths, in mesh units; see `component_unit`.
     """
     squared = np.full(len(mesh.vertices), BASELINE**2)
     if obstacles is not None:
@@ -95,27 +95,27 @@ def feature_map(
 
 
 def _levels(weights: FloatArray) -> IntArray:
-    """Weights in steps, 0 where nothing is painted and `LEVELS` for a weight of 1, (V,)."""
+    """Levels of weights: 0 where nothing is painted, `LEVELS` for a weight of 1, (V,)."""
     return np.ceil(LEVELS * weights - tolerances.SNAP).astype(np.int64)
 
 
 def _response(mesh: Mesh, level: IntArray, start: FloatArray, width: float) -> FloatArray:
-    """Strongest Gaussian at every vertex, in [0, 1], by distances along the surface.
+    """Strongest Gaussian at every vertex, in [0, 1], by distances along edges.
 
     Parameters
     ----------
     mesh : Mesh
     level : (V,) int array
-        Of the weights.
+        Levels of the weights.
     start : (V,) float array
-        Distance from the middle of its Gaussian that a painted vertex has, in widths.
+        Distance of each painted vertex from the centre of its Gaussian, in widths.
     width : float
         Standard deviation at a weight of 1, in mesh units.
     """
     response = np.zeros(len(level))
     edges = mesh.edges
     length = edge_lengths(mesh.vertices, edges)
-    # From the strongest down: what lies under a stronger Gaussian need not spread its own.
+    # From the highest level down: vertices below a stronger Gaussian need none of their own.
     for step in np.unique(level[level > 0])[::-1].tolist():
         checkpoint()
         weight = step / LEVELS
@@ -136,21 +136,21 @@ def _distances(
     limit: float,
     size: int,
 ) -> FloatArray:
-    """Distances along edges, (size,), from sources that begin with their own; inf from a limit."""
-    # A vertex more, from which every source is as far away as it has to begin with.
+    """Distances along edges, (size,), from sources with start distances; inf beyond a limit."""
+    # One additional vertex, joined to each source by an arc of its start distance.
     rows = np.concatenate([edges[:, 0], np.full(len(sources), size)])
     columns = np.concatenate([edges[:, 1], sources])
-    # A zero would not be an arc.
+    # A length of zero would not be stored as an arc.
     lengths = np.maximum(np.concatenate([length, start]), tolerances.TINY)
     graph = sparse.csr_array((lengths, (rows, columns)), shape=(size + 1, size + 1))
     return csgraph.dijkstra(graph, directed=False, indices=size, limit=limit)[:size]
 
 
 def _off_ridge(mesh: Mesh, level: IntArray, width: float, depth: float) -> FloatArray:
-    """How far painted vertices are from the ridge of their region, in widths, shape (V,).
+    """Distance of painted vertices from the ridge of their region, in widths, shape (V,).
 
-    Where a region is broader than the Gaussian it is measured in depths of the ridge instead, so
-    that all of a region attracts.
+    If a region is broader than the Gaussian, the unit is the depth of its ridge instead, so that
+    the whole region attracts.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ def _off_ridge(mesh: Mesh, level: IntArray, width: float, depth: float) -> Float
     width : float
         Standard deviation at a weight of 1.
     depth : float
-        From which on vertices count as on the ridge.
+        Depth from which vertices count as ridge.
     """
     inside = _depths(mesh, level, depth)
     upwards = _steepest(mesh, level, inside)
-    # Along the steepest way to where it ends; every round doubles the steps.
+    # Follow the steepest ascent to its end; every round doubles the number of steps.
     top = upwards
     while (top[top] != top).any():
         top = top[top]
@@ -196,9 +196,9 @@ def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
 
 
 def _steepest(mesh: Mesh, level: IntArray, inside: FloatArray) -> IntArray:
-    """The neighbour that lies deepest inside, by slope; a vertex itself where it is on a ridge.
+    """The neighbour of steepest ascent in depth; the vertex itself on a ridge.
 
-    Only neighbours of the same level count: where a higher one begins, it takes over.
+    Only neighbours of the same level count.
     """
     start, end = np.concatenate([mesh.edges, mesh.edges[:, ::-1]]).T
     alike: BoolArray = (level[start] > 0) & (level[end] == level[start])

@@ -1,4 +1,4 @@
-"""Stage 2 (section 4.1): optimise the pretrained network for one problem, with early stopping."""
+"""Stage 2 (section 4.1): fine-tune the pretrained network on one problem, with early stopping."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from .torch_threads import single_thread
 from .trainable_network import CurveNetwork
 
 BAND_WIDTH = 3.0
-"""Width of the narrow band about the curve, in mean edge lengths (section 4.1)."""
+"""Width of the narrow band around the curve, in mean edge lengths (section 4.1)."""
 
 
 @dataclass(frozen=True)
 class FinetuningConfig:
-    """How stage 2 runs.
+    """Settings of stage 2.
 
     Attributes
     ----------
     learning_rate : float
-        The paper's.
+        As in the paper.
     patience : int
-        Iterations over which the narrow-band energy must stay still.
+        Number of last iterations in which the fluctuation is measured.
     fluctuation : float
-        How still: its spread over those iterations, relative to its value. The paper says
-        "minimal fluctuations".
+        Greatest range of the narrow-band energy over them, relative to its value, at convergence.
+        The paper requires "minimal fluctuations".
     threshold : float
-        Energy below which the curve is good at once. On a sphere, where the least energy is zero,
-        a curve at this value is within 6 % of the radius of the great circle.
+        Energy below which the curve has converged at once. On a sphere, where the least energy is
+        zero, a curve at this value is within 6 % of the radius of the great circle.
     least_iterations : int
-        Iterations before stillness counts; AdamW needs some to find its step sizes, and from a
-        plateau at the start it may look still.
+        Iterations before the fluctuation counts. AdamW needs some to adapt its step sizes; on a
+        plateau at the start the energy hardly changes.
     iterations : int
-        The cap.
+        Cap.
     """
 
     learning_rate: float = 0.001
@@ -74,13 +74,13 @@ def finetune(
     Parameters
     ----------
     network : CurveNetwork
-        As pretrained; not changed.
+        The pretrained network; not changed.
     problem : Problem
     weights : LossWeights
     config : FinetuningConfig
     watch : callable, optional
-        Called with the fraction of the cap that is done and φ after every iteration; fine-tuning
-        stops when it returns False.
+        Called after every iteration with the iterations done, as a fraction of the cap, and the
+        best φ; fine-tuning stops when it returns False.
     """
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     surface = surface_tensors(problem, device)
@@ -122,7 +122,7 @@ def finetune(
 def narrow_band_energy(
     surface: EnergySurface, phi: Tensor, weights: LossWeights, edge_length: float
 ) -> float:
-    """Mean density of the level-set and smoothness terms in the band about the zero set."""
+    """Mean density of the level-set and smoothness terms in the band around the zero set."""
     inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)
     density = weights.sdf * sdf_density(surface, phi)
     density = density + weights.smooth * smoothness_density(surface, phi)
@@ -131,7 +131,7 @@ def narrow_band_energy(
 
 
 def _may_stop(energies: list[float], config: FinetuningConfig) -> bool:
-    """The paper's early stop: the energy is low enough, or rests."""
+    """The paper's early stop: the energy is below the threshold or hardly fluctuates."""
     if energies[-1] < config.threshold:
         return True
     if len(energies) < max(config.patience, config.least_iterations):

@@ -1,11 +1,11 @@
 """The network (section 3.2, Fig. 2): an MLP with Efficient Channel Attention and Light GLU.
 
-It sees one vertex at a time, except that the attention's weights come from the mean over the
-surface. The paper gives neither widths nor kernels; what is chosen here stands in
-`NetworkConfig`, each with its reason.
+It processes one vertex at a time, except that the weights of the attention depend on the mean over
+the surface. The paper gives neither widths nor kernel sizes; `NetworkConfig` has those chosen here,
+with reasons.
 
-The network is functions of arrays and of parameters by name, written once for NumPy arrays, where
-it only runs (`single_pass`), and for tensors, where it is trained (`trainable_network`).
+The functions take arrays and parameters by name. They accept NumPy arrays, for inference
+(`single_pass`), and tensors, for training (`trainable_network`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..progress import checkpoint
 
 POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)
 INDICATOR_CHANNEL, DISTANCE_CHANNEL = 6, 7
-"""Places of P, N, φ_p and φ₀ among the input channels."""
+"""Indices of P, N, φ_p and φ₀ among the input channels."""
 
 
 @dataclass(frozen=True)
@@ -29,29 +29,28 @@ class NetworkConfig:
     Attributes
     ----------
     width : int
-        Channels C of every hidden layer. 64 is where the loss after pretraining stops falling
-        for its cost.
+        Channels C of every hidden layer. Above 64 the loss after pretraining hardly decreases.
     depth : int
         Hidden blocks.
     attention : bool
         Efficient Channel Attention in every block; off for the ablation of Table 3.
     attention_kernel : int
-        Neighbouring channels that interact, odd; 3 is what ECA-Net's rule gives for 64 channels.
+        Number of neighbouring channels that interact, odd; ECA-Net's rule gives 3 for 64 channels.
     gating : bool
         Light GLU in every block; off for the ablation of Table 3.
     gate_rank : int
-        Rank of the gate's matrix, the "light" of Light GLU: a full gate would double the
-        parameters of a block, rank 8 of 64 adds a quarter.
+        Rank of the gate's matrix in Light GLU: a full gate would double the parameters of a block,
+        rank 8 of 64 adds a quarter.
     position_gain : float
         Factor on the first layer's initial weights for positions. Coordinates lie within about
-        ±0.5 and a plain layer would see them as almost linear; 5 resolves a tenth of the surface.
+        ±0.5, where tanh of a plain layer is almost linear; 5 resolves a tenth of the surface.
     normals : bool
         Normals N among the input; off for the ablation of Table 4, where zeros replace them.
     control_indicator : bool
         φ_p among the input; off for Table 4 likewise.
     distance : bool
-        φ₀ among the input and under the correction that the network gives; off for Table 4. The
-        last layer then begins at random, because φ = 0 is a place where the energy has no slope.
+        φ₀ among the input and added to the output; off for Table 4. The last layer then starts from
+        random weights, because the gradient of the energy vanishes at φ = 0.
     """
 
     width: int = 64
@@ -67,7 +66,7 @@ class NetworkConfig:
 
 
 class NetworkInput(NamedTuple):
-    """What the network sees of a problem with n vertices and k control points.
+    """The input of the network for a problem with n vertices and k control points.
 
     Attributes
     ----------
@@ -75,7 +74,7 @@ class NetworkInput(NamedTuple):
     initial_distance : (n,) array
         φ₀, zero at the control vertices.
     area_share : (n,) array
-        Share of the surface's area that belongs to each vertex; sums to 1.
+        Share of each vertex in the surface's area; sums to 1.
     response : (n, k) array
         Column j is a smooth field that is 1 at control vertex j and 0 at the others.
     control_vertices : (k,) int array
@@ -124,7 +123,7 @@ def _linear_shapes(name: str, inputs: int, outputs: int) -> Iterator[tuple[str, 
 
 
 class Operations(NamedTuple):
-    """What NumPy and torch do not have under one name.
+    """Operations that NumPy and torch name differently.
 
     Attributes
     ----------
@@ -132,7 +131,7 @@ class Operations(NamedTuple):
         Maps values (n, inputs), a weight (outputs, inputs) and a bias (outputs,) or None to
         (n, outputs).
     tanh, sigmoid : callable
-        Of every value.
+        Elementwise.
     correlate : callable
         Maps values (C,) and an odd kernel (kernel,) to (C,), with zeros beyond the ends.
     ones_like : callable
@@ -146,14 +145,13 @@ class Operations(NamedTuple):
 
 
 def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operations) -> Array:
-    """φ = φ₀ + a correction that the network gives at every vertex, zero at the control points.
+    """φ = φ₀ + the correction by the network, which is zero at the control points.
 
-    Starting from φ₀, "the foundation for network initialization" (section 3.1), the last layer
-    begins at zero, so the untrained network returns φ₀ itself. What the layers give at the
-    control points is taken off again by smooth fields, so that φ is exactly zero there. The paper
-    asks for that by its large λ_int alone; with that weight AdamW spends its steps on the
-    interpolation term, and on a great circle 200 of them hardly moved the curve, where with exact
-    zeros they brought it there.
+    φ₀ is "the foundation for network initialization" (section 3.1): the last layer starts at zero,
+    so the untrained network returns φ₀. Smooth fields cancel the output of the layers at the
+    control points, so that φ is exactly zero there. The paper relies on a large λ_int for this, but
+    then AdamW spends its steps on the interpolation term: in 200 steps a curve hardly moved that
+    reached a great circle with exact zeros.
 
     Parameters
     ----------
@@ -181,7 +179,7 @@ def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operatio
 
 
 def channels_seen(config: NetworkConfig, features: Array, operations: Operations) -> Array:
-    """1 for each input channel that the network sees and 0 for those switched off."""
+    """1 for each active input channel and 0 for those switched off."""
     seen = operations.ones_like(features[0])  # (channels,)
     seen[NORMAL_CHANNELS] *= config.normals
     seen[INDICATOR_CHANNEL] *= config.control_indicator
@@ -204,7 +202,7 @@ def block(
 def attended(
     parameters: Parameters, name: str, inner: Array, area_share: Array, operations: Operations
 ) -> Array:
-    """Efficient Channel Attention: scale channels by weights from their means and neighbours'.
+    """Efficient Channel Attention: scale channels by weights from the means of neighbouring ones.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Stage 1 (section 4.1): train one network on random control points of one or more meshes.
 
-Every set has the λ_smooth that a design takes for it (`losses.balanced`): with one value for all,
-the least energy of most sets would be a flat φ. In every epoch every set is turned at random, since
-a few bodies stand in few ways about their axes.
+Each set has the λ_smooth of its design (`losses.balanced`): with one value for all, the minimum of
+most sets would be a flat φ. In every epoch each set gets a random permutation and random signs of
+its axes, since a few bodies have few orientations.
 """
 
 from __future__ import annotations
@@ -38,28 +38,28 @@ from .training_maps import random_maps
 from .weights_file import save_weights
 
 GRADIENT_LIMIT = 1.0
-"""Norm to which a step's gradient is clipped; single sets with a bad loop would throw training."""
+"""Norm to which gradients are clipped; single sets with a bad loop would derail training."""
 
 
 @dataclass(frozen=True)
 class PretrainingConfig:
-    """How stage 1 runs; sets, points and learning rate are the paper's.
+    """Settings of stage 1; sets, points and learning rate are the paper's.
 
     Attributes
     ----------
     sets : int
-        Sets of control points in all, spread evenly over the meshes.
+        Number of sets of control points, distributed evenly over the meshes.
     fewest_points, most_points : int
-        Points of a set.
+        Number of points of a set.
     open_share : float
-        Share of sets that are asked for as open curves.
+        Share of sets with an open curve.
     given_share : float
-        Share of sets whose closed curve visits the points in the order drawn, not the shortest.
+        Share of sets whose closed curve visits the points in random order, not the shortest.
     map_share : float
-        Share of sets with obstacles or lanes. With any, the network has the ninth channel φ_fea,
+        Share of sets with obstacles or lanes. Above 0, the network has the ninth channel φ_fea,
         which is neutral in the other sets.
     batch : int
-        Sets to a step.
+        Sets per step.
     epochs : int
         Passes over all sets.
     learning_rate : float
@@ -90,19 +90,19 @@ def pretrain(
 ) -> list[float]:
     """Train on random control points of the meshes and write the weights (Eq. 9).
 
-    A checkpoint beside the output is written after every epoch; a run that was interrupted goes
-    on from it and ends with the weights that it would have had.
+    A checkpoint is written beside the output after every epoch. An interrupted run resumes from it
+    and ends with the same weights as without interruption.
 
     Parameters
     ----------
     meshes : sequence of Mesh
     output : path
-        Where the weights go, a ``.npz`` archive.
+        The file of the weights, a ``.npz`` archive.
     network_config, config, weights : optional
-        Defaults are those of the paper and of this package. λ_smooth is lowered set by set, as for
-        a design.
+        By default those of the paper and of this package. λ_smooth is lowered for single sets, as
+        for a design.
     progress : callable, optional
-        Called with the name of the stage, steps done, steps in all and the mean loss so far.
+        Called with the name of the stage, steps done, total steps and the mean loss so far.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def pretrain(
     configuration = repr((network.config, config, weights, _fingerprint(meshes)))
     losses = _resume(checkpoint, configuration, network, optimiser)
 
-    # The tensors of a set on 4,000 vertices take about 2 MB, so all of them stay on the device.
+    # The tensors of a set on 4,000 vertices take about 2 MB, so all stay on the device.
     prepared = [
         _Prepared(
             surface_tensors(problem, device),
@@ -178,7 +178,7 @@ def pretrain(
             "optimiser": optimiser.state_dict(),
             "losses": losses,
         }
-        # An interruption while writing must not cost the checkpoint before.
+        # An interruption while writing must not destroy the previous checkpoint.
         partial = checkpoint.with_suffix(".partial")
         torch.save(state, partial)
         partial.replace(checkpoint)
@@ -189,7 +189,7 @@ def pretrain(
 
 @dataclass(frozen=True)
 class _Prepared:
-    """A set with its tensors on the device."""
+    """The tensors of a set on the device."""
 
     surface: EnergySurface
     given: NetworkInput
@@ -197,9 +197,9 @@ class _Prepared:
 
 
 def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
-    """The same set with its axes exchanged or reversed at random, and perhaps the sign of φ₀.
+    """The same set with its axes permuted and reversed at random, and a random sign of φ₀.
 
-    The energy of Eq. 2 knows neither axes nor the sign of φ.
+    The energy of Eq. 2 is invariant under both.
     """
     axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
     side = float(generator.choice([-1.0, 1.0]))
@@ -218,7 +218,7 @@ def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
 def _resume(
     checkpoint: Path, configuration: str, network: CurveNetwork, optimiser: torch.optim.Optimizer
 ) -> list[float]:
-    """Load an interrupted run, if there is one; the losses of its epochs."""
+    """Load an interrupted run, if there is one; return the losses of its epochs."""
     if not checkpoint.exists():
         return []
     try:
@@ -239,7 +239,7 @@ def _resume(
 
 
 def _kind(sample: float, config: PretrainingConfig) -> tuple[bool, str]:
-    """Whether a set's curve is closed, and in which order it visits the points."""
+    """Whether the curve of a set is closed, and the order of its points."""
     if sample < config.open_share:
         return False, "shortest"
     return True, "given" if sample < config.open_share + config.given_share else "shortest"
@@ -258,7 +258,7 @@ def _random_problems(
     config: PretrainingConfig,
     report: Callable[[str, int, int, float], None],
 ) -> Iterator[Problem]:
-    """Random sets of vertices, as many on each mesh; sets without a simple path are redrawn."""
+    """Random sets of vertices, equally many per mesh; sets without a simple path are replaced."""
     done = 0
     per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
     for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
@@ -297,7 +297,7 @@ def _random_problems(
 def _maps(
     mesh: Mesh, points: IntArray, config: PretrainingConfig, generator: np.random.Generator
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """Obstacles and alignment of a set; none at all where the network is not to see any."""
+    """Obstacles and alignment of a set; None if the network has no ninth channel."""
     if config.map_share == 0.0:
         return None, None
     if generator.random() < config.map_share:
@@ -307,4 +307,4 @@ def _maps(
 
 
 TRIES_PER_SET = 10
-"""Draws allowed for each set wanted, before a mesh is refused."""
+"""Most random sets per set wanted, before a mesh is rejected."""

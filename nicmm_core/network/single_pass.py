@@ -1,4 +1,4 @@
-"""What the pretrained network says as it is: one forward pass in NumPy, without any training."""
+"""Inference: one forward pass of the pretrained network in NumPy, without training."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ SingleArray = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Inference:
-    """What the network says to a request on a mesh.
+    """The inferred level set of a request on a mesh.
 
     Attributes
     ----------
     problem : Problem
     solution : Solution
-        The network's level set.
+        The level set by the network.
     zeros : ZeroSet
-        Of it, or with maps of what `shortest_by_map` takes instead.
+        Of the solution; with maps, of the choice of `shortest_by_map`.
     """
 
     problem: Problem
@@ -41,7 +41,7 @@ class Inference:
 
 
 def infer(mesh: Mesh, request: Request) -> Inference:
-    """Where a curve runs by the network.
+    """Infer the course of a curve.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def infer(mesh: Mesh, request: Request) -> Inference:
 
 
 def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
-    """The network's level set for a problem, or φ₀ where it is not finite.
+    """The level set of a problem by the network, or φ₀ if that is not finite.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
         As NumPy arrays.
     problem : Problem
     """
-    # Weights of a bad file may overflow; the check below says so.
+    # Weights of a bad file may overflow; this is checked below.
     with np.errstate(over="ignore", invalid="ignore"):
         field = level_set(weights, network_input(problem), NUMPY).astype(np.float64)
     status = Status.CONVERGED
@@ -85,9 +85,9 @@ def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
 
 
 def network_input(problem: Problem) -> NetworkInput:
-    """What the network sees of a problem, in single precision, as it was trained.
+    """The input of the network, in single precision as in training.
 
-    φ is then about 1e-7 away from that of double precision, in units of the problem.
+    φ then differs from double precision by about 1e-7, in units of the problem.
     """
     areas = problem.elements.vertex_areas
     return NetworkInput(
@@ -107,7 +107,7 @@ def _linear(values: SingleArray, weight: SingleArray, bias: SingleArray | None) 
 
 
 def _sigmoid(values: SingleArray) -> SingleArray:
-    """1 / (1 + exp(-x)), by the tangent, which cannot overflow and is faster."""
+    """1 / (1 + exp(-x)) by tanh, which cannot overflow and is faster."""
     half = np.tanh(0.5 * values)
     half += 1.0
     half *= 0.5

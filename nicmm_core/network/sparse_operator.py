@@ -1,4 +1,4 @@
-"""A constant sparse matrix that gradients flow through."""
+"""A constant sparse matrix as a differentiable operator."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Product(torch.autograd.Function):
 def _csr_tensor(matrix: sparse.sparray, device: torch.device) -> Tensor:
     csr = sparse.csr_array(matrix)
     with warnings.catch_warnings():
-        # torch announces once that compressed sparse tensors are young.
+        # torch warns once that compressed sparse tensors are in beta.
         warnings.filterwarnings("ignore", message="Sparse")
         return torch.sparse_csr_tensor(
             torch.as_tensor(csr.indptr, dtype=torch.int32),

@@ -1,4 +1,4 @@
-"""Problems as tensors in single precision: what training and prediction work on."""
+"""Problems as tensors in single precision, for training and fine-tuning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .sparse_operator import SparseOperator
 
 
 def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
-    """Move what the energy needs of a problem to a device."""
+    """The operators of the energy on a device."""
     arrays = energy_surface(problem)
     elements = problem.elements
     phi_fea = arrays.feature_map
@@ -30,7 +30,7 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
 
 
 def network_input(problem: Problem, device: torch.device) -> NetworkInput:
-    """Move what the network sees of a problem to a device."""
+    """The input of the network on a device."""
     arrays = single_pass.network_input(problem)
     return NetworkInput(*(torch.as_tensor(array, device=device) for array in arrays))
 

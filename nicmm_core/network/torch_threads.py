@@ -1,4 +1,4 @@
-"""One thread for the network."""
+"""Single-threaded torch."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import torch
 
 @contextmanager
 def single_thread() -> Iterator[None]:
-    """Let torch use one thread, and as many as before afterwards.
+    """Let torch use one thread, and restore the previous number afterwards.
 
-    Sums then do not depend on the number of cores, so the same input gives the same curve on every
-    machine of a kind. The matrices of a few thousand rows gain nothing from more threads, and on
-    a busy machine the threads of a step wait for one another, which took ten times as long.
+    Sums then do not depend on the number of cores, so the same input gives the same curve on all
+    machines of the same kind. Matrices with a few thousand rows gain nothing from more threads; on
+    a busy machine the threads wait for each other, which took ten times as long.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -1,4 +1,4 @@
-"""The network as a torch module, which training changes."""
+"""The network as a trainable torch module."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from .weights_file import SHIPPED, load_weights
 class CurveNetwork(nn.Module):
     """The parameters of a network and its forward pass `network.level_set`.
 
-    Before training, layers are as torch's own begin: uniform within the inverse root of their
-    number of inputs. But positions count more in the first layer, and the last one is zero.
+    Initial weights are as torch's: uniform within the inverse square root of the number of inputs.
+    But the first layer's weights for positions are larger, and the last layer is zero.
     """
 
     def __init__(self, config: NetworkConfig, channels: int = BASE_CHANNELS) -> None:
@@ -37,7 +37,7 @@ class CurveNetwork(nn.Module):
         parameters = self.weights.parameters
         with torch.no_grad():
             for name, parameter in parameters.items():
-                # A bias follows its weight and has as many inputs.
+                # A bias has the number of inputs of its weight.
                 inputs = math.prod(shapes[name.replace("bias", "weight")][1:])
                 parameter.uniform_(-1.0 / math.sqrt(inputs), 1.0 / math.sqrt(inputs))
             parameters["stem.weight"][:, :3] *= config.position_gain
@@ -56,7 +56,7 @@ class CurveNetwork(nn.Module):
 
 
 def build_network(weights: NetworkWeights) -> CurveNetwork:
-    """A network that starts from weights, which stay as they are."""
+    """A network with a copy of some weights."""
     network = CurveNetwork(weights.config, weights.parameters["stem.weight"].shape[1])
     with torch.no_grad():
         for name, parameter in network.weights.parameters.items():
@@ -65,7 +65,7 @@ def build_network(weights: NetworkWeights) -> CurveNetwork:
 
 
 def network_weights(network: CurveNetwork) -> NetworkWeights:
-    """A copy of what a network has learned, as NumPy arrays."""
+    """A copy of the weights of a network, as NumPy arrays."""
     return NetworkWeights(
         network.config,
         {
@@ -76,7 +76,7 @@ def network_weights(network: CurveNetwork) -> NetworkWeights:
 
 
 def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> CurveNetwork:
-    """Read a network to be trained on; see `weights_file.load_weights`."""
+    """Read a network to train further; see `weights_file.load_weights`."""
     return build_network(load_weights(path, channels))
 
 

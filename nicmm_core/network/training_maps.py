@@ -1,4 +1,4 @@
-"""Random obstacles and lanes for pretraining: what people paint beside and across curves."""
+"""Random obstacles and lanes for pretraining, as users paint them beside and across curves."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 
 BESIDE = 0.12
-"""Farthest that the ends of a lane lie from the way between two control points, in √area."""
+"""Greatest distance of the ends of a lane from the path between two control points, in √area."""
 
 PART = (0.2, 0.8)
-"""The part of that way that a lane runs along."""
+"""The section of that path along which a lane runs."""
 
 RADII = (0.02, 0.07)
 """Of obstacles, in √area."""
 
 WEIGHTS = (0.4, 1.0)
+"""Of strokes."""
 
 MOST_STROKES = 3
 
@@ -26,10 +27,10 @@ MOST_STROKES = 3
 def random_maps(
     mesh: Mesh, points: IntArray, generator: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Weights of obstacles and of alignment, (V,) both, from one to three strokes.
+    """Weights of obstacles and of alignment, both (V,), from one to three strokes.
 
-    A stroke belongs to the way along edges between two of the control points: a lane from beside
-    its one end to beside its other, or an obstacle round a vertex of it.
+    A stroke belongs to the shortest path along edges between two of the control points: a lane with
+    ends near the path, or an obstacle around one of its vertices.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def random_maps(
 
 
 def _shortest_path(graph: sparse.csr_array, start: int, end: int) -> IntArray:
-    """Vertices of the shortest way along edges."""
+    """Vertices of the shortest path along edges."""
     _, previous = csgraph.dijkstra(graph, directed=False, indices=end, return_predecessors=True)
     path = [start]
     while path[-1] != end:
@@ -74,6 +75,6 @@ def _shortest_path(graph: sparse.csr_array, start: int, end: int) -> IntArray:
 
 
 def _around(graph: sparse.csr_array, middle: int, radius: float) -> IntArray:
-    """Vertices within a distance along edges, the middle itself among them."""
+    """Vertices within a distance along edges, including the middle itself."""
     distance = csgraph.dijkstra(graph, directed=False, indices=middle, limit=radius)
     return np.flatnonzero(np.isfinite(distance))

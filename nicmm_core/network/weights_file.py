@@ -24,14 +24,14 @@ SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
 """Weights that come with the package; `docs/pretraining.md` names the command that made them."""
 
 SHIPPED_WITH_MAPS = SHIPPED.with_name("nicmm-maps.npz")
-"""Those of the network that sees φ_fea in the ninth channel."""
+"""Those of the network with φ_fea in the ninth channel."""
 
 LARGEST = 2**28
-"""Bytes of all arrays of a file; a small archive may hold any amount of zeros."""
+"""Most bytes of all arrays of a file; a small archive may unpack to any size."""
 
 
 def save_weights(path: str | Path, weights: NetworkWeights) -> None:
-    """Write configuration and parameters, which are NumPy arrays."""
+    """Write configuration and parameters; these must be NumPy arrays."""
     config = np.array(json.dumps(asdict(weights.config)))
     with Path(path).open("wb") as file:
         np.savez_compressed(file, config=config, **weights.parameters)
@@ -40,13 +40,13 @@ def save_weights(path: str | Path, weights: NetworkWeights) -> None:
 def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> NetworkWeights:
     """Read the weights of a network for a number of input channels, as NumPy arrays.
 
-    Where a file has weights for the eight base channels only, a ninth one, φ_fea, starts with zero
-    weight. Settings that a file does not name have their defaults.
+    If a file has weights for the eight base channels only, the ninth, φ_fea, gets zero weights.
+    Settings missing in a file have their defaults.
 
     Raises
     ------
     ArgumentError
-        If the file is missing or is no weights file.
+        If the file is missing or is not a weights file.
     """
     try:
         arrays = _read_arrays(path)
@@ -71,9 +71,9 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
 
 
 def _read_arrays(path: str | Path) -> dict[str, Array]:
-    """The arrays of an archive by name. Without pickles nothing in a file is executed."""
+    """The arrays of an archive by name. Pickles are refused, so a file cannot execute code."""
     with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
-        warnings.simplefilter("error")  # NumPy warns of headers that it can only guess at
+        warnings.simplefilter("error")  # NumPy warns of unclear headers
         size = sum(member.file_size for member in archive.infolist())
         if size > LARGEST:
             raise ValueError(f"it would unpack to {size} bytes, more than {LARGEST}")
@@ -87,11 +87,11 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
 
 @cache
 def shipped_weights(channels: int) -> NetworkWeights:
-    """The weights that come with the package, read once; nobody may change them."""
+    """The weights that come with the package, cached; do not modify them."""
     return load_weights(SHIPPED if channels == BASE_CHANNELS else SHIPPED_WITH_MAPS, channels)
 
 
-# What a missing file, another kind of file and weights of another network raise.
+# Raised by a missing file, another kind of file or weights of another network.
 _UNREADABLE = (
     OSError,
     EOFError,

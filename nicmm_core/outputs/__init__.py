@@ -1,4 +1,4 @@
-"""What can be done with a curve: cut the mesh along it, take its region, part the surface there.
+"""Uses of a curve: cut the mesh along it, take its region, separate the surface there.
 
-Nothing below imports this package.
+No module of the design imports this package.
 """

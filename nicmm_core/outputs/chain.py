@@ -1,8 +1,7 @@
-"""The points of a curve as the places where a mesh is cut: at vertices, on edges, inside faces.
+"""The points of a curve as places where a mesh is cut: at vertices, on edges or inside faces.
 
-A point close to a vertex or an edge is moved there, so that no thin faces come from it, and points
-close to each other become one. Where that would make the curve touch itself its points stay where
-they are.
+Points close to a vertex or an edge are snapped to it, to avoid thin faces, and points close to each
+other are merged. Where that would make the curve touch itself, its points are kept.
 """
 
 from __future__ import annotations
@@ -21,21 +20,21 @@ from ..geometry.tolerances import TINY
 
 @dataclass(frozen=True)
 class Chain:
-    """Places on a mesh that a curve passes, no two of them the same.
+    """Distinct places on a mesh that a curve passes.
 
     Attributes
     ----------
     closed : bool
     faces : (m,) int array
-        An input face of each place.
+        An input face that contains each place.
     barycentric : (m, 3) float array
-        Coordinates there; zero for corners that have no share in it.
+        Coordinates there, exactly zero off the supporting vertices.
     first_point : (m,) int array
-        The first point of the curve that is this place; its points up to the next place are too.
+        Index of the first point of the curve that is merged into each place.
     point : (m,) int array
-        The point of the curve that the place was made from.
+        Index of the point of the curve whose coordinates the place has.
     segment_faces : (m,) int array
-        A face that holds a place and the one after it; without meaning at an open end.
+        A face that contains a place and the next one; meaningless at an open end.
     """
 
     closed: bool
@@ -58,7 +57,7 @@ def build_chain(
     margin: FloatArray,
     wanted: BoolArray,
 ) -> Chain:
-    """Move points to vertices and edges near them, and join neighbours that are one place.
+    """Snap points to near vertices and edges, and merge neighbours at the same place.
 
     Parameters
     ----------
@@ -67,9 +66,9 @@ def build_chain(
     faces, barycentric, segment_faces : arrays
         As from `checked_curve`.
     margin : (n,) float array
-        Coordinates below it become zero, and neighbours that differ by less become one.
+        Coordinates below it become zero, and neighbours that differ by less are merged.
     wanted : (n,) bool array
-        Points that stand for their place rather than their neighbours, such as control points.
+        Points whose coordinates a merged place takes, such as control points.
     """
     barycentric = without_small_weights(barycentric, margin)
     corners = mesh.faces[faces]
@@ -86,7 +85,7 @@ def build_chain(
         begins = np.array([0])
     else:
         begins = np.flatnonzero(~np.roll(joins, 1))
-    # A run of near points may be long: it is broken where it has left its first point.
+    # A run of near points may be long: it is split where it leaves its first point.
     begins = _broken_runs(begins, joins, faces, barycentric, corners, margin)
     ends = np.roll(begins, -1)
     count = (ends - begins - 1) % n + 1
@@ -137,7 +136,7 @@ def superfluous_points(
     wanted: BoolArray,
     deviation: float,
 ) -> BoolArray:
-    """Points inside faces without which the curve stays within a distance of its course.
+    """Points inside faces that can be omitted with a limited deviation of the curve.
 
     Parameters
     ----------
@@ -146,7 +145,7 @@ def superfluous_points(
     faces : (n,) int array
     closed : bool
     wanted : (n,) bool array
-        Points that stay.
+        Points to keep.
     deviation : float
         In mesh units.
 
@@ -161,7 +160,7 @@ def superfluous_points(
     superfluous = np.zeros(n, dtype=bool)
     if deviation <= 0.0 or free.all():
         return superfluous
-    # Between two points that stay, the curve does not leave the face.
+    # Between two points that are kept, the curve does not leave the face.
     stays = np.flatnonzero(~free).tolist()
     waiting = list(zip(stays, [*stays[1:], stays[0] + n], strict=True))
     while waiting:
@@ -182,17 +181,17 @@ def superfluous_points(
 
 
 def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int) -> IntArray:
-    """The points of the curve that some places stand for, with those beside them.
+    """The points of the curve that are merged into some places and their neighbours.
 
     Parameters
     ----------
     chain : Chain
-        Made from some of the points of a curve.
+        Built from some of the points of a curve.
     places : sequence of int
     kept : (k,) int array
-        Which points these were.
+        Indices of these points.
     n_points : int
-        How many the curve has.
+        Number of points of the curve.
     """
     near = {(place + step) % len(chain) for place in places for step in (-1, 0, 1)}
     begins = kept[chain.first_point]

@@ -1,8 +1,8 @@
 """A mesh cut along a curve: the same surface, with the curve as a chain of its edges.
 
-Every face that the curve crosses or touches becomes triangles; faces beside a cut edge share its
-new vertices, so the result is as conforming as the mesh was. New vertices know where they are in
-the input, so whatever lives on the mesh can be carried over.
+Every face that the curve crosses or touches is triangulated. Faces at a cut edge share its new
+vertices, so the result is as conforming as the mesh was. New vertices have barycentric coordinates
+in input faces, so that attributes can be interpolated.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from .chain import Chain, build_chain, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 
 SNAP_CUT = 1e-3
-"""By default, points with a barycentric coordinate below this move to the edge or the vertex."""
+"""Default barycentric coordinate below which points snap to the edge or vertex."""
 
 LARGEST_SNAP = 0.25
-"""Above a third there would be nowhere to go."""
+"""Largest snap; with a third or more, all coordinates of a point could vanish."""
 
 FLAT = 1e-9
-"""Least height of a face, relative to its longest side, at which its angles are measured."""
+"""Height of a face, relative to its longest side, from which its angles are measured."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +40,20 @@ class CutMesh:
     vertices : (V + n, 3) float array
         Those of the input mesh, then the new ones.
     faces : (F', 3) int array
-        Faces that are as they were, in the old order, then the parts of the others; all turn as
-        the input faces do.
+        Unchanged faces, in the old order, then the parts of the others, with the orientation of the
+        input faces.
     source_face : (F',) int array
-        The input face that each face is or is a part of.
+        The input face of each face.
     new_face : (n,) int array
-        An input face that holds each new vertex.
+        An input face that contains each new vertex.
     new_barycentric : (n, 3) float array
-        Where the new vertices are in it.
+        Their coordinates in it.
     chain : (m,) int array
-        Vertices along the curve, no one twice, each joined to the next one by an edge.
+        Distinct vertices along the curve, each joined to the next by an edge.
     closed : bool
         Whether the last vertex of the chain is joined to the first.
     chain_point : (m,) int array
-        The point of the curve that each vertex of the chain stands for.
+        Index of the point of the curve at each vertex of the chain.
     """
 
     vertices: FloatArray
@@ -78,7 +78,7 @@ class CutMesh:
 
     @cached_property
     def directed_chain_edges(self) -> frozenset[tuple[int, int]]:
-        """The same in either direction, to ask for single ones."""
+        """Edges along the curve in both directions, for lookups."""
         edges = self.chain_edges.tolist()
         return frozenset((a, b) for a, b in edges) | frozenset((b, a) for a, b in edges)
 
@@ -100,7 +100,7 @@ class CutMesh:
         return weights
 
     def at_corners(self, mesh: Mesh, values: FloatArray) -> FloatArray:
-        """Carry values at the corners of faces over, such as UVs, which have seams.
+        """Interpolate values at the corners of faces, such as UVs, which have seams.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class CutMesh:
         return np.einsum("fij,fj...->fi...", self.corner_weights(mesh), values[self.source_face])
 
     def at_vertices(self, mesh: Mesh, values: FloatArray) -> FloatArray:
-        """Carry values at vertices over, such as weights.
+        """Interpolate values at vertices, such as weights.
 
         Parameters
         ----------
@@ -143,8 +143,10 @@ def cut_mesh(
     curve : SurfaceCurve
         Closed or open, simple.
     snap : float, default 0.001
-        Points with a barycentric coordinate below this move to the edge or the vertex near them, so
-        that there are no needles; not where the curve would then touch itself.
+        Points with a barycentric coordinate below this snap to the edge or vertex, to avoid
+        needles, except where the curve would then touch itself.
+    deviation : float, default 0
+        Points inside faces are omitted where the curve then moves by at most this, in mesh units.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def cut_mesh(
 
 
 class _ContactError(Exception):
-    """The chain meets itself at some of its places."""
+    """The chain touches itself at some of its places."""
 
     def __init__(self, places: list[int]) -> None:
         super().__init__(places)
@@ -215,7 +217,7 @@ class _ContactError(Exception):
 
 @dataclass(frozen=True)
 class _Places:
-    """Where the places of a chain are: at a vertex, on an edge or inside a face."""
+    """The places of a chain by location: at a vertex, on an edge or inside a face."""
 
     at_vertex: dict[int, int]  # place by vertex
     on_edge: dict[tuple[int, int], list[int]]  # places in order along an edge, smaller vertex first
@@ -280,7 +282,7 @@ def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
             at_vertex[vertex] = place
             continue
         first, second = sorted(here, key=lambda corner: row[corner])
-        # The share of the farther end: rounding keeps it apart from 0 and from 1.
+        # The share of the second end: rounding cannot make it 0 or 1.
         share[place] = weights[second] / (weights[first] + weights[second])
         on_edge[int(row[first]), int(row[second])].append(place)
     for along in on_edge.values():
@@ -294,9 +296,9 @@ def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
 def _segments_inside(
     chain: Chain, corners: IntArray, places: _Places
 ) -> dict[int, list[tuple[int, int]]]:
-    """Segments that lead through the inside of a face, by the face.
+    """Segments through the interior of a face, by face.
 
-    Those along an edge need nothing, but must not lead past a place.
+    Segments along an edge need no cut, but must not pass over a place.
     """
     inside: dict[int, list[tuple[int, int]]] = defaultdict(list)
     support = [
@@ -323,7 +325,7 @@ def _segments_inside(
 
 
 def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
-    """Faces that have an edge with places on it."""
+    """Faces with places on one of their edges."""
     if not places.on_edge:
         return []
     edges = np.array(list(places.on_edge))
@@ -394,7 +396,7 @@ def _weights_in(
 
 
 def _flattened(corners: FloatArray, weights: list[tuple[float, float, float]]) -> FloatArray:
-    """Points of a face in its plane; of a face without height in one that is equilateral."""
+    """Points of a face in its plane; a face without height is replaced by an equilateral one."""
     one, other = corners[1] - corners[0], corners[2] - corners[0]
     length = np.linalg.norm(one)
     x, y = one @ other, float(np.linalg.norm(np.cross(one, other)))

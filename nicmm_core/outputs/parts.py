@@ -1,4 +1,4 @@
-"""A surface parted along a curve: either side gets its own vertices."""
+"""A surface separated along a curve: each side gets its own vertices."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .shared_sides import shared_sides
 
 @dataclass(frozen=True)
 class PartedMesh:
-    """A cut mesh whose two sides of the curve are no longer joined.
+    """A cut mesh in which both sides of the curve are disconnected.
 
     Attributes
     ----------
     vertices : (V', 3) float array
-        Those of the cut mesh, then the second and further copies along the curve.
+        Those of the cut mesh, then their copies along the curve.
     faces : (F', 3) int array
-        As many as the cut mesh has, in the same order.
+        Faces of the cut mesh, in the same order.
     source_vertex : (V',) int array
-        Which vertex of the cut mesh each one is or copies.
+        The vertex of the cut mesh of each vertex.
     part : (F',) int array
-        Which connected part each face belongs to, from 0 on.
+        The connected component of each face, from 0.
     """
 
     vertices: FloatArray
@@ -36,10 +36,10 @@ class PartedMesh:
 
 
 def part_mesh(cut: CutMesh) -> PartedMesh:
-    """Part a mesh along the curve that it was cut along.
+    """Separate a cut mesh along its curve.
 
-    The ends of an open curve inside the surface stay single, so the surface opens like a slit. A
-    curve that bounds nothing leaves the surface in one part with one or two more boundaries.
+    Ends of an open curve inside the surface are not duplicated, so it opens a slit. A curve that
+    bounds no region leaves the surface connected, with one or two more boundaries.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
     n_vertices, n_corners = len(cut.vertices), cut.faces.size
     shared = shared_sides(cut.faces, cut.chain_edges)
     edges, faces = shared.edges[~shared.on_chain], shared.faces[~shared.on_chain]
-    # Corners at one vertex stay joined where their faces share an edge there that is not cut.
+    # Corners at a vertex stay joined if their faces share an uncut edge there.
     one, other = (
         (3 * side[:, None] + (cut.faces[side][:, None] == edges[:, :, None]).argmax(axis=2)).ravel()
         for side in faces.T
@@ -61,7 +61,7 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
     on_chain = np.zeros(n_vertices, dtype=bool)
     on_chain[cut.chain] = True
     vertex = cut.faces.ravel()
-    # Elsewhere all corners of a vertex stay together, whatever the surface is like there.
+    # Off the curve, all corners of a vertex stay joined, even at non-manifold vertices.
     order = np.argsort(vertex, kind="stable")
     beside = np.flatnonzero((np.diff(vertex[order]) == 0) & ~on_chain[vertex[order[1:]]])
     rows = np.concatenate([one, order[beside]])
@@ -83,7 +83,7 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
 
 
 def _parts(faces: IntArray) -> IntArray:
-    """Connected parts of faces that share vertices, (F,)."""
+    """Connected components of faces by shared vertices, (F,)."""
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     size = int(faces.max()) + 1
     graph = sparse.coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(size, size))

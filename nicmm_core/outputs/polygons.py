@@ -1,7 +1,7 @@
-"""Larger faces of a cut mesh, for meshes whose triangles are those of quads and polygons.
+"""Polygons of a cut mesh, for meshes whose triangles come from quads and polygons.
 
-What a curve leaves of a polygon on either side becomes one polygon again, as a knife leaves it: a
-model of quads stays one of quads where the curve does not pass.
+The parts of a polygon on each side of the curve become polygons again, as after a knife cut.
+Polygons that the curve does not cross are unchanged.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from .cut import CutMesh
 from .shared_sides import shared_sides
 
 BENT = 0.9
-"""Least cosine between a triangle's normal and that of the polygon that it may be joined into."""
+"""Least cosine between the normal of a triangle and that of the polygon that it joins."""
 
 
 @dataclass(frozen=True)
 class CutPolygons:
-    """Polygons that take the place of those that were cut.
+    """Polygons that replace those that were cut.
 
     Attributes
     ----------
     corners : list of (k,) lists of int
-        Vertices of the cut mesh, turning as its faces do.
+        Vertices of the cut mesh, with the orientation of its faces.
     triangles : list of (k,) lists of int
-        A face of the cut mesh that has each corner and lies in the polygon.
+        A face of the cut mesh in the polygon, for each corner.
     source : (p,) int array
-        The input polygon that each is a part of.
+        The input polygon of each.
     """
 
     corners: list[list[int]]
@@ -39,7 +39,7 @@ class CutPolygons:
 
 
 def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) -> CutPolygons:
-    """Put the triangles of cut polygons together again, but not over the curve.
+    """Merge the triangles of cut polygons, but not across the curve.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
     source_polygon : (F,) int array
         The polygon of each face of the mesh that was cut.
     joined : bool, default True
-        Otherwise the cut polygons are left as triangles.
+        If False, cut polygons stay triangles.
 
     Returns
     -------
     CutPolygons
-        Without polygons in which nothing was cut.
+        Without polygons that were not cut.
     """
     polygon = source_polygon[cut.source_face]
     is_cut = np.zeros(len(source_polygon), dtype=bool)
@@ -89,9 +89,9 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
 
 
 def _outline(cut: CutMesh, faces: list[int]) -> list[tuple[int, int]] | None:
-    """Corners round some triangles, each with one that has it; None where they stay triangles.
+    """Corners around some triangles, each with one of its triangles; None if they stay triangles.
 
-    They do where they are bent too much, and where they are no disc with all corners on its rim.
+    They do if they are bent too much, or do not form a disc with all corners on its rim.
     """
     if not _is_flat(cut.vertices, cut.faces[faces]):
         return None
@@ -122,7 +122,7 @@ def _sides_of(cut: CutMesh, face: int) -> list[tuple[int, int]]:
 
 
 def _is_flat(vertices: FloatArray, faces: IntArray) -> bool:
-    """Whether triangles are a graph over the plane that fits them, and not too steep."""
+    """Whether triangles are a graph of limited slope over their mean plane."""
     corner = vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(normal, axis=1)

@@ -1,7 +1,7 @@
-"""What a curve encloses: faces and vertices on one side of it.
+"""The region that a curve encloses: faces and vertices on one side of it.
 
-The rule of `sides`, as for the sign of a design's level set (`relaxation.curve_field`); but a face
-of the cut mesh has a side even where no vertex of the input mesh lies inside.
+By the rule of `geometry.sides`, as for the sign of a design's level set (`relaxation.curve_field`).
+Here faces of the cut mesh have sides, even if no input vertex lies inside.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Region:
     cut_vertices : (V + n,) bool array
         Vertices of the cut mesh that are inside or on the curve.
     share : (F,) float array
-        How much of the area of each input face is inside, from 0 to 1.
+        Share of the area of each input face that is inside, in [0, 1].
     area : float
         Of the region, in square mesh units.
     """
@@ -43,18 +43,18 @@ class Region:
 
     @property
     def faces(self) -> BoolArray:
-        """Input faces that are inside by more than half of their area, (F,)."""
+        """Input faces with more than half of their area inside, (F,)."""
         return self.share > 0.5
 
     def complement(self, mesh: Mesh, cut: CutMesh) -> Region:
-        """The other side of the curve, on the same part of the mesh.
+        """The other side of the curve, on the same component of the mesh.
 
         Parameters
         ----------
         mesh : Mesh
             The mesh that was cut.
         cut : CutMesh
-            The cut that this is a region of.
+            The cut of this region.
         """
         side = _sides(cut)
         return _region(mesh, cut, (side != 0) & ~self.cut_faces)
@@ -88,14 +88,14 @@ def enclosed_region(
     Returns
     -------
     Region
-        Without parts of the mesh that are not connected to the curve.
+        Without components of the mesh that are not connected to the curve.
 
     Raises
     ------
     CurveError
         If the curve bounds no region.
     ControlPointError
-        If ``side_of`` is no single point beside the curve, on its part of the mesh.
+        If ``side_of`` is not a single point off the curve, on its component of the mesh.
     """
     side = _sides(cut)
     areas = cut.mesh.face_areas
@@ -103,20 +103,20 @@ def enclosed_region(
         inside = side == _side_at(mesh, cut, side, side_of)
     else:
         one, other = areas[side == 1].sum(), areas[side == -1].sum()
-        # All on one side: the curve runs along the boundary.
+        # If all faces are on one side, the curve follows the boundary.
         inside = side == (1 if other == 0.0 or 0.0 < one < other else -1)
     return _region(mesh, cut, inside)
 
 
 def _region(mesh: Mesh, cut: CutMesh, inside: BoolArray) -> Region:
-    """The region of some faces of the cut."""
+    """The region of some faces of the cut mesh."""
     areas = cut.mesh.face_areas
     vertices = np.zeros(len(cut.vertices), dtype=bool)
     vertices[cut.faces[inside]] = True
     n_faces = len(mesh.faces)
     within = np.bincount(cut.source_face, areas * inside, n_faces)
     whole = np.bincount(cut.source_face, areas, n_faces)
-    # Parts of a face without area are counted instead.
+    # For faces without area, the number of parts is used instead.
     number = np.bincount(cut.source_face, inside, n_faces) / np.bincount(cut.source_face)
     share = np.where(whole > 0.0, within / np.where(whole > 0.0, whole, 1.0), number)
     return Region(inside, vertices, share, float(areas[inside].sum()))
@@ -140,7 +140,7 @@ def _sides(cut: CutMesh) -> IntArray:
 
 
 def _faces_beside(cut: CutMesh) -> IntArray:
-    """Faces that have an edge of the chain."""
+    """Faces at an edge of the chain."""
     size = len(cut.vertices)
     sides = np.sort(cut.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     wanted = np.sort(cut.chain_edges, axis=1) @ np.array([size, 1])
@@ -155,7 +155,7 @@ def _side_at(mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | Surf
     source, target = int(point.faces[0]), point.barycentric[0]
     among = np.flatnonzero(cut.source_face == source)
     weights = cut.corner_weights(mesh)[among]
-    # Coordinates with respect to each part; the point lies where the least one is greatest.
+    # Coordinates in each part of the face; the point lies where the least one is greatest.
     right = np.tile(target[:, None], (len(among), 1, 1))
     inside = np.linalg.solve(weights.transpose(0, 2, 1), right)
     least = inside.min(axis=1).ravel()

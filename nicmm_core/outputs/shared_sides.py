@@ -1,4 +1,4 @@
-"""Which faces lie beside each other."""
+"""Adjacent faces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..geometry.array_types import BoolArray, IntArray
 
 @dataclass(frozen=True)
 class SharedSides:
-    """Pairs of sides that are the same edge; k - 1 pairs where an edge has k faces.
+    """Pairs of faces at the same edge; k - 1 pairs at an edge with k faces.
 
     Attributes
     ----------
@@ -20,7 +20,7 @@ class SharedSides:
     faces : (p, 2) int array
         The two faces.
     on_chain : (p,) bool array
-        Whether the edge is one of those asked for.
+        Whether the edge is in the chain.
     """
 
     edges: IntArray
@@ -29,7 +29,7 @@ class SharedSides:
 
 
 def shared_sides(faces: IntArray, chain_edges: IntArray) -> SharedSides:
-    """Faces beside each other, and where a chain of edges lies between them.
+    """Adjacent faces, and whether a chain of edges separates them.
 
     Parameters
     ----------

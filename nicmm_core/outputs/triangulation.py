@@ -1,8 +1,8 @@
 """One triangle cut into triangles along segments: a constrained Delaunay triangulation.
 
-Points are homogeneous barycentric coordinates, so those on one side of the triangle have an exact
-zero in common and are exactly collinear. Signs of areas are exact; only the choice between valid
-triangulations is left to rounding.
+Points are barycentric coordinates, so points on a side of the triangle share an exact zero and are
+exactly collinear. Signs of areas are exact; only the choice among valid triangulations depends on
+rounding.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from fractions import Fraction
 from ..geometry.array_types import FloatArray
 
 SURE = 1e-13
-"""Determinants of barycentric coordinates above this have the right sign in double precision."""
+"""Determinants of barycentric coordinates above this have exact signs in double precision."""
 
 ANGLE_MARGIN = 1e-9
-"""Opposite angles have to exceed a half turn by this before an edge is flipped."""
+"""Excess of the sum of opposite angles over π from which an edge is flipped."""
 
 Weights = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
 
 class ConstraintError(Exception):
-    """Segments cross, or a segment leads through a point; `points` are those concerned."""
+    """Segments cross, or a segment passes through a point; `points` are those involved."""
 
     def __init__(self, points: tuple[int, ...]) -> None:
         super().__init__(points)
@@ -32,7 +32,7 @@ class ConstraintError(Exception):
 
 
 def orientation(a: Weights, b: Weights, c: Weights) -> int:
-    """1 where a, b, c turn to the left, -1 to the right, 0 where they are collinear; exact."""
+    """1 if a, b, c turn to the left, -1 to the right, 0 if they are collinear; exact."""
     value = _determinant(*a, *b, *c)
     if abs(value) <= SURE:
         exact = _determinant(*map(Fraction, (*a, *b, *c)))
@@ -41,19 +41,19 @@ def orientation(a: Weights, b: Weights, c: Weights) -> int:
 
 
 def _determinant(a, b, c, d, e, f, g, h, i):  # type: ignore[no-untyped-def]
-    # Written so that a column of zeros gives an exact zero.
+    # In this form a column of zeros gives an exact zero.
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 class FaceTriangulation:
-    """Triangles of one face, changed point by point and segment by segment.
+    """Triangles of one face, built point by point and segment by segment.
 
     Parameters
     ----------
     weights : list of (float, float, float)
         Barycentric coordinates of the points; the first three are the corners.
     flat : (n, 2) float array
-        The points in the plane of the face, to measure angles.
+        The points in the plane of the face, for angles.
     """
 
     def __init__(self, weights: list[Weights], flat: FloatArray) -> None:
@@ -65,11 +65,11 @@ class FaceTriangulation:
 
     @property
     def triangles(self) -> list[Triangle]:
-        """Each triangle once, turning as the face does."""
+        """Each triangle once, with the orientation of the face."""
         return [(a, b, c) for (a, b), c in self._third.items() if a < b and a < c]
 
     def add_on_side(self, corner: int, points: list[int]) -> None:
-        """Insert points of the side that begins at a corner, in their order along it."""
+        """Insert points on the side that starts at a corner, in order."""
         before, end = corner, (corner + 1) % 3
         for point in points:
             third = self._third[before, end]
@@ -121,9 +121,9 @@ class FaceTriangulation:
         self._fixed |= {(start, end), (end, start)}
 
     def improve(self) -> None:
-        """Flip edges that are no segments until the triangulation is Delaunay."""
+        """Flip edges that are not segments until the triangulation is Delaunay."""
         waiting = list(self._third)
-        # Lawson's flips end after n² steps; rounding must not turn them into a circle.
+        # Lawson's flips end after O(n²) steps; the cap prevents cycles by rounding.
         for _ in range(8 * len(self.weights) ** 2 + len(waiting)):
             if not waiting:
                 return
@@ -137,7 +137,7 @@ class FaceTriangulation:
                 waiting += [(a, d), (d, b), (b, c), (c, a)]
 
     def _edges_between(self, start: int, end: int) -> Iterator[tuple[int, int]]:
-        """Edges that a segment crosses, from its start on, each with its right end first."""
+        """Edges that a segment crosses, in order, each with its right end first."""
         if (start, end) in self._third or (end, start) in self._third:
             return
         for (corner, right), left in list(self._third.items()):
