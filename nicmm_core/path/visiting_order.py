@@ -190,9 +190,9 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
         if gain[i, j] > best:
             best = float(gain[i, j])
             onward = np.roll(tour, -int(i))
-            stretch, rest = onward[:count], onward[count:]
+            section, rest = onward[:count], onward[count:]
             if turned[i, j] < straight[i, j]:
-                stretch = stretch[::-1]
+                section = section[::-1]
             place = int(offset[i, j]) - count + 1
-            moved = np.concatenate([rest[:place], stretch, rest[place:]])
+            moved = np.concatenate([rest[:place], section, rest[place:]])
     return best, moved

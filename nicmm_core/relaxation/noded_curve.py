@@ -344,14 +344,14 @@ def _traced_polyline(
     following = (node + 1) % n
     changed = ~kept[node]
     lost = np.zeros(n, dtype=bool)
-    parts = [_kept_stretches(curve, np.flatnonzero(~changed))]
+    parts = [_kept_pieces(curve, np.flatnonzero(~changed))]
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
     # A trace starts inside a face; control points may lie elsewhere, so it then runs backward.
     for backwards in (False, True):
         here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
-        part, reached = _traced_stretches(surface, nodes.normals, places, here, ends, backwards)
+        part, reached = _traced_pieces(surface, nodes.normals, places, here, ends, backwards)
         lost[here[~reached]] = True
         parts.append(part)
     if not curve.closed:
@@ -362,11 +362,11 @@ def _traced_polyline(
     return polyline, np.searchsorted(owner[order], np.arange(n)), lost
 
 
-Stretches = tuple[IntArray, SurfacePoints]
+Pieces = tuple[IntArray, SurfacePoints]
 """Points of the polyline, each with the node before it; that node is the first point."""
 
 
-def _kept_stretches(curve: NodedCurve, nodes: IntArray) -> Stretches:
+def _kept_pieces(curve: NodedCurve, nodes: IntArray) -> Pieces:
     bounds = np.append(curve.node_place, len(curve.polyline))
     count = bounds[nodes + 1] - bounds[nodes]
     owner = np.repeat(nodes, count)
@@ -374,14 +374,14 @@ def _kept_stretches(curve: NodedCurve, nodes: IntArray) -> Stretches:
     return owner, curve.polyline[bounds[owner] + offset]
 
 
-def _traced_stretches(
+def _traced_pieces(
     surface: CurveSurface,
     normals: FloatArray,
     places: SurfacePoints,
     nodes: IntArray,
     ends: tuple[IntArray, IntArray],
     backwards: bool,
-) -> tuple[Stretches, BoolArray]:
+) -> tuple[Pieces, BoolArray]:
     """Straight traces from nodes to the next ones, traced in reverse if backwards."""
     mesh = surface.mesh
     start, end = reversed(ends) if backwards else ends

@@ -102,7 +102,7 @@ def test_points_in_one_cell_are_told_apart(large):
 @pytest.mark.slow
 def test_given_order_and_via_points_hold_on_large_meshes():
     ring = shapes.torus(around=240, across=120)
-    # Three points on the outside, joined the long way round the axis by via points or the short.
+    # Three points on the outside, joined around the axis: the long way by via points, or the short.
     angle = np.arctan2(ring.vertices[:, 1], ring.vertices[:, 0])
     outside = np.linalg.norm(ring.vertices[:, :2], axis=1) > 1.39
     at = [int(np.flatnonzero(outside)[np.abs(angle[outside] - a).argmin()]) for a in (0, 0.5, 1.0)]

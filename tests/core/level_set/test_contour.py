@@ -1,4 +1,4 @@
-"""The contour of known fields: where it runs, that it stays whole, and which way it goes."""
+"""The contour of known fields: its course, that it stays in one piece, and its direction."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def curves_of(mesh, field, controls=NONE):
 
 
 def assert_nearly_all_exact(mesh, deviation):
-    """The contour is exact but for the vertices that it passes closely and is drawn to."""
+    """The contour is exact except at vertices to which it snaps."""
     assert np.abs(deviation).max() < PASSING_MARGIN * 1.5 * mean_edge_length(mesh)
     assert np.quantile(np.abs(deviation), 0.8) < 1e-9
 

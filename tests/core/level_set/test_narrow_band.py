@@ -19,7 +19,7 @@ def problem(request, ball):
 
 
 def test_whole_surface_has_the_energy_of_the_losses(problem):
-    """A band that holds everything leaves nothing out: both write down Eq. 2 the same way."""
+    """A band that contains everything gives the same Eq. 2."""
     phi = problem.initial_distance
     band = build_narrow_band(problem, phi, np.inf)
     assert len(band.unknowns) == len(phi) - len(problem.loop.control_vertices)

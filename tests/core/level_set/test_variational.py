@@ -122,9 +122,9 @@ def test_obstacle_is_avoided_and_alignment_followed():
     above = on_the_way + [0.0, 0.0, 0.25]
     above /= np.linalg.norm(above)
     wanted = np.linalg.norm(mesh.vertices - above, axis=1) < 0.15
-    led = design(mesh, points, alignment=wanted.astype(float)).curves[0]
+    attracted = design(mesh, points, alignment=wanted.astype(float)).curves[0]
     plain = design(mesh, points).curves[0]
-    assert distance_to(led, above) < 0.6 * distance_to(plain, above)
+    assert distance_to(attracted, above) < 0.6 * distance_to(plain, above)
 
 
 def distance_to(curve, place):

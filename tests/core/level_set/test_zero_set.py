@@ -42,7 +42,7 @@ def test_a_shorter_curve_is_kept_and_a_longer_one_replaced(flat_disc, lane):
 
 
 def test_lengths_count_by_the_map(flat_disc):
-    """The straight way leads through an obstacle: there it is the longer one."""
+    """The straight path leads through an obstacle, by which it is the longer one."""
     x, y, _ = flat_disc.vertices.T
     wall = ((np.abs(x) < 0.1) & (y < 0.25)).astype(float)
     problem = problem_on(flat_disc, obstacles=wall)

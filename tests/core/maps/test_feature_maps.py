@@ -189,7 +189,7 @@ class TestEdgeMap:
 
     def test_pairs_that_no_face_joins(self, ball):
         far = int(np.linalg.norm(ball.vertices - ball.vertices[0], axis=1).argmax())
-        with pytest.raises(nicmm.ArgumentError, match="no edge of a face"):
+        with pytest.raises(nicmm.ArgumentError, match="not an edge of a face"):
             nicmm.edge_map(ball, [[0, far]])
 
 

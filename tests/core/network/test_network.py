@@ -172,7 +172,7 @@ def test_without_distance_the_output_knows_nothing_of_it(given):
 
 
 def test_without_attention_a_vertex_does_not_feel_the_others(given):
-    """Attention is the only way from one vertex to another, but for the control points."""
+    """Only attention connects vertices, except for the control points."""
     elsewhere = np.ones(len(given.features), dtype=bool)
     elsewhere[given.control_vertices] = False
     elsewhere[0] = False
@@ -241,7 +241,7 @@ def test_renumbering_the_vertices_renumbers_the_output(given):
 
 
 def test_weights_without_numbers_give_the_initial_distance(problem):
-    """Whether they overflow on the way or hold no number to begin with."""
+    """Whether they overflow in between or are NaN from the start."""
     for bad in (1e38, np.nan):
         weights = random_weights()
         weights.parameters["head.weight"][:] = bad

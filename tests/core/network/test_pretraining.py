@@ -265,7 +265,7 @@ def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
     features = torch.as_tensor(generator.normal(size=(20, channels)), dtype=torch.float32)
     given = NetworkInput(features, features[:, 7].clone(), None, None, None)
     before = features.clone()
-    ways = set()
+    orientations = set()
     for _ in range(1000):
         other = turned(given, generator)
         axes = np.zeros((3, 3))
@@ -282,8 +282,8 @@ def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
         torch.testing.assert_close(other.initial_distance, side * before[:, 7])
         assert torch.equal(other.features[:, 6], before[:, 6])
         assert torch.equal(other.features[:, 8:], before[:, 8:])
-        ways.add((*axes.ravel().tolist(), side))
-    assert len(ways) == 2 * 48
+        orientations.add((*axes.ravel().tolist(), side))
+    assert len(orientations) == 2 * 48
     assert torch.equal(features, before)
 
 

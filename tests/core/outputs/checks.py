@@ -75,7 +75,7 @@ def longest_edge(mesh):
 
 
 def components_without(faces, chain_edges):
-    """Number of parts that faces fall into where no way may lead over some edges."""
+    """Number of components of faces that are not connected across some edges."""
     forbidden = {tuple(sorted(edge)) for edge in chain_edges.tolist()}
     keys = np.sort(sides(faces), axis=1)
     at_edge = {}

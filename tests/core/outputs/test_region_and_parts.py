@@ -1,4 +1,4 @@
-"""What curves enclose, and surfaces parted along them, against counts made in another way."""
+"""What curves enclose, and surfaces parted along them, against independent counts."""
 
 import numpy as np
 import pytest

@@ -164,7 +164,7 @@ class TestEveryOrder:
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_many_points(self, ball, closed):
-        """Twenty to and fro: laid one after the other the path was four times as long."""
+        """Twenty points back and forth: legs in this order made the path four times as long."""
         chosen = np.random.default_rng(20).choice(len(ball.vertices), 20, replace=False)
         points = locate_control_points(ball, chosen, closed)
         working, loop = build_initial_loop(ball, points, "given", None, closed)

@@ -74,7 +74,7 @@ def test_on_a_sphere_the_error_falls_with_the_mesh():
 
 def test_the_smaller_side_is_inside_whichever_way_the_curve_runs(ball):
     low = circle(ANGLES, np.sqrt(1 - 0.4**2)) - [0.0, 0.0, 0.4]
-    fields = [curve_field(ball, curve_through(ball, way, [0])) for way in (low, low[::-1])]
+    fields = [curve_field(ball, curve_through(ball, path, [0])) for path in (low, low[::-1])]
     np.testing.assert_allclose(fields[0], fields[1], atol=1e-9)
     far = np.abs(ball.vertices[:, 2] + 0.4) > 0.05
     np.testing.assert_array_equal(fields[0][far] < 0.0, ball.vertices[far, 2] < -0.4)

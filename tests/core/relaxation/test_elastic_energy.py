@@ -122,7 +122,7 @@ def test_the_energy_has_no_first_node_and_no_direction(flat_disc, count):
 
 
 def test_the_energy_does_not_depend_on_numbers_orientation_or_pose(body):
-    """Positive on a surface that bends, whichever way its faces are turned."""
+    """Positive on a surface that bends, whatever the orientation of its faces."""
     turn = Rotation.from_rotvec([0.3, -1.0, 2.0])
     posed = nicmm.Mesh(turn.apply(body.vertices.copy()), body.faces)
     section = body.vertices[np.argsort(body.vertices[:, 0])[::30]]

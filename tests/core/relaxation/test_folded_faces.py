@@ -37,7 +37,7 @@ def surface(square):
 
 
 def straight_across(square, mesh, height=0.53):
-    """The same way over the same faces, straight in both meshes; it runs back in the fold."""
+    """The same trace over the same faces, straight in both meshes; it runs backward in the fold."""
     along = np.linspace(0.1, 0.9, 60)
     positions = np.stack([along, np.full(60, height), np.zeros(60)], axis=1)
     curve = curve_through(square, positions, [0, 59], closed=False)
@@ -94,7 +94,7 @@ def test_a_trace_over_a_fold_stays_straight(square, surface):
 
 
 def test_a_long_way_without_folds_is_lost_though_the_mesh_has_some():
-    """What a fold adds to a way is allowed there only and not round the rim of a sheet."""
+    """A fold lengthens a trace, which is allowed there only and not around the rim of a sheet."""
     plate = shapes.cube(8)
     low = plate.vertices * [1.0, 1.0, 0.01]
     mesh = nicmm.Mesh(low, plate.faces)

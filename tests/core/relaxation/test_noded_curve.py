@@ -188,7 +188,7 @@ def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
 @settings(max_examples=15)
 @given(st.integers(0, 10_000))
 def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_disc, seed):
-    """Random moves of up to half the radius, where ways cross one another everywhere."""
+    """Random moves of up to half the radius, where traces cross everywhere."""
     generator = np.random.default_rng(seed)
     surface = surface_of(flat_disc)
     exact = noded_curve(surface, ring_on(flat_disc), 60)

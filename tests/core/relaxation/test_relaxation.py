@@ -228,7 +228,7 @@ def states(mesh, curve, config=DEFAULT, smoothness=1.0):
 
 @pytest.mark.parametrize("smoothness", [0.3, 1.0, 5.0])
 def test_the_energy_never_rises(flat_disc, smoothness):
-    """Without spacing nodes anew, which moves the places where they sample the curve."""
+    """Without respacing nodes, which moves the places where they sample the curve."""
     config = RelaxationConfig(levels=(128,), stretch=np.inf)
     _, seen = states(flat_disc, star(flat_disc), config, smoothness)
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
@@ -266,7 +266,7 @@ def test_more_smoothness_gives_no_more_bending_and_no_shorter_curve(flat_disc):
 
 
 def test_obstacles_are_avoided(flat_disc):
-    """A hill on one side of the straight way: the curve leaves it and ∮ φ_fea² ds falls."""
+    """A hill on one side of the straight path: the curve leaves it and ∮ φ_fea² ds falls."""
     hill = 1.0 + 4.0 * np.exp(-np.sum((flat_disc.vertices[:, :2] - [0, -0.05]) ** 2, 1) / 0.02)
     x = np.linspace(-0.6, 0.6, 30)
     start = curve_through(flat_disc, np.stack([x, 0.01 + 0 * x, 0 * x], axis=1), [0, 29], False)
@@ -299,13 +299,15 @@ def test_a_flat_map_is_a_tension(flat_disc):
 
 
 def test_a_lane_is_followed_and_left_smoothly(flat_disc):
-    """It runs beside the middle of a straight way: the curve lies in it there and nowhere else."""
+    """A lane beside the middle of a straight path: the curve lies in it there and nowhere else."""
     x, y, _ = flat_disc.vertices.T
     beyond = np.maximum(np.abs(x) - 0.25, 0.0)
     lane = np.sqrt(1.0 - np.exp(-((y - 0.08) ** 2 + beyond**2) / (2 * 0.05**2)))
     ends = np.array([-0.7, 0.7])
-    way = np.linspace(*ends, 40)
-    start = curve_through(flat_disc, np.stack([way, 0 * way, 0 * way], axis=1), [0, 39], False)
+    along = np.linspace(*ends, 40)
+    start = curve_through(
+        flat_disc, np.stack([along, 0 * along, 0 * along], axis=1), [0, 39], False
+    )
     result = relaxed(flat_disc, start, feature=lane, weight=200.0)
     points = result.curve.points
     inside = np.abs(points[:, 0]) < 0.2
@@ -320,8 +322,8 @@ def test_a_lane_is_followed_by_short_curves_too(length):
     mesh = scaled(shapes.disc(24), length)
     x, y, _ = mesh.vertices.T / length
     lane = np.sqrt(1.0 - np.exp(-((y - 0.06) ** 2) / (2 * 0.08**2)))
-    way = length * np.linspace(-0.5, 0.5, 40)
-    start = curve_through(mesh, np.stack([way, 0 * way, 0 * way], axis=1), [0, 39], False)
+    along = length * np.linspace(-0.5, 0.5, 40)
+    start = curve_through(mesh, np.stack([along, 0 * along, 0 * along], axis=1), [0, 39], False)
     # τ_fea of a surface whose area is 1, which is where the three curves lie.
     result = relaxed(mesh, start, feature=lane, weight=FEATURE_TENSION, config=GUIDED)
     points = result.curve.points / length
@@ -363,7 +365,7 @@ def test_strands_that_would_cross_stay_apart(flat_disc):
     gap = np.linalg.norm(points[:, None] - points, axis=2)
     along = np.abs(np.arange(300)[:, None] - np.arange(300))
     along = np.minimum(along, 300 - along)
-    # Two mean steps of the last level, less what a push of finite strength gives way.
+    # Two mean steps of the last level, less what a contact term of finite strength allows.
     assert gap[along > 25].min() > result.curve.length / 512
 
 
@@ -398,7 +400,7 @@ def test_the_cap_is_kept(flat_disc, cap):
 
 
 def test_a_coil_round_a_thin_ring_stays_on_it():
-    """Few nodes are too far apart for straight ways round the tube; more take over."""
+    """With few nodes straight traces around the tube fail; a level of more nodes takes over."""
     thin = shapes.torus(major=1.0, minor=0.05, around=96, across=8)
     angle = np.arange(600) * 2 * np.pi / 600
     radius = 1 + 0.05 * np.cos(40 * angle)
@@ -449,7 +451,7 @@ def test_work_is_bounded_by_moves(flat_disc, work):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [41, 197])
 def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
-    """Its nodes are spaced anew again and again, and steps over folds gain less than that costs."""
+    """Its nodes are respaced repeatedly, and steps over folds gain less than that costs."""
     moves = []
     step = levenberg_marquardt.moved_along_conormals
     monkeypatch.setattr(

@@ -24,7 +24,7 @@ def seen_by_nodes(nodes):
 
 
 def lanes(mesh, gap, factor=1.0, closed=False):
-    """There along y = 0 and back along y = gap, thirty nodes each way and a bow between."""
+    """Out along y = 0, an arc, and back along y = gap, thirty nodes in each direction."""
     x = STEP * np.arange(-15, 16)
     bow = 2.0 * STEP * np.arange(1, 8)
     there = np.stack([x, 0 * x], axis=1)
