@@ -5,10 +5,10 @@ made a manifold if it is not one (`repaired_surface`), and the request is answer
 (`surface_designer`):
 
 control points → initial loop → signed distance → features (`problem`) → network, pretrained
-→ prediction → one loop through the points → contour → relaxation of the curve.
+→ its level set → one loop through the points → contour → relaxation of the curve.
 
 On all but small meshes all but the last is done on a coarse mesh of the same surface, and the
-curve is lifted from there (`coarsening`).
+curve is mapped from there to the fine mesh (`coarsening`).
 """
 
 from __future__ import annotations

@@ -293,12 +293,6 @@ def legs_alternate(order, closed):
     return any(first[0] < second[0] < first[1] < second[1] for first in pairs for second in pairs)
 
 
-def test_unknown_order_is_refused(small_ball):
-    points = locate_control_points(small_ball, [0, 5, 9], closed=True)
-    with pytest.raises(nicmm.ArgumentError, match="order is 'random'"):
-        build_initial_loop(small_ball, points, "random")
-
-
 def interior_vertices(mesh):
     """Vertices off the boundary."""
     sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)

@@ -1,0 +1,99 @@
+"""The surface numbers its vertices: other numbers, places and sizes of a mesh change nothing."""
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.geometry.numbering import frame_coordinates, renumbered, uniform_hash
+from tests.core.checks import apart, random_surface_points
+
+
+def shuffled(mesh, seed):
+    """The mesh with vertices and faces in another order, and the new number of each vertex."""
+    generator = np.random.default_rng(seed)
+    number = generator.permutation(len(mesh.vertices))
+    vertices = np.empty_like(mesh.vertices)
+    vertices[number] = mesh.vertices
+    faces = number[mesh.faces][generator.permutation(len(mesh.faces))]
+    return nicmm.Mesh(vertices, np.roll(faces, int(seed), axis=1)), number
+
+
+def rotation(seed):
+    turned, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return turned * np.sign(np.linalg.det(turned))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shuffled_meshes_become_the_same(body, seed):
+    one, other = renumbered(body), renumbered(shuffled(body, seed)[0])
+    np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
+    np.testing.assert_array_equal(one.mesh.faces, other.mesh.faces)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rigid_motions_and_scales_keep_the_numbers(body, seed):
+    moved = nicmm.Mesh(3.7 * body.vertices @ rotation(seed).T + [5.0, -2.0, 1.0], body.faces)
+    np.testing.assert_array_equal(renumbered(moved).number, renumbered(body).number)
+    np.testing.assert_array_equal(frame_coordinates(moved), frame_coordinates(body))
+
+
+def test_points_values_and_curves_are_mapped(surface):
+    there = renumbered(surface)
+    points = random_surface_points(surface, 7, 0)
+    np.testing.assert_allclose(
+        there.points(points).positions(there.mesh), points.positions(surface), atol=1e-15
+    )
+    values = there.values(surface.vertices[:, 0].copy())
+    np.testing.assert_array_equal(values, there.mesh.vertices[:, 0])
+    assert there.values(None) is None
+    normals = there.mesh.face_normals
+    np.testing.assert_allclose(normals, surface.face_normals[there.face], atol=1e-12)
+    chosen = np.flatnonzero(there.mesh.referenced)[[3, 40, 80]]
+    curve = nicmm.design_curve(there.mesh, chosen, order="shortest").curves[0]
+    back = there.curve(curve)
+    np.testing.assert_allclose(back.points, curve.points, atol=1e-12 * surface.diagonal)
+
+
+def test_hash_is_uniform_and_knows_every_bit():
+    coordinates = np.stack(np.meshgrid(*[np.arange(-20, 20)] * 3), axis=-1).reshape(-1, 3)
+    found = uniform_hash(coordinates)
+    assert 0.0 < found.min() and found.max() < 1.0
+    assert len(np.unique(found)) == len(found)
+    share, _ = np.histogram(found, bins=20, range=(0.0, 1.0))
+    assert np.abs(share / len(found) - 0.05).max() < 0.005
+    beside = uniform_hash(coordinates + [1, 0, 0])
+    assert abs(np.corrcoef(found, beside)[0, 1]) < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("faces", [500, 4000])
+@pytest.mark.parametrize("closed", [True, False])
+def test_numbers_of_a_mesh_do_not_decide_the_course(faces, closed):
+    """On small meshes and on those with a coarse mesh, whatever the order of points, too."""
+    moved = []
+    for seed in range(4):
+        mesh = shapes.creature(seed, resolution=32, faces=faces)
+        generator = np.random.default_rng(seed)
+        chosen = generator.choice(len(mesh.vertices), 5, replace=False)
+        curve = nicmm.design_curve(mesh, chosen, order="shortest", closed=closed).curves[0]
+        other, number = shuffled(mesh, seed + 1)
+        points = generator.permutation(number[chosen])
+        again = nicmm.design_curve(other, points, order="shortest", closed=closed).curves[0]
+        moved.append(apart(curve.points, again.points) / mesh.diagonal)
+    assert np.median(moved) < 1e-6
+    assert max(moved) < 0.01
+
+
+@pytest.mark.slow
+def test_rigid_motions_do_not_decide_the_course():
+    moved = []
+    for seed in range(6):
+        mesh = shapes.creature(seed, resolution=32, faces=4000)
+        chosen = np.random.default_rng(seed).choice(len(mesh.vertices), 4, replace=False)
+        curve = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
+        turned = nicmm.Mesh(2.0 * mesh.vertices @ rotation(seed).T + [1.0, 2.0, 3.0], mesh.faces)
+        again = nicmm.design_curve(turned, chosen, order="shortest").curves[0]
+        back = ((again.points - [1.0, 2.0, 3.0]) @ rotation(seed)) / 2.0
+        moved.append(apart(curve.points, back) / mesh.diagonal)
+    assert np.median(moved) < 1e-6
