@@ -22,6 +22,9 @@ from .tolerances import TINY
 RESOLUTION = 1e-7
 """Of coordinates that are compared, in square roots of the area: far coarser than rounding."""
 
+FARTHEST = 2.0**60
+"""Greatest coordinate that is told from others."""
+
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface is symmetric about the plane across it."""
 
@@ -92,7 +95,9 @@ def frame_coordinates(mesh: Mesh) -> IntArray:
     signs = np.where(np.abs(frame.skewness) > SYMMETRIC, frame.skewness, largest)
     axes = axes * np.where(signs < 0.0, -1.0, 1.0)
     unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
-    return np.round((mesh.vertices - frame.centre) @ axes / unit).astype(np.int64)
+    with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
+        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes / unit)
+    return np.round(places.clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
 def test_a_slab_finds_the_nearest_seeds_within_its_margin(bumpy, monkeypatch, margin):
     """Exactly those that the whole mesh has at distances up to the margin."""
     surface = nicmm.Mesh(*bumpy)
-    graph = coarse_mesh._edge_graph(surface)
+    graph = coarse_mesh._edge_graph(surface, np.zeros(len(surface.vertices)))
     seed = np.sort(np.random.default_rng(0).choice(len(surface.vertices), 40, replace=False))
     distance, _, source = csgraph.dijkstra(
         graph, directed=False, indices=seed, min_only=True, return_predecessors=True

@@ -115,8 +115,11 @@ def test_shortest_order_is_that_of_the_distances(ball):
     points = locate_control_points(ball, nearest_vertices(ball, circle(angles)), closed=True)
     _, loop = build_initial_loop(ball, points, "shortest")
     chord = np.linalg.norm(circle(angles)[:, None] - circle(angles)[None], axis=2)
-    expected = shortest_order(chord, closed=True)
-    assert loop.order.tolist() in (expected.tolist(), [0, *expected[:0:-1].tolist()])
+    expected = shortest_order(chord, closed=True).tolist()
+    # On the mesh the points are not quite evenly spaced, so the tour may start at another one.
+    found = loop.order.tolist()
+    found = np.roll(found, -found.index(expected[0])).tolist()
+    assert found in (expected, [expected[0], *expected[:0:-1]])
 
 
 SURFACES = {
