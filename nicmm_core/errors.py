@@ -5,9 +5,32 @@ Every message names the argument, says what was found and what would mend it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PointName:
+    """A point by its argument and its index there, as messages name it."""
+
+    argument: str
+    index: int
+
+    def __str__(self) -> str:
+        return f"{self.argument}[{self.index}]"
+
 
 class NicmmError(Exception):
-    """Root of every error that this package raises for what it was given."""
+    """Root of every error that this package raises for what it was given.
+
+    Attributes
+    ----------
+    points : tuple of PointName
+        The points that the message names.
+    """
+
+    def __init__(self, message: str, *points: PointName) -> None:
+        super().__init__(message)
+        self.points = points
 
 
 class MeshError(NicmmError):

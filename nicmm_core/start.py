@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from .errors import CurveError
+from .errors import CurveError, PointName
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve, curve_on_mesh
@@ -157,10 +157,11 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
     distance = np.linalg.norm(away, axis=1)
     longest = LONGEST_MOVE * curve.length
     if distance.max() > longest:
-        worst = int(distance.argmax())
+        worst = PointName("control_points", int(visited[distance.argmax()]))
         raise CurveError(
-            f"control_points[{visited[worst]}] is {distance[worst]:g} from where start passes it, "
-            f"more than {longest:g}, which is {LONGEST_MOVE:g} of the curve's length{ANEW}"
+            f"{worst} is {distance.max():g} from where start passes it, more than {longest:g}, "
+            f"which is {LONGEST_MOVE:g} of the curve's length{ANEW}",
+            worst,
         )
 
 

@@ -4,7 +4,6 @@
 Blender keeps a separate copy of a mesh that is being edited: call `synchronise` first.
 """
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,13 +23,11 @@ def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
 
     `vertices` are the indices of the vertices that the control points are at, if they are.
     """
-
-    def point(found: re.Match) -> str:
-        number = int(found[1])
-        name = f"point {number + 1}"
-        return name if vertices is None else f"{name} (vertex {vertices[number]})"
-
-    text = re.sub(r"control_points\[(\d+)\]", point, str(error))
+    text = str(error)
+    for point in getattr(error, "points", ()):
+        if point.argument == "control_points":
+            at = "" if vertices is None else f" (vertex {vertices[point.index]})"
+            text = text.replace(str(point), f"point {point.index + 1}{at}")
     text = text.replace("control_points has", "there are").replace("control_points", "the points")
     if type(error).__name__ == "UnreachableError" and obstacle_group:
         text += f' (obstacles: the vertex group "{obstacle_group}")'

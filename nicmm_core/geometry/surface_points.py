@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from ..errors import ControlPointError, UnreachableError
+from ..errors import ControlPointError, PointName, UnreachableError
 from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
@@ -74,19 +74,20 @@ def locate_control_points(
     """
     points = locate_points(mesh, control_points, "control_points")
     _check_count(len(points), closed)
-    check_distinct(mesh, points, _names(points))
+    check_distinct(mesh, points, control_point_names(np.arange(len(points))))
     if connected:
         check_connected(mesh, points)
     return points
 
 
-def _names(points: SurfacePoints) -> list[str]:
-    return [f"control_points[{index}]" for index in range(len(points))]
+def control_point_names(controls: IntArray) -> list[PointName]:
+    """What messages call control points, by their indices."""
+    return [PointName("control_points", index) for index in controls.tolist()]
 
 
 def check_connected(mesh: Mesh, points: SurfacePoints) -> None:
     """Refuse control points on different components."""
-    check_one_component(mesh, points, _names(points))
+    check_one_component(mesh, points, control_point_names(np.arange(len(points))))
 
 
 def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> SurfacePoints:
@@ -168,9 +169,11 @@ def _points_at_vertices(mesh: Mesh, indices: IntArray, name: str) -> SurfacePoin
     _check_range(name, indices, len(mesh.vertices), "vertices")
     loose = ~mesh.referenced[indices]
     if loose.any():
+        first = PointName(name, int(loose.argmax()))
         raise ControlPointError(
-            f"{name}[{int(loose.argmax())}] = {indices[loose][0]} is a vertex that no "
-            "face uses, so it is off the surface; choose a vertex of a face"
+            f"{first} = {indices[loose][0]} is a vertex that no face uses, so it is off the "
+            "surface; choose a vertex of a face",
+            first,
         )
     around = mesh.vertex_faces
     faces = around.indices[around.indptr[indices]].astype(np.int64)
@@ -181,9 +184,8 @@ def _points_at_vertices(mesh: Mesh, indices: IntArray, name: str) -> SurfacePoin
 def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoints:
     bad = ~np.isfinite(positions).all(axis=1)
     if bad.any():
-        raise ControlPointError(
-            f"{name}[{int(bad.argmax())}] is NaN or infinite; pass finite positions"
-        )
+        first = PointName(name, int(bad.argmax()))
+        raise ControlPointError(f"{first} is NaN or infinite; pass finite positions", first)
     # What is far from the box is far from the surface; so far that squares overflow, no nearest
     # point would be found.
     corners = mesh.vertices[mesh.referenced]
@@ -193,10 +195,11 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
         points, distance = nearest_points(mesh, positions)
     off = distance > tolerances.ON_SURFACE * mesh.diagonal
     if off.any():
-        first = int(off.argmax())
+        first = PointName(name, int(off.argmax()))
         raise ControlPointError(
-            f"{name}[{first}] is off the surface by at least {distance[first]:.3g}, more than "
-            f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first"
+            f"{first} is off the surface by at least {distance[first.index]:.3g}, more than "
+            f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first",
+            first,
         )
     flat = ~np.isfinite(points.barycentric).all(axis=1)
     for place in np.flatnonzero(flat):
@@ -299,10 +302,11 @@ def first_hits(
 def _check_range(name: str, indices: IntArray, limit: int, kind: str) -> None:
     outside = (indices < 0) | (indices >= limit)
     if outside.any():
-        first = int(outside.argmax())
+        first = PointName(name, int(outside.argmax()))
         raise ControlPointError(
-            f"{name}[{first}] = {indices[first]} is out of range; the mesh has {limit} {kind}, "
-            f"so indices must lie in 0 … {limit - 1}"
+            f"{first} = {indices[first.index]} is out of range; the mesh has {limit} {kind}, "
+            f"so indices must lie in 0 … {limit - 1}",
+            first,
         )
 
 
@@ -320,7 +324,7 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
     return SurfacePoints(points.faces, barycentric / barycentric.sum(axis=1, keepdims=True))
 
 
-def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
+def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
     """Refuse two points that are the same."""
     if len(points) < 2:
         return
@@ -333,19 +337,24 @@ def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
         second = int(nearest[first][nearest[first] != first][0])
         raise ControlPointError(
             f"{names[first]} and {names[second]} are the same point; "
-            "remove one of them (a closed curve returns to its first point by itself)"
+            "remove one of them (a closed curve returns to its first point by itself)",
+            names[first],
+            names[second],
         )
 
 
-def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[str]) -> None:
+def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
     """Refuse points on different components."""
     component = mesh.face_component[points.faces]
     other = component != component[0]
     if other.any():
+        apart = names[int(other.argmax())]
         raise UnreachableError(
-            f"{names[0]} and {names[int(other.argmax())]} lie on different "
-            "components of the mesh, so no curve joins them; join the components, or merge "
-            "vertices by distance where only hair-thin gaps part them"
+            f"{names[0]} and {apart} lie on different components of the mesh, so no curve joins "
+            "them; join the components, or merge vertices by distance where only hair-thin gaps "
+            "part them",
+            names[0],
+            apart,
         )
 
 

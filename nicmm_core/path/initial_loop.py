@@ -19,11 +19,11 @@ from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, control_point_names
 from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
 from .simple_path import find_path
-from .via_points import ViaPoints, Waypoints, names_of, with_via_points
+from .via_points import ViaPoints, Waypoints, with_via_points
 from .virtual_splits import SplitMesh, WorkingMesh
 from .visiting_order import order_along_boundaries, shortest_order
 
@@ -110,7 +110,9 @@ def build_initial_loop(
     tours = _Tours(mesh, points, closed)
     path, failure = None, None
     for visit in tours.of(order):
-        waypoints = Waypoints(points[visit], np.ones(len(points), dtype=bool), names_of(visit))
+        waypoints = Waypoints(
+            points[visit], np.ones(len(points), dtype=bool), control_point_names(visit)
+        )
         if via_points is not None:
             waypoints = with_via_points(mesh, points, via_points, order, closed)
         try:
@@ -119,13 +121,15 @@ def build_initial_loop(
         except UnreachableError as error:
             failure = error
     if path is None:
-        what = str(failure)
+        what, named = str(failure), []
         if isinstance(failure, CrossingError):
             names, leg = waypoints.names, failure.leg
-            here, there = names[leg], names[(leg + 1) % len(names)]
-            what = f"{here} cannot be joined to {there} without crossing the rest of the curve"
+            named = [names[leg], names[(leg + 1) % len(names)]]
+            what = (
+                f"{named[0]} cannot be joined to {named[1]} without crossing the rest of the curve"
+            )
         advice = _advice(mesh, points, tours, visit, phi_fea, not waypoints.is_control.all())
-        raise UnreachableError(f"{what}; {advice}") from failure
+        raise UnreachableError(f"{what}; {advice}", *named) from failure
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
     loop, zigzag = refine_along(split, component, path.vertices, closed, pieces)

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ArgumentError
-from ..geometry.array_types import BoolArray, IntArray
+from ..errors import ArgumentError, PointName
+from ..geometry.array_types import BoolArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import (
     SurfacePoints,
     check_distinct,
     check_one_component,
+    control_point_names,
     locate_points,
 )
 
@@ -40,18 +41,13 @@ class Waypoints:
     ----------
     points : SurfacePoints
     is_control : (k,) bool array
-    names : list of str
+    names : list of PointName
         Their names in messages.
     """
 
     points: SurfacePoints
     is_control: BoolArray
-    names: list[str]
-
-
-def names_of(controls: IntArray) -> list[str]:
-    """Names of control points in messages."""
-    return [f"control_points[{index}]" for index in controls]
+    names: list[PointName]
 
 
 def located_via_points(
@@ -116,14 +112,14 @@ def with_via_points(
         If a via point lies on another component.
     """
     located = located_via_points(mesh, points, via_points, order, closed)
-    controls = names_of(np.arange(len(points)))
+    controls = control_point_names(np.arange(len(points)))
     faces, barycentric, is_control, names = [], [], [], []
     for index, control in enumerate(controls):
         via = located.get(index, SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3))))
         faces += [points.faces[index : index + 1], via.faces]
         barycentric += [points.barycentric[index : index + 1], via.barycentric]
         is_control += [True] + [False] * len(via)
-        names += [control, *(f"via_points[{index}][{place}]" for place in range(len(via)))]
+        names += [control, *(PointName(f"via_points[{index}]", place) for place in range(len(via)))]
     together = SurfacePoints(np.concatenate(faces), np.concatenate(barycentric))
     check_distinct(mesh, together, names)
     check_one_component(mesh, together, names)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import UnreachableError
+from ..errors import PointName, UnreachableError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..level_set.redistancing import build_distance_surface, spread
@@ -76,19 +76,23 @@ def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
     named : dict of str to SurfacePoints
         Points by the argument that they come from.
     """
-    component: dict[str, set[int]] = {}
-    for name, points in named.items():
+    component: dict[PointName, set[int]] = {}
+    for argument, points in named.items():
         for index, point in enumerate(free.holding(points)):
+            name = PointName(argument, index)
             if not len(point):
                 raise UnreachableError(
-                    f"{name}[{index}] lies inside an obstacle of weight 1, or closer to one than "
-                    "the clearance; move it, or paint less"
+                    f"{name} lies inside an obstacle of weight 1, or closer to one than the "
+                    "clearance; move it, or paint less",
+                    name,
                 )
-            component[f"{name}[{index}]"] = set(free.mesh.face_component[point.faces].tolist())
+            component[name] = set(free.mesh.face_component[point.faces].tolist())
     first, common = next(iter(component.items()))
     for name, own in component.items():
         if not own & common:
             raise UnreachableError(
                 f"obstacles of weight 1 separate {name} from {first}; leave a way between them, or "
-                "lower the weights there"
+                "lower the weights there",
+                name,
+                first,
             )
