@@ -1,9 +1,8 @@
 """What moves a curve on degraded meshes: the faces, or another course that is chosen there.
 
 A curve on the clean mesh names faces and barycentrics, so it is a curve on the degraded one too.
-Where relaxation begins with it, it can only be the faces that move it. And on the clean mesh itself
-the course may be another one where the vertices are given in another order, since the coarse mesh
-draws its cells from them by chance.
+Where relaxation begins with it, it can only be the faces that move it. On the clean mesh itself the
+order of the vertices must not move it.
 """
 
 from __future__ import annotations
