@@ -15,7 +15,7 @@ from .design_result import Design
 from .errors import CurveError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, checked_curve
+from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.surface_points import SurfacePoints, in_faces
 from .repair.mapped_mesh import MappedMesh
@@ -116,24 +116,27 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
             )
         start = start.curves[0]
     original = mapped.original
-    faces, barycentric, segment_faces = checked_curve(original, start)
-    index = np.asarray(start.control_index)
-    if len(index) == 0 or (index < 0).any() or (index >= len(faces)).any():
+    curve, segment_faces = checked_curve(original, start)
+    index = curve.control_index
+    first = int(index.argmin()) if curve.closed and len(index) else 0
+    if len(index) < 2 or (index < 0).any() or (np.diff(np.roll(index, -first)) <= 0).any():
         raise CurveError(
-            f"start has the control_index {index.tolist()}; pass a curve that passes all its "
-            "control points"
+            f"start has the control_index {index.tolist()}; pass a curve that passes at least two "
+            "control points, all of them, each once and in order"
         )
-    points = SurfacePoints(faces, barycentric)
-    away = np.abs(points.positions(original) - np.asarray(start.points)).max(initial=0.0)
+    points = SurfacePoints(curve.faces, curve.barycentric)
+    away = np.abs(points.positions(original) - curve.points).max(initial=0.0)
     if not away <= tolerances.SAME_CURVE * original.diagonal:
         raise CurveError(
             f"start lies on another mesh: its points are up to {away:g} from where their faces and "
             "coordinates are on this one; pass the mesh that it was designed on"
         )
-    if not start.closed:
-        segment_faces[-1] = faces[-1]
+    if not curve.closed:
+        segment_faces[-1] = curve.faces[-1]
     points = in_faces(original, points, segment_faces)
-    curve = replace(start, faces=points.faces, barycentric=points.barycentric)
+    curve = replace(curve, faces=points.faces, barycentric=points.barycentric)
+    if not curve.closed:
+        curve = _between_ends(original, curve)
     carried = mapped.carried(curve)
     if carried is None:
         raise CurveError(
@@ -141,6 +144,13 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
             f"curves, or passes a non-manifold edge on its way{ANEW}"
         )
     return carried
+
+
+def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
+    """An open curve from its first control point to its last one."""
+    index = curve.control_index
+    kept = slice(index[0], index[-1] + 1)
+    return curve_on_mesh(mesh, False, curve.faces[kept], curve.barycentric[kept], index - index[0])
 
 
 def design_on_original(mapped: MappedMesh, design: Design) -> Design:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh
+from .mesh import Mesh, real_array
 from .surface_points import SurfacePoints, in_faces
 from .tolerances import BARYCENTRIC_SUM
 
@@ -73,10 +73,11 @@ def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
     """The point some share of the way from one point of a curve to the next, in a face of both."""
-    faces, barycentric, segment_faces = checked_curve(mesh, curve)
-    ends = np.array([segment, (segment + 1) % len(faces)])
+    curve, segment_faces = checked_curve(mesh, curve)
+    ends = np.array([segment, (segment + 1) % len(curve.faces)])
     there = segment_faces[[segment, segment]]
-    both = in_faces(mesh, SurfacePoints(faces[ends], barycentric[ends]), there).barycentric
+    points = SurfacePoints(curve.faces[ends], curve.barycentric[ends])
+    both = in_faces(mesh, points, there).barycentric
     return SurfacePoints(there[:1], (1.0 - share) * both[:1] + share * both[1:])
 
 
@@ -87,20 +88,16 @@ def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
-def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray, IntArray]:
-    """Faces, (n,), and coordinates, (n, 3), of a curve's points, and faces of its segments, (n,).
+def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArray]:
+    """A curve on a mesh with arrays of the right types, and faces of its segments, (n,).
 
     Raises
     ------
     CurveError
         If the curve does not lie on this mesh.
     """
-    faces, barycentric = np.asarray(curve.faces), np.asarray(curve.barycentric, dtype=np.float64)
-    if faces.ndim != 1 or barycentric.shape != (len(faces), 3):
-        raise CurveError(
-            f"curve has faces of shape {faces.shape} and barycentric of shape "
-            f"{barycentric.shape}; pass (n,) and (n, 3)"
-        )
+    curve = _readable(curve)
+    faces, barycentric = curve.faces, curve.barycentric
     least = 3 if curve.closed else 2
     if len(faces) < least:
         raise CurveError(f"curve has {len(faces)} points, too few; it needs {least}")
@@ -113,9 +110,39 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[IntArray, FloatArray
             f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
             f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
         )
-    faces = faces.astype(np.int64)
     barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDING))
-    return faces, barycentric, _segment_faces(mesh, curve.closed, faces, barycentric)
+    curve = replace(curve, barycentric=barycentric)
+    return curve, _segment_faces(mesh, curve.closed, faces, barycentric)
+
+
+def _readable(curve: SurfaceCurve) -> SurfaceCurve:
+    """The curve with arrays of the right types and shapes, or a CurveError."""
+    if not isinstance(curve.closed, bool | np.bool_):
+        raise CurveError(f"curve.closed is {curve.closed!r}; pass True or False")
+    values: dict[str, FloatArray] = {}
+    for name in ("faces", "barycentric", "points", "control_index"):
+        try:
+            values[name] = real_array(getattr(curve, name))
+        except (TypeError, ValueError) as error:
+            raise CurveError(f"curve.{name} cannot be read as numbers ({error})") from error
+    n = values["faces"].size
+    shapes = {"faces": (n,), "barycentric": (n, 3), "points": (n, 3)}
+    for name, shape in shapes.items():
+        if values[name].shape != shape:
+            raise CurveError(f"curve.{name} has shape {values[name].shape}; pass {shape}")
+    index = values["control_index"]
+    for name, whole in (("faces", values["faces"]), ("control_index", index)):
+        if whole.ndim != 1 or not (np.abs(whole) < 2.0**53).all() or (whole % 1.0).any():
+            raise CurveError(f"curve.{name} is not an array of whole numbers, one for each point")
+    if (index < -1).any() or (index >= n).any():
+        raise CurveError(f"curve.control_index has values outside of -1 … {n - 1}")
+    return SurfaceCurve(
+        bool(curve.closed),
+        values["faces"].astype(np.int64),
+        values["barycentric"],
+        values["points"],
+        index.astype(np.int64),
+    )
 
 
 def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatArray:

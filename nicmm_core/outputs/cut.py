@@ -173,9 +173,10 @@ def cut_mesh(
         raise ArgumentError(f"snap is {snap!r}; pass a number in 0 … {LARGEST_SNAP:g}")
     if not 0.0 <= deviation < np.inf:
         raise ArgumentError(f"deviation is {deviation!r}; pass a length of at least 0")
-    faces, barycentric, segment_faces = checked_curve(mesh, curve)
+    curve, segment_faces = checked_curve(mesh, curve)
+    faces, barycentric = curve.faces, curve.barycentric
     wanted = np.zeros(len(faces), dtype=bool)
-    wanted[np.asarray(curve.control_index)[np.asarray(curve.control_index) >= 0]] = True
+    wanted[curve.control_index[curve.control_index >= 0]] = True
     exact = np.zeros(len(faces), dtype=bool)
     positions = SurfacePoints(faces, barycentric).positions(mesh)
     while True:

@@ -241,6 +241,16 @@ def test_a_curve_of_an_earlier_session(ball):
     assert_valid_curve(ball, design.curves[0], moved.positions(ball))
 
 
+@pytest.mark.parametrize("kept", [slice(1, 4), slice(0, 3), slice(2, 5)])
+def test_an_open_curve_ends_at_the_control_points_that_it_names(ball, kept):
+    points = on_ball(ball)
+    curve = nicmm.design_curve(ball, points, closed=False).curves[0]
+    shorter = replace(curve, control_index=curve.control_index[kept])
+    left = points[np.arange(5)[kept]]
+    now = nicmm.Designer(ball).design(left, closed=False, start=shorter)
+    assert_valid_curve(ball, now.curves[0], left.positions(ball), closed=False)
+
+
 def test_points_of_a_shortest_curve_in_the_order_visited(body):
     """As an editor keeps them: the start is a Design whose points were named in another order."""
     designer = nicmm.Designer(body)
@@ -344,8 +354,9 @@ class TestRefusals:
     def test_what_is_no_curve(self, ball):
         points = on_ball(ball)
         start = nicmm.design_curve(ball, points).curves[0]
-        lost = replace(start, control_index=np.array([0, -1, 5]))
-        self.refused(ball, points, "control_index", start=lost)
+        for index in ([0, -1, 5], [0], [], [5, 5, 9], [9, 3, 20]):
+            lost = replace(start, control_index=np.array(index, dtype=int))
+            self.refused(ball, points, "control_index", start=lost)
         twice = np.concatenate([np.arange(len(start.faces))] * 2)
         wound = curve_on_mesh(
             ball, True, start.faces[twice], start.barycentric[twice], start.control_index
@@ -354,6 +365,25 @@ class TestRefusals:
         cancelled = nicmm.design_curve(ball, points, progress=lambda *_: False)
         if not cancelled.curves:
             self.refused(ball, points, "has 0 curves", start=cancelled)
+
+    @pytest.mark.parametrize("name", ["faces", "barycentric", "points", "control_index", "closed"])
+    def test_fields_of_any_kind(self, small_ball, name):
+        """Whatever they hold, it is a curve that can be gone on from, or a typed error."""
+        chosen = [3, 60, 100]
+        start = nicmm.design_curve(small_ball, chosen).curves[0]
+        whole = getattr(start, name)
+        others = [None, "x", [], 0, 2.5, np.nan, [1, [2]], ["a"], object(), {}, [10**30]]
+        if isinstance(whole, np.ndarray):
+            others += [whole[:-1], whole[None], whole.T, whole + 0.5, -whole, 7 * whole, 1j * whole]
+            others += [whole * np.nan, whole.astype(object), whole[::-1], whole + 10**6]
+        for other in others:
+            try:
+                changed = replace(start, **{name: other})
+                now = nicmm.Designer(small_ball).design(chosen, start=changed)
+            except nicmm.CurveError as error:
+                assert "start" in str(error) or "curve" in str(error)
+            else:
+                assert_valid_curve(small_ball, now.curves[0], small_ball.vertices[chosen])
 
     @pytest.mark.parametrize("bad", [0, -1, 2.5, True, "3"])
     def test_iterations(self, ball, bad):
