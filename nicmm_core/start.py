@@ -258,7 +258,8 @@ class _Line:
         step = np.roll(start, -1, axis=0) - start
         start, step = start[: len(self.arc) - 1], step[: len(self.arc) - 1]
         lengths = np.maximum(np.diff(self.arc), tolerances.TINY)
-        share = ((position - start) * step).sum(axis=1) / lengths**2
+        squared = (step * step).sum(axis=1)
+        share = ((position - start) * step).sum(axis=1) / np.where(squared > 0.0, squared, 1.0)
         begin, end = (low - self.arc[:-1]) / lengths, (high - self.arc[:-1]) / lengths
         share = np.clip(share, np.clip(begin, 0.0, 1.0), np.clip(end, 0.0, 1.0))
         distance = np.linalg.norm(start + share[:, None] * step - position, axis=1)
@@ -269,14 +270,17 @@ class _Line:
     def with_points(self, arcs: FloatArray) -> SurfaceCurve:
         """The curve with control points at ascending arc lengths; an open one ends at them."""
         n = len(self.polyline)
+        apart = np.abs(self.arc[:n, None] - arcs)
+        at_point = apart <= tolerances.AT_ONE_PLACE * self.mesh.diagonal
+        # Rounding must not put a point of the polyline at the end of the segment before it.
+        arcs = np.where(at_point.any(axis=0), self.arc[apart.argmin(axis=0)], arcs)
         segment = np.clip(np.searchsorted(self.arc, arcs, side="right") - 1, 0, len(self.arc) - 2)
         lengths = np.maximum(np.diff(self.arc)[segment], tolerances.TINY)
         share = np.clip((arcs - self.arc[segment]) / lengths, 0.0, 1.0)[:, None]
         faces = self.polyline.faces[segment]
         end = in_faces(self.mesh, self.polyline[(segment + 1) % n], faces).barycentric
         barycentric = (1.0 - share) * self.polyline.barycentric[segment] + share * end
-        near = np.abs(self.arc[:n, None] - arcs).min(axis=1)
-        kept = near > tolerances.AT_ONE_PLACE * self.mesh.diagonal
+        kept = ~at_point.any(axis=1)
         if not self.curve.closed:
             kept &= (self.arc[:n] > arcs[0]) & (self.arc[:n] < arcs[-1])
         at = np.concatenate([arcs, self.arc[:n][kept]])

@@ -11,7 +11,7 @@ import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +151,60 @@ def _arguments(generator: np.random.Generator, result: Answer) -> None:
     _designed(generator, result, asked, points, arguments)
 
 
+def _start(generator: np.random.Generator, result: Answer) -> None:
+    """Designs that go on from one another, and from what is no curve on the mesh."""
+    mesh = _any_mesh(generator)
+    designer = nicmm.Designer(mesh)
+    points: Any = _vertices_of_one_component(generator, mesh)
+    arguments: dict[str, Any] = {
+        "closed": bool(generator.integers(2)),
+        "order": _chosen(generator, ("given", "shortest")),
+    }
+    start: Any = designer.design(points, **arguments)
+    for _ in range(3):
+        points = points.copy()
+        match generator.integers(4):
+            case 0:
+                beside = np.unique(mesh.faces[mesh.faces_at(points[:1])])
+                points[0] = _chosen(generator, beside)
+            case 1:
+                points = np.append(points, generator.choice(np.unique(mesh.faces)))
+            case 2 if len(points) > 2:
+                points = np.delete(points, generator.integers(len(points)))
+        given = arguments | {"start": _hostile_start(generator, start)}
+        if generator.random() < 0.5:
+            given["max_iterations"] = int(generator.integers(1, 6))
+        if generator.random() < 0.2:
+            given["obstacles"] = (generator.random(len(mesh.vertices)) < 0.1).astype(float)
+        try:
+            start = _ask(designer, result, points, given) or start
+        except nicmm.NicmmError:
+            continue
+
+
+def _hostile_start(generator: np.random.Generator, start: nicmm.Design) -> Any:
+    """A design, its curve, or either with a field that is spoiled."""
+    if generator.random() < 0.4 or not start.curves:
+        return start
+    curve = start.curves[0]
+    names = ("faces", "barycentric", "points", "control_index", "closed")
+    match generator.integers(6):
+        case 0:
+            return _object(generator)
+        case 1:
+            return replace(start, curves=[curve] * int(generator.integers(3)), resumable=None)
+        case 2:
+            return replace(curve, **{_chosen(generator, names): _object(generator)})
+        case 3:
+            name = _chosen(generator, names[:4])
+            return replace(curve, **{name: _cast(generator, getattr(curve, name))})
+        case 4:
+            name = _chosen(generator, names[:4])
+            values = INDICES if name in ("faces", "control_index") else NUMBERS
+            return replace(curve, **{name: _spoiled(generator, getattr(curve, name), values)})
+    return curve
+
+
 def _sequence(generator: np.random.Generator, result: Answer) -> None:
     """Several requests to one designer, some of which fail."""
     mesh = _any_mesh(generator)
@@ -244,6 +298,7 @@ _KINDS: tuple[tuple[str, Callable[[np.random.Generator, Answer], None]], ...] = 
     *[("output", _output)] * 4,
     ("geometry", _geometry),
     ("sequence", _sequence),
+    *[("start", _start)] * 2,
 )
 """Drawn from; what takes long comes seldom."""
 
@@ -261,14 +316,16 @@ def _designed(
     _ask(nicmm.Designer(mesh), result, points, arguments)
 
 
-def _ask(designer: nicmm.Designer, result: Answer, points: Any, arguments: dict[str, Any]) -> None:
+def _ask(
+    designer: nicmm.Designer, result: Answer, points: Any, arguments: dict[str, Any]
+) -> nicmm.Design | None:
     mesh = designer.mesh
     before = mesh.vertices.tobytes(), mesh.faces.tobytes()
     try:
         design = designer.design(points, **arguments)
     except CallersError:
         result.outcome = "the caller's own error"
-        return
+        return None
     if before != (mesh.vertices.tobytes(), mesh.faces.tobytes()):
         result.faults.append("the mesh was changed")
     result.outcome = design.status.name
@@ -279,11 +336,12 @@ def _ask(designer: nicmm.Designer, result: Answer, points: Any, arguments: dict[
         result.faults.append("the field has another shape or is not finite")
     # Only the default method promises one curve.
     if design.status is nicmm.Status.NOT_ONE_CURVE and arguments.get("method", "nicmm") != "nicmm":
-        return
+        return design
     closed = bool(arguments.get("closed", True))
     given = locate_control_points(mesh, points, closed)
     verdict = judge(mesh, design, given, closed, arguments.get("order", "given"))
     result.faults += verdict.faults
+    return design
 
 
 def _sound_mesh(generator: np.random.Generator) -> nicmm.Mesh:
