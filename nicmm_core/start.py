@@ -260,7 +260,8 @@ class _Line:
         lengths = np.maximum(np.diff(self.arc), tolerances.TINY)
         squared = (step * step).sum(axis=1)
         share = ((position - start) * step).sum(axis=1) / np.where(squared > 0.0, squared, 1.0)
-        begin, end = (low - self.arc[:-1]) / lengths, (high - self.arc[:-1]) / lengths
+        with np.errstate(over="ignore"):  # along segments of hardly any length
+            begin, end = (low - self.arc[:-1]) / lengths, (high - self.arc[:-1]) / lengths
         share = np.clip(share, np.clip(begin, 0.0, 1.0), np.clip(end, 0.0, 1.0))
         distance = np.linalg.norm(start + share[:, None] * step - position, axis=1)
         distance[(begin > 1.0) | (end < 0.0)] = np.inf
