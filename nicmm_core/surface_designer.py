@@ -143,7 +143,7 @@ class SurfaceDesigner:
 
     def _start_from_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
-        there = self._renumbered
+        there = self._copy
         found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
         # A level set may touch itself where the mesh is too coarse; the path does not.
@@ -247,7 +247,7 @@ class SurfaceDesigner:
         return curve_surface(self.mesh)
 
     @cached_property
-    def _renumbered(self) -> Renumbered:
+    def _copy(self) -> Renumbered:
         return renumbered(self.mesh)
 
     @cached_property

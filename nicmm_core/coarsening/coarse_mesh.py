@@ -21,7 +21,7 @@ from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
-from ..geometry.numbering import frame_coordinates, renumbered, uniform_hash
+from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..repair.degenerate_faces import flat_faces, with_areas
@@ -156,9 +156,7 @@ def build_coarse_mesh(
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
         raise MeshError("the cells of the coarse mesh meet in no face")
-    there = renumbered(Mesh(mesh.vertices[seed], corners[first]))
-    cell = np.where(cell < 0, -1, there.number[cell])
-    return CoarseMesh(_with_areas(there.mesh), seed[np.argsort(there.number)], cell)
+    return CoarseMesh(_with_areas(Mesh(mesh.vertices[seed], corners[first])), seed, cell)
 
 
 def _with_areas(mesh: Mesh) -> Mesh:

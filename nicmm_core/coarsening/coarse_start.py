@@ -10,11 +10,12 @@ from ..errors import NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
+from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import infer
 from ..progress import subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
-from ..request import Request
+from ..request import Request, renumbered_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import curve_on_fine_mesh
 
@@ -58,6 +59,7 @@ class CoarseStart:
 class _CoarseSurface:
     coarse: CoarseMesh
     surface: CurveSurface
+    copy: Renumbered
 
 
 class CoarseStarts:
@@ -105,10 +107,10 @@ class CoarseStarts:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
         with subrange(COARSE_SHARE, 0.9):
-            zeros = infer(coarse.mesh, on_coarse).zeros
-        if not zeros.is_simple_curve(coarse.mesh, request.closed):
+            zeros = infer(level.copy.mesh, renumbered_request(level.copy, on_coarse)).zeros
+        if not zeros.is_simple_curve(level.copy.mesh, request.closed):
             return None
-        curve = zeros.curves[0]
+        curve = level.copy.curve(zeros.curves[0])
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
         result = curve_on_fine_mesh(
             self._fine, coarse, level.surface, curve, request.points[visited]
@@ -119,7 +121,9 @@ class CoarseStarts:
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
-            self._made[key] = _CoarseSurface(coarse, curve_surface(coarse.mesh))
+            self._made[key] = _CoarseSurface(
+                coarse, curve_surface(coarse.mesh), renumbered(coarse.mesh)
+            )
         return self._made[key]
 
 

@@ -1,21 +1,21 @@
-"""A numbering of vertices and faces that the surface decides, whatever numbers a file gives them.
+"""A copy of a mesh that its surface decides: numbers by place, coordinates in its principal frame.
 
 Which path is found among several of about the same length depends on the order in which vertices
-and faces are visited. Here they are sorted by their places in the surface's principal frame. So a
-mesh that is renumbered, turned, moved or scaled gets the same numbers, up to rounding, unless the
-surface has no such frame, as a ball.
+and faces are visited. Here they are sorted by their places in the principal frame of the surface,
+mirrored if that makes the surface reach farther along each axis. So a mesh that is renumbered,
+rotated, moved, scaled or mirrored has the same copy, up to rounding and scale, unless the surface
+has no such frame, as a ball.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
-from .mesh import Mesh
+from .mesh import LARGEST, Mesh
 from .surface_points import SurfacePoints
 from .tolerances import TINY
 
@@ -31,36 +31,38 @@ SYMMETRIC = 1e-6
 
 @dataclass(frozen=True)
 class Renumbered:
-    """A mesh with other numbers.
+    """A mesh and its copy.
 
     Attributes
     ----------
     original : Mesh
     mesh : Mesh
-        Its first corners are those with the smallest numbers; orientations stay.
+        The copy.
     number : (V,) int array
-        The number of each original vertex.
+        The number that each original vertex has in the copy.
     face : (F,) int array
-        The original face of each face.
-    shift : (F,) int array
-        How far the corners of each face are rotated.
+        The original face of each face of the copy.
+    corner : (F, 3) int array
+        Which corner of that face each corner is.
     """
 
     original: Mesh
     mesh: Mesh
     number: IntArray
     face: IntArray
-    shift: IntArray
+    corner: IntArray
 
     def points(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the original."""
+        """Points of the original on the copy."""
         place = np.empty(len(self.face), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
         faces = place[points.faces]
-        return SurfacePoints(faces, _rotated(points.barycentric, self.shift[faces]))
+        return SurfacePoints(
+            faces, np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
+        )
 
     def values(self, values: FloatArray | None) -> FloatArray | None:
-        """Values at the vertices of the original, (V,)."""
+        """Values at the vertices of the original, (V,), at those of the copy."""
         if values is None:
             return None
         result = np.empty_like(values)
@@ -68,35 +70,39 @@ class Renumbered:
         return result
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
-        """A curve of the mesh as one of the original."""
+        """A curve on the copy as one on the original."""
+        barycentric = np.empty_like(curve.barycentric)
+        np.put_along_axis(barycentric, self.corner[curve.faces], curve.barycentric, axis=1)
         faces = self.face[curve.faces]
-        barycentric = _rotated(curve.barycentric, -self.shift[curve.faces])
         return curve_on_mesh(self.original, curve.closed, faces, barycentric, curve.control_index)
 
 
 def renumbered(mesh: Mesh) -> Renumbered:
-    """A mesh with the numbers that its surface gives."""
+    """The copy of a mesh that its surface decides."""
+    frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
+    axes = frame.signed_axes()
     order = np.lexsort(frame_coordinates(mesh).T[::-1])
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
-    faces = number[mesh.faces]
-    shift = faces.argmin(axis=1)
-    faces = _rotated(faces, shift)
-    face = np.lexsort(faces.T[::-1])
-    return Renumbered(mesh, Mesh(mesh.vertices[order], faces[face]), number, face, shift[face])
+    corner = np.tile(np.arange(3), (len(mesh.faces), 1))
+    if np.linalg.det(axes) < 0.0:
+        corner = corner[:, ::-1]  # in mirrored coordinates faces have the other orientation
+    first = np.take_along_axis(number[mesh.faces], corner, axis=1).argmin(axis=1)
+    corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
+    faces = np.take_along_axis(number[mesh.faces], corner, axis=1)
+    face = np.lexsort(np.sort(faces, axis=1).T[::-1])
+    with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
+        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
+    places = places[order].clip(-LARGEST, LARGEST)
+    return Renumbered(mesh, Mesh(places, faces[face]), number, face, corner[face])
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
     """Places of the vertices in the principal frame, in units of `RESOLUTION`, shape (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
-    axes = frame.axes
-    # A symmetric surface does not say which way an axis points; the given coordinates do.
-    largest = axes[np.abs(axes).argmax(axis=0), np.arange(3)]
-    signs = np.where(np.abs(frame.skewness) > SYMMETRIC, frame.skewness, largest)
-    axes = axes * np.where(signs < 0.0, -1.0, 1.0)
     unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
-        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes / unit)
+        places = np.nan_to_num((mesh.vertices - frame.centre) @ frame.signed_axes() / unit)
     return np.round(places.clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
@@ -119,6 +125,16 @@ class PrincipalFrame:
     deviation: float
     axes: FloatArray
     skewness: FloatArray
+
+    def signed_axes(self) -> FloatArray:
+        """The axes, each pointing to where the surface reaches farther, shape (3, 3).
+
+        Where the surface is symmetric along an axis, that points to where its largest coordinate
+        grows.
+        """
+        largest = self.axes[np.abs(self.axes).argmax(axis=0), np.arange(3)]
+        signs = np.where(np.abs(self.skewness) > SYMMETRIC, self.skewness, largest)
+        return self.axes * np.where(signs < 0.0, -1.0, 1.0)
 
 
 def principal_frame(
@@ -144,12 +160,3 @@ def uniform_hash(coordinates: IntArray) -> FloatArray:
             mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
         mixed ^= mixed >> np.uint64(31)
     return ((mixed >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-
-
-Rows = TypeVar("Rows", FloatArray, IntArray)
-
-
-def _rotated(rows: Rows, shift: IntArray) -> Rows:
-    """Rows of three that begin with another entry."""
-    place = (np.arange(3) + shift[:, None]) % 3
-    return np.take_along_axis(rows, place, axis=1)

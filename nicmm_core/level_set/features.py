@@ -34,8 +34,7 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
     model, unless the axes are undetermined, as those of a ball.
     """
     frame = principal_frame(vertices, faces, face_areas)
-    # An axis has no sign of its own: it points to where the surface reaches farther.
-    axes = frame.axes * np.where(frame.skewness < 0.0, -1.0, 1.0)
+    axes = frame.signed_axes()
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return (vertices - frame.centre) @ axes
 
