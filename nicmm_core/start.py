@@ -102,6 +102,8 @@ def moved_start(
         visited = _nearest_numbering(surface.mesh, curve, visited, request)
     else:
         curve, visited = _with_other_points(surface, curve, request)
+    if request.order == "given" and visited[0] != 0:
+        curve, visited = _begun_at_first(surface, curve, visited)
     _check_moves(surface.mesh, curve, visited, request.points)
     points = request.points[visited]
     moved = moved_along(surface, curve, points)
@@ -186,6 +188,16 @@ def _ascending(numbers: IntArray, closed: bool) -> bool:
     """Whether numbers ascend, on a closed curve from some place on it."""
     first = int(numbers.argmin()) if closed else 0
     return bool((np.diff(np.roll(numbers, -first)) > 0).all())
+
+
+def _begun_at_first(
+    surface: CurveSurface, curve: NodedCurve, visited: IntArray
+) -> tuple[NodedCurve, IntArray]:
+    """A closed curve from its control point 0 on, and which points its control nodes are."""
+    first = int(visited.argmin())
+    whole = curve.surface_curve(surface.mesh)
+    whole = replace(whole, control_index=np.roll(whole.control_index, -first))
+    return noded_curve(surface, whole, WARM.levels[-1]), np.roll(visited, -first)
 
 
 def _with_other_points(

@@ -241,6 +241,28 @@ def test_a_curve_of_an_earlier_session(ball):
     assert_valid_curve(ball, design.curves[0], moved.positions(ball))
 
 
+def test_a_given_order_begins_at_its_first_point(ball):
+    """Whatever point the start begins at, and wherever the first one that is still there is."""
+    designer, points = nicmm.Designer(ball), on_ball(ball)[np.array([3, 4, 0, 1, 2])]
+    for given in (points, points[np.arange(5)[::-1]]):
+        shortest = designer.design(given, order="shortest")
+        visited = shortest.resumable.visited
+        if (np.diff(np.roll(visited, -int(visited.argmin()))) > 0).all():
+            break
+    assert visited[0] != 0
+    now = designer.design(given, start=shortest)
+    assert_valid_curve(ball, now.curves[0], given.positions(ball))
+    now = designer.design(given, start=now)
+    assert_valid_curve(ball, now.curves[0], given.positions(ball))
+    moved = nearest_points(ball, given.positions(ball)[:1] + [0.0, 0.0, 0.1])[0]
+    for count in (4, 5):
+        faces = np.concatenate([moved.faces, given.faces[1:count]])
+        weights = np.concatenate([moved.barycentric, given.barycentric[1:count]])
+        asked = nicmm.SurfacePoints(faces, weights)
+        after = designer.design(asked, start=now)
+        assert_valid_curve(ball, after.curves[0], asked.positions(ball))
+
+
 @pytest.mark.parametrize("kept", [slice(1, 4), slice(0, 3), slice(2, 5)])
 def test_an_open_curve_ends_at_the_control_points_that_it_names(ball, kept):
     points = on_ball(ball)
