@@ -3,8 +3,8 @@
 
 Each folder imports only from those before it: `scene`, `outputs`, `operators`, `tool`, `interface`.
 
-Nothing here loads the core, or a library that it needs, before a curve is asked for: enabling the
-extension stays quick and works where a library is missing, and the operator then says which one.
+Nothing here loads the core, or a library that it needs, before a curve is requested. So the
+extension is enabled quickly even if a library is missing; the operator then reports which one.
 """
 
 from . import command_line, preferences, settings

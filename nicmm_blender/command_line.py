@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c nicmm`: a curve on an object of a file, written to another file.
+"""`blender -c nicmm`: designs a curve on an object of a file and writes another file.
 
-The options are the properties of *Design Curve on Surface*, read from Blender's own description.
+The options are the properties of *Design Curve on Surface*, read from their Blender definitions.
 """
 
 import argparse
@@ -20,10 +20,10 @@ _registered: list = []
 
 
 def main(arguments: list) -> int:
-    """Run the command; 0 when it succeeded, 2 with a message on standard error when it did not."""
+    """Run the command; return 0, or 2 after a message on standard error if it failed."""
     try:
         options = parser().parse_args(arguments)
-    except SystemExit as stopped:  # argparse has written why; Blender wants a number
+    except SystemExit as stopped:  # argparse has printed the reason; Blender expects a number
         return 0 if not stopped.code else FAILED
     try:
         run(options)
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def activate(name: str | None) -> None:
-    """Make an object active in Object Mode; without a name, the one that is active in the file."""
+    """Make the named object, or the file's active object, active in Object Mode."""
     context = bpy.context
     if name is not None:
         chosen = bpy.data.objects.get(name)
@@ -78,7 +78,7 @@ def activate(name: str | None) -> None:
 
 
 def _points(options: argparse.Namespace) -> dict:
-    """The control points, as the operator takes them."""
+    """The control points as arguments of the operator."""
     if options.group is not None:
         return {"point_group": options.group}
     if options.points is not None:
@@ -96,13 +96,13 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--output-file", required=True, metavar="OUT.blend")
     made.add_argument("--object", metavar="NAME", help="default: the active object of the file")
     points = made.add_argument_group(
-        "control points", "By default the vertices that are selected in the file."
+        "control points", "By default the vertices selected in the file."
     ).add_mutually_exclusive_group()
     points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
     points.add_argument(
         "--points",
         metavar="A,B,C",
-        help='vertex indices, from 0, or places in the object\'s own space: "0.5 0 1, 0 0 2, 41"',
+        help='vertex indices, from 0, or positions in the object\'s local space: "0.5 0 1, 0 0 2, 41"',
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = made.add_argument_group("settings", "As in the sidebar.")
@@ -112,7 +112,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _option(described) -> dict:
-    """How argparse takes a Blender property."""
+    """The argparse keywords for a Blender property."""
     # argparse formats its help with %.
     words = {"help": described.description.replace("%", "%%"), "default": None}
     if described.type == "BOOLEAN":

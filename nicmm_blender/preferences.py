@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences of the extension: how it shares the computer, and whether PyTorch was found."""
+"""Preferences of the extension, and a report of the libraries that were found."""
 
 import functools
 import importlib.metadata
@@ -21,8 +21,8 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
 
     patience: FloatProperty(
         name="Wait For",
-        description="How long the window waits for a curve. What takes longer goes on with a "
-        "progress display while the view can be turned, and Esc stops it",
+        description="How long the window waits for a curve. A longer computation continues in "
+        "the background with a progress display, and Esc cancels it",
         default=PATIENCE,
         min=0.0,
         max=10.0,
@@ -30,15 +30,15 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
     )
     kept_meshes: IntProperty(
         name="Meshes Kept in Memory",
-        description="Another curve on one of the last meshes is faster. Each keeps about a "
-        "kilobyte for every vertex",
+        description="Number of recently used meshes to keep in memory, so that further curves "
+        "on them are faster. Each mesh takes about a kilobyte per vertex",
         default=KEPT_MESHES,
         min=0,
         max=64,
     )
     live_delay: FloatProperty(
         name="Live Update After",
-        description="How long a mesh has to rest before its curves are updated",
+        description="How long a mesh must stay unchanged before its curves are updated",
         default=LIVE_DELAY,
         min=0.05,
         max=10.0,
@@ -59,7 +59,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
 
 @functools.cache
 def library_report() -> tuple:
-    """What the extension has found, in lines; loads none of it."""
+    """Lines that list the libraries found, without loading them."""
     lines = []
     for module, name in (("scipy", "SciPy"), ("igl", "libigl")):
         version = _version(module, name)
@@ -69,10 +69,10 @@ def library_report() -> tuple:
     lines.append(
         f"PyTorch {version}: the method NICMM (Paper) can be used"
         if version
-        else "PyTorch was not found. It would add the method NICMM (Paper), which is slower than "
-        "the usual one; nothing else needs it"
+        else "PyTorch was not found. Only the method NICMM (Paper) needs it, which is slower "
+        "than the default method"
     )
-    return (*lines, "Nothing here needs the network")
+    return (*lines, "The extension does not use the network")
 
 
 def _version(module: str, distribution: str) -> str:
@@ -86,14 +86,14 @@ def _version(module: str, distribution: str) -> str:
 
 
 def _get(name: str, default):
-    """A preference; the usual value while the extension is not enabled by its preferences."""
+    """A preference, or its default where the extension is not registered as an add-on."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     found = None if addon is None else addon.preferences
     return default if found is None else getattr(found, name)
 
 
 def patience() -> float:
-    """Seconds that the window waits for a curve before it goes on by turns."""
+    """Seconds that the window waits for a curve before the work continues in time slices."""
     return _get("patience", PATIENCE)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a curve, for the operators and the sidebar: options of the core, and outputs."""
+"""The settings of a curve for the operators and the sidebar: core options and outputs."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
@@ -11,14 +11,14 @@ from .scene import curve_record
 AUTOMATIC = (
     "AUTO",
     "Automatic",
-    "As selected where Blender knows the order of all selected vertices, otherwise the shortest "
-    "way round",
+    "The order of selection where Blender has recorded it for all selected vertices, otherwise "
+    "the shortest order",
 )
-"""An order of Blender's own, before those of the core."""
+"""An order that only the extension has, listed before those of the core."""
 
 
 def properties_of(options) -> dict:
-    """Blender's properties for options of the core, by name; those of points have none."""
+    """Blender properties for core options, by name; options that hold points are left out."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
@@ -27,7 +27,7 @@ def properties_of(options) -> dict:
 
 
 def _property(option):
-    """A Blender property for an option of the core."""
+    """The Blender property for a core option."""
     words = {"name": option.label, "description": option.description}
     if option.kind is Kind.SWITCH:
         return BoolProperty(**words, default=option.default)
@@ -52,13 +52,13 @@ def _property(option):
 
 
 class DesignProperties:
-    """What the operator and the scene's settings have in common: the options of the core."""
+    """The core options, shared by the operator and the scene settings."""
 
     __annotations__ = properties_of(OPTIONS)
 
 
 class EditingProperties:
-    """What can be asked of a curve that is being edited: its points have an order already."""
+    """The options of a curve that is being edited; its points already have an order."""
 
     __annotations__ = properties_of(
         option for option in OPTIONS if option.name not in ("order", "method")
@@ -68,35 +68,35 @@ class EditingProperties:
 def _tube_property(default: bool):
     return BoolProperty(
         name="Tube",
-        description="Show the sticky curve as a mesh round it. Before Blender 5.0 the viewport "
-        "draws hair curves themselves with a few points only",
+        description="Show the sticky curve as a tube mesh. Before Blender 5.0 the viewport "
+        "draws hair curves with only a few points",
         default=default,
     )
 
 
 class OutputProperties:
-    """What becomes of a curve; for a new one and for one that is converted."""
+    """The output of a new curve or of one that is converted."""
 
     output: EnumProperty(
         name="Output",
         description="What the curve becomes",
         items=(
-            ("CURVE", "Curve", "A curve object of polylines. The mesh stays as it is"),
+            ("CURVE", "Curve", "A curve object of polylines. The mesh stays unchanged"),
             (
                 "STICKY",
                 "Sticky Curves",
                 "A hair curves object that follows the mesh when it is deformed. "
-                "The mesh stays as it is",
+                "The mesh stays unchanged",
             ),
-            ("EDGES", "Cut Edges", "Cut the mesh, so that the curve becomes edges of it"),
+            ("EDGES", "Cut Edges", "Cut the mesh so that the curve becomes edges of it"),
             ("REGION", "Region", "The part of the mesh that the curve encloses"),
-            ("PARTS", "Separate Parts", "Cut the mesh and part it along the curve"),
+            ("PARTS", "Separate Parts", "Cut the mesh and separate it along the curve"),
         ),
         default="CURVE",
     )
     thickness: FloatProperty(
         name="Thickness",
-        description="Radius of the drawn curve relative to the size of the mesh. Zero draws a line",
+        description="Radius of the curve relative to the size of the mesh. Zero gives a line",
         default=0.004,
         min=0.0,
         soft_max=0.05,
@@ -121,17 +121,17 @@ class OutputProperties:
             (
                 "POLYGONS",
                 "Polygons",
-                "One polygon on either side of the curve where it is flat enough, as a knife "
-                "leaves it",
+                "One polygon on each side of the curve where the face is flat enough, as with "
+                "the Knife tool",
             ),
-            ("TRIANGLES", "Triangles", "Triangles. The surface stays exactly as Blender draws it"),
+            ("TRIANGLES", "Triangles", "Triangles. The shape of the surface stays exactly the same"),
         ),
         default="POLYGONS",
     )
     simplify: FloatProperty(
         name="Simplify",
-        description="How far cut edges may run from the curve to save vertices inside faces, "
-        "relative to the mean edge length",
+        description="Largest distance between the cut edges and the curve, relative to the mean "
+        "edge length. Larger values give fewer vertices inside faces",
         default=0.01,
         min=0.0,
         soft_max=0.2,
@@ -143,29 +143,29 @@ class OutputProperties:
         name="Region As",
         description="How the region is marked",
         items=(
-            ("SELECTION", "Selection", "Select its faces and nothing else"),
-            ("VERTEX_GROUP", "Vertex Group", "Put its vertices into a new vertex group"),
-            ("FACE_SET", "Face Set", "Make it a new face set for Sculpt Mode"),
+            ("SELECTION", "Selection", "Select only its faces"),
+            ("VERTEX_GROUP", "Vertex Group", "Assign its vertices to a new vertex group"),
+            ("FACE_SET", "Face Set", "Make its faces a new face set for Sculpt Mode"),
         ),
         default="SELECTION",
     )
     region_cut: BoolProperty(
         name="Cut First",
-        description="Cut the mesh along the curve, so that the region ends exactly there. "
-        "Otherwise it takes the faces that are inside by more than half",
+        description="Cut the mesh along the curve so that the region ends exactly there. "
+        "Otherwise the region consists of the faces with more than half of their area inside",
         default=False,
     )
     other_side: BoolProperty(
         name="Other Side",
-        description="Take the side of the curve with the larger area",
+        description="Use the side of the curve with the larger area",
         default=False,
     )
     parts_as: EnumProperty(
         name="Parts As",
-        description="Where the parts go",
+        description="What the parts become",
         items=(
             ("LOOSE", "Loose Parts", "Both stay in this mesh and no longer share vertices"),
-            ("OBJECTS", "Objects", "The part that the curve encloses becomes an object of its own"),
+            ("OBJECTS", "Objects", "The part that the curve encloses becomes a separate object"),
         ),
         default="LOOSE",
     )
@@ -175,22 +175,22 @@ PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotat
 
 
 class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGroup):
-    """Settings of the sidebar panel, kept with the scene."""
+    """Settings of the sidebar panel, saved with the scene."""
 
     tube: _tube_property(not sticky_curves.are_drawn_with_all_points())
 
 
 def choose_tube(operator) -> None:
-    """Begin with a tube where it looks better; for operators that the window calls, not scripts.
+    """Enable *Tube* where strands look coarse; for operators called from the window.
 
-    What the caller has set, or the user chose the last time, stays.
+    A value that the caller has set, or that the user chose last time, is kept.
     """
     if not operator.properties.is_property_set("tube", ghost=False):
         operator.tube = not sticky_curves.are_drawn_with_all_points()
 
 
 def draw(layout, properties, mesh_object) -> None:
-    """Draw the settings for a curve on `mesh_object`, which may be None; for the redo panel."""
+    """Draw the settings for a curve on `mesh_object` or None, in the redo panel."""
     draw_course(layout, properties)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
@@ -202,7 +202,7 @@ def draw(layout, properties, mesh_object) -> None:
 
 
 def draw_course(layout, properties) -> None:
-    """Draw what leads the curve, without its maps."""
+    """Draw the settings of the curve itself, without its maps."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     for name in ("closed", "order", "method", "smoothness"):
@@ -210,14 +210,14 @@ def draw_course(layout, properties) -> None:
 
 
 def draw_clearance(layout, properties) -> None:
-    """Draw the distance from obstacles, greyed out where there are none."""
+    """Draw the clearance, greyed out without obstacles."""
     row = layout.row()
     row.active = bool(properties.obstacle_group)
     row.prop(properties, "clearance")
 
 
 def draw_output(layout, properties) -> None:
-    """Draw what belongs to the output that is chosen."""
+    """Draw the output and its settings."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "output")

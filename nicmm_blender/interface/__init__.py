@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What users see in the sidebar and in menus."""
+"""The sidebar and the menu entries."""

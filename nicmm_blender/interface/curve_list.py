@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of the curves that were designed on a mesh."""
+"""The list of the curves designed on a mesh."""
 
 import bpy
 from bpy.props import IntProperty
@@ -15,7 +15,7 @@ UPDATE_ICON = "FILE_REFRESH"
 
 
 class NICMM_UL_curves(bpy.types.UIList):
-    """All objects of the file, of which the list shows the curves on one mesh"""
+    """All objects of the file, filtered to the curves on one mesh"""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_name):
         row = layout.row(align=True)
@@ -40,13 +40,13 @@ class NICMM_UL_curves(bpy.types.UIList):
 
 
 def _active_index(_window_manager) -> int:
-    """Where the active object is among all objects: the list follows the viewport."""
+    """The index of the active object among all objects, so that the list follows the viewport."""
     active = bpy.context.active_object
     return -1 if active is None else bpy.data.objects.find(active.name)
 
 
 def _activate(_window_manager, index: int) -> None:
-    """Make an object active, as a click on it does; in other modes the mesh must stay active."""
+    """Make an object active, in Object Mode only: in other modes the mesh must stay active."""
     context = bpy.context
     if context.mode == "OBJECT" and index < len(bpy.data.objects):
         chosen = bpy.data.objects[index]
@@ -69,7 +69,7 @@ def register() -> None:
     bpy.utils.register_class(NICMM_UL_curves)
     bpy.types.WindowManager.nicmm_active_curve = IntProperty(
         name="Active Curve",
-        description="The curve that is active in the viewport",
+        description="The active curve in the viewport",
         get=_active_index,
         set=_activate,
         options={"SKIP_SAVE"},

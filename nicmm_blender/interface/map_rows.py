@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of a panel that choose, make and paint a map, and the menus that they open."""
+"""Panel rows to choose, create and paint a map, and their menus."""
 
 import bpy
 
@@ -7,7 +7,7 @@ from ..operators import maps
 
 
 def draw_row(layout, properties, role: str, context, mesh_object) -> None:
-    """Draw the choice of a group with buttons to make and paint it."""
+    """Draw the field of a vertex group with buttons to create and paint it."""
     field = maps.FIELDS[role]
     row = layout.row(align=True)
     row.prop_search(properties, field, mesh_object, "vertex_groups")

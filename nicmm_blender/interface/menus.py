@@ -17,13 +17,13 @@ def draw_in_menu(menu, _context) -> None:
 
 
 def draw_in_context_menu(menu, context) -> None:
-    """The context menu of Edit Mode is one menu for vertices, edges and faces."""
+    """Draw the entries in vertex select mode only: Edit Mode has one context menu for all."""
     if context.tool_settings.mesh_select_mode[0]:
         draw_in_menu(menu, context)
 
 
 def draw_conversions(menu, context) -> None:
-    """One entry for each output, where a designed curve is active."""
+    """Draw one entry for each output if a designed curve is active."""
     if not curve_record.has_record(context.active_object):
         return
     _begin(menu)
@@ -38,7 +38,7 @@ def draw_conversions(menu, context) -> None:
 
 def _begin(menu) -> None:
     menu.layout.separator()
-    # Some of Blender's menus call operators as scripts do; ours ask what suits the window.
+    # Some of Blender's menus set EXEC_REGION_WIN, which would skip `invoke`.
     menu.layout.operator_context = "INVOKE_REGION_WIN"
 
 

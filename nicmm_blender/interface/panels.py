@@ -13,7 +13,7 @@ from . import curve_list, icons, map_rows
 
 
 class SidebarPanel:
-    """The tab of the sidebar that all panels are in."""
+    """The sidebar tab that holds all panels."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -62,7 +62,7 @@ class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
 
 
 class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
-    """The curves that were designed on this mesh"""
+    """The curves designed on this mesh"""
 
     bl_label = "Curves on This Mesh"
     bl_parent_id = "NICMM_PT_design_curve"

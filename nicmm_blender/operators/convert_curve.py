@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that makes something else from a designed curve."""
+"""The operator that converts a designed curve to another output."""
 
 import bpy
 from bpy.props import BoolProperty
@@ -12,7 +12,7 @@ from .long_solves import reporting
 
 
 class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
-    """Turn a designed curve into another one, or into edges, a region or parts of its mesh"""
+    """Convert a designed curve to another kind of curve, or to edges, a region or parts of its mesh"""
 
     bl_idname = "nicmm.convert_curve"
     bl_label = "Convert Designed Curve"

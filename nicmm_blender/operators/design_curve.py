@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that draws a curve through the selected vertices."""
+"""The operator that designs a curve through the selected vertices."""
 
 import bpy
 from bpy.props import StringProperty
@@ -10,7 +10,7 @@ from ..scene import curve_record, design_request, mesh_data
 from . import polls
 from .long_solves import LongSolves
 
-ORDER_NAMES = {  # by the core's name, and whether the points are what is selected
+ORDER_NAMES = {  # by the core's name, and whether the points are the selected vertices
     ("given", True): "in the order of selection",
     ("given", False): "in the order given",
     ("shortest", True): "in the shortest order",
@@ -29,14 +29,14 @@ class NICMM_OT_design_curve(
 
     points: StringProperty(
         name="Points",
-        description="Control points of scripts, instead of the selected vertices: vertex indices "
-        "or places in the object's own space with commas, such as 12, 80, 0.5 0 1",
+        description="Control points instead of the selected vertices, for scripts: vertex indices "
+        "or positions in the object's local space, separated by commas, such as 12, 80, 0.5 0 1",
         options={"HIDDEN", "SKIP_SAVE"},
     )
     point_group: StringProperty(
         name="Point Group",
-        description="Vertex group whose vertices are the control points of scripts, instead of "
-        "the selected vertices",
+        description="Vertex group whose vertices are the control points instead of the selected "
+        "vertices, for scripts",
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
@@ -63,7 +63,7 @@ class NICMM_OT_design_curve(
     def _control_points(self, mesh_object, surface):
         if self.points and self.point_group:
             raise mesh_data.InputError(
-                "points and point_group both say where the control points are. Give one of them"
+                "points and point_group both define the control points. Give only one of them"
             )
         if self.points:
             return mesh_data.given_points(surface, self.points, self.order)

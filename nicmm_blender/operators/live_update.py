@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps curves up to date while their mesh or its weights change.
+"""Updates curves when their mesh or its weights change.
 
-Blender's handlers only note that something has changed. When the mesh has rested, a timer compares
-what each curve was designed on with what is there now (`curve_record.digest`) and designs anew
-those that are out of date, by turns. Writing a curve changes no mesh, and undo brings a curve
-back together with its digest: nothing goes round in circles.
+Blender's handlers only record that something has changed. Once the mesh has stayed unchanged for
+the delay set in the preferences, a timer compares the digest that each curve was designed on with
+the present one (`curve_record.digest`) and designs the outdated curves again, in time slices.
+Writing a curve changes no mesh, and undo restores a curve together with its digest, so an update
+never triggers another one.
 """
 
 import time
@@ -20,20 +21,20 @@ from . import turns
 from .long_solves import TURN, answer_all
 
 PAUSE = 0.01
-"""Seconds that Blender has to itself between two turns."""
+"""Seconds between two turns, in which Blender handles events."""
 
 WAIT = 0.1
-"""Seconds until it is asked again whether curves may be written."""
+"""Seconds until the next check whether curves may be written."""
 
 
 class _Updates:
-    """What has changed and what is being done; no Blender objects, which undo replaces."""
+    """Changes and work in progress; holds no Blender objects, since undo replaces them."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Know of nothing."""
+        """Forget all changes and work."""
         self.changed: set = set()  # of meshes, by their session_uid
         self.everything = False
         self.last_change = 0.0
@@ -43,7 +44,7 @@ class _Updates:
         self.failed: dict = {}  # from a curve's session_uid to the digest and the message
 
     def note(self, meshes: set, everything: bool = False) -> None:
-        """Remember that something has changed, and let the timer look at it."""
+        """Record a change and start the timer."""
         self.changed |= meshes
         self.everything |= everything
         self.last_change = time.monotonic()
@@ -51,7 +52,7 @@ class _Updates:
             bpy.app.timers.register(tick, first_interval=preferences.live_delay())
 
     def stop(self) -> None:
-        """Drop what is being done."""
+        """Cancel the work in progress."""
         if self.work is not None:
             self.work.cancel()
         self.work, self.requests, self.curves = None, [], []
@@ -61,15 +62,15 @@ _updates = _Updates()
 
 
 def tick() -> float | None:
-    """Do a little; return the seconds until the next time, or None where nothing is left."""
+    """Work for one turn; return the seconds until the next one, or None when all is done."""
     if not _live_scenes():
         _updates.stop()
         return None
     if _updates.changed or _updates.everything:
         _updates.stop()
-        rest = _updates.last_change + preferences.live_delay() - time.monotonic()
-        if rest > 0.0 or _has_to_wait():
-            return max(rest, WAIT)
+        remaining = _updates.last_change + preferences.live_delay() - time.monotonic()
+        if remaining > 0.0 or _has_to_wait():
+            return max(remaining, WAIT)
         _begin()
     if _updates.work is None:
         return None
@@ -82,7 +83,7 @@ def tick() -> float | None:
 
 
 def messages(mesh_object) -> list:
-    """Why curves on a mesh could not be updated."""
+    """Messages of the curves on a mesh that could not be updated."""
     found = [
         _updates.failed.get(each.session_uid) for each in curve_record.designed_on(mesh_object)
     ]
@@ -90,7 +91,7 @@ def messages(mesh_object) -> list:
 
 
 def _begin() -> None:
-    """Ask for the curves that are out of date."""
+    """Start work on the outdated curves."""
     changed, everything = _updates.changed, _updates.everything
     _updates.changed, _updates.everything = set(), False
     surfaces: dict = {}
@@ -108,7 +109,7 @@ def _begin() -> None:
 
 
 def _ask(designed, mesh_object, surface) -> None:
-    """Add a request for a curve if it is out of date."""
+    """Add a request for a curve if it is outdated."""
     asked = curve_record.asked_of(designed)
     uid = designed.session_uid
     now = ""
@@ -129,7 +130,7 @@ def _ask(designed, mesh_object, surface) -> None:
 
 
 def _write() -> None:
-    """Put the curves that have been found into their objects."""
+    """Write the new curves into their objects."""
     work, requests, curves = _updates.work, _updates.requests, _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
@@ -148,7 +149,7 @@ def _write() -> None:
 
 
 def _has_to_wait() -> bool:
-    """Whether Blender is rendering, or a tool of ours is at work on curves."""
+    """Whether Blender is rendering, or a modal operator of the extension is running."""
     running = (
         operator.bl_idname
         for window in bpy.context.window_manager.windows
@@ -170,7 +171,7 @@ def _live_curves() -> list:
 
 @persistent
 def note_changes(scene, depsgraph) -> None:
-    """After Blender has brought its scene up to date."""
+    """Record changed meshes after an update of the dependency graph."""
     if not scene.nicmm_live_update:
         return
     meshes = {
@@ -184,7 +185,7 @@ def note_changes(scene, depsgraph) -> None:
 
 @persistent
 def note_other_state(*_arguments) -> None:
-    """After undo, redo and opening a file."""
+    """Check all curves after undo, redo or opening a file."""
     _updates.stop()
     if _live_scenes():
         _updates.note(set(), everything=True)
@@ -192,7 +193,7 @@ def note_other_state(*_arguments) -> None:
 
 @persistent
 def forget(*_arguments) -> None:
-    """Before another file is opened."""
+    """Drop all state before another file is opened."""
     _updates.stop()
     _updates.reset()
 
@@ -213,8 +214,8 @@ HANDLERS = (
 def register() -> None:
     bpy.types.Scene.nicmm_live_update = BoolProperty(
         name="Live Update",
-        description="Design the curves of this scene again whenever their mesh, or weights that "
-        "they depend on, have changed",
+        description="Design the curves of this scene again whenever their mesh or the weights "
+        "that they use change",
         default=False,
         update=_switched,
     )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators that design curves share: short work at once, long work with the window alive.
+"""The base of operators that design curves: the window responds during long computations.
 
-Scripts, the redo panel and background Blender run `execute`, which does not return before the
-curves are there. From the window `invoke` waits as long as most curves take; what takes longer goes
-on by turns, a timer giving them, until it is done or Esc is pressed.
+Scripts, the redo panel and background Blender run `execute`, which returns when the curves are
+done. In the window `invoke` waits for as long as most curves take. A longer computation continues
+in time slices on timer events until it is done or Esc is pressed.
 """
 
 import sys
@@ -19,10 +19,10 @@ from .partial_curve import PartialCurve
 from .viewports import NAVIGATION
 
 TURN = 0.03
-"""Seconds; about the time between two pictures of the window."""
+"""Seconds of work for each timer event, about the duration of one frame."""
 
 LONGEST_TURN = 0.25
-"""Seconds. Where the window takes longer to draw, turns are as long, so that work goes on."""
+"""Seconds. A turn takes as long as the window needs to draw, up to this limit."""
 
 PASSED_ON = NAVIGATION | {
     "MOUSEMOVE",
@@ -31,17 +31,17 @@ PASSED_ON = NAVIGATION | {
     "WHEELOUTMOUSE",
     "WINDOW_DEACTIVATE",
 }
-"""Events that change nothing of what the operator works on."""
+"""Events that do not change the data that the operator works on."""
 
 
-# Operators that wait for their turns.
+# Operators that wait for timer events.
 _running: list = []
 
 
 class LongSolves:
-    """For operators; they have `requests(context)` and `finish(context, requests, answers)`.
+    """A mixin for operators that define `requests(context)` and `finish(context, requests, answers)`.
 
-    An answer is a design of the core, or the error that there is instead.
+    An answer is a design of the core or an error.
     """
 
     def execute(self, context):
@@ -55,7 +55,7 @@ class LongSolves:
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
             self.cancel(context)
-            self.report({"INFO"}, "Cancelled; nothing has changed")
+            self.report({"INFO"}, "Cancelled without changes")
             return {"CANCELLED"}
         if event.type == "TIMER":
             drawing = time.perf_counter() - self._turn_ended
@@ -69,7 +69,7 @@ class LongSolves:
         return {"PASS_THROUGH" if event.type in PASSED_ON else "RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Also called by Blender, when it opens another file or ends."""
+        """Cancel the work; also called by Blender when it opens another file or quits."""
         self._work.cancel()
         self._tidy(context)
 
@@ -115,7 +115,7 @@ class LongSolves:
 
 
 def stop_all() -> None:
-    """Cancel what is running; before the extension is disabled."""
+    """Cancel all running operators, before the extension is disabled."""
     for operator in list(_running):
         operator.cancel(bpy.context)
 
@@ -145,12 +145,12 @@ def answer_all(requests: list, progress) -> list:
 
 
 def _place(fraction: float, count: int) -> int:
-    """The request that is being answered when a fraction of all is done."""
+    """The index of the current request at a fraction of the total work."""
     return min(int(fraction * count), count - 1)
 
 
 def reporting(operator, work):
-    """Do an operator's work; what it cannot do becomes a report that says what would mend it."""
+    """Run an operator's work; turn expected errors into reports."""
     from ... import nicmm_core as nicmm
 
     try:
@@ -159,15 +159,15 @@ def reporting(operator, work):
         return _cancelled(
             operator,
             f"A library that NICMM Curves needs cannot be loaded ({error}). "
-            "Install the zip that was made for this platform and this Blender",
+            "Install the zip made for this platform and this Blender version",
         )
     try:
         return work()
     except nicmm.MissingPackageError as error:
         return _cancelled(
             operator,
-            f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves that was "
-            "built with --with-torch brings PyTorch along",
+            f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves built with "
+            "--with-torch contains PyTorch",
         )
     except (mesh_data.InputError, nicmm.NicmmError) as error:
         return _cancelled(operator, str(error))
@@ -180,7 +180,7 @@ def _cancelled(operator, message: str):
 
 @contextmanager
 def _pointer_progress(context):
-    """Show progress at the mouse pointer; gives the callable that the core reports to."""
+    """Show progress at the mouse pointer; yield the progress function for the core."""
     window_manager = context.window_manager
     window_manager.progress_begin(0.0, 1.0)
     try:

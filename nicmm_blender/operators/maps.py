@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators that make obstacle and alignment maps as vertex groups, and let them be painted."""
+"""The operators that create and paint obstacle and alignment maps, which are vertex groups."""
 
 import bpy
 import numpy as np
@@ -10,8 +10,8 @@ from . import polls
 from .long_solves import reporting
 
 ROLES = (
-    ("OBSTACLES", "Obstacles", "Where the curve must not go"),
-    ("ALIGNMENT", "Alignment", "What the curve follows"),
+    ("OBSTACLES", "Obstacles", "Weights that keep curves away"),
+    ("ALIGNMENT", "Alignment", "Weights that attract curves"),
 )
 FIELDS = {"OBSTACLES": "obstacle_group", "ALIGNMENT": "alignment_group"}
 NAMES = {"OBSTACLES": "Obstacles", "ALIGNMENT": "Alignment"}
@@ -19,26 +19,26 @@ NAMES = {"OBSTACLES": "Obstacles", "ALIGNMENT": "Alignment"}
 SOURCES = (
     ("PAINT", "Empty", "No weights yet; paint them", "BRUSH_DATA", 0),
     ("SELECTION", "Selected Vertices", "The selected vertices", "RESTRICT_SELECT_OFF", 1),
-    ("CURVATURE", "Curvature", "Where the surface bends, either way", "SPHERECURVE", 2),
+    ("CURVATURE", "Curvature", "Where the surface is strongly curved", "SPHERECURVE", 2),
     ("SHARP_EDGES", "Sharp Edges", "Edges whose faces meet at an angle", "MOD_EDGESPLIT", 3),
-    ("MARKED_SHARP", "Edges Marked Sharp", "Edges that are marked as sharp", "EDGESEL", 4),
-    ("SEAMS", "Seams", "Edges that are UV seams", "UV_EDGESEL", 5),
+    ("MARKED_SHARP", "Edges Marked Sharp", "Edges marked as sharp", "EDGESEL", 4),
+    ("SEAMS", "Seams", "Edges marked as UV seams", "UV_EDGESEL", 5),
 )
 ATTRIBUTES = {"MARKED_SHARP": ("use_edge_sharp", "marked sharp"), "SEAMS": ("use_seam", "a seam")}
 
 
 class NICMM_OT_new_map(bpy.types.Operator):
-    """Make a vertex group that keeps curves away or attracts them, and show it in Weight Paint"""
+    """Create a vertex group that keeps curves away or attracts them"""
 
     bl_idname = "nicmm.new_map"
     bl_label = "New Map"
     bl_options = {"REGISTER", "UNDO"}
 
-    role: EnumProperty(name="Use As", description="What the weights do to curves", items=ROLES)
-    source: EnumProperty(name="From", description="Where the weights come from", items=SOURCES)
+    role: EnumProperty(name="Use As", description="Effect of the weights on curves", items=ROLES)
+    source: EnumProperty(name="From", description="Source of the weights", items=SOURCES)
     angle: FloatProperty(
         name="Angle",
-        description="Angle between the normals of two faces from which their edge is sharp",
+        description="Smallest angle between the normals of two faces at a sharp edge",
         subtype="ANGLE",
         default=np.radians(30.0),
         min=0.0,
@@ -46,7 +46,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
     )
     strength: FloatProperty(
         name="Strength",
-        description="Largest weight. An obstacle of weight 1 is never entered",
+        description="Largest weight. Curves never enter an obstacle of weight 1",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -54,7 +54,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
     )
     show: BoolProperty(
         name="Weight Paint",
-        description="Switch to Weight Paint mode, which shows the weights and lets them be painted",
+        description="Switch to Weight Paint mode to show and paint the weights",
         default=True,
     )
 
@@ -83,7 +83,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         mesh_data.synchronise(mesh_object)
         weights = self.strength * _weights(mesh_object, self.source, self.angle)
         if self.source != "PAINT" and not weights.any():
-            self.report({"WARNING"}, f'Nothing on "{mesh_object.name}" gives a weight')
+            self.report({"WARNING"}, f'All weights on "{mesh_object.name}" are zero')
         mode = mesh_object.mode
         _enter(context, mesh_object, "OBJECT")
         group = mesh_object.vertex_groups.new(name=NAMES[self.role])
@@ -97,7 +97,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
 
 
 class NICMM_OT_paint_map(bpy.types.Operator):
-    """Paint the weights of a map, or go back to Object Mode"""
+    """Paint the weights of a map, or return to Object Mode"""
 
     bl_idname = "nicmm.paint_map"
     bl_label = "Paint Map"
@@ -130,7 +130,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
 
 
 def is_painting(context, mesh_object, name: str) -> bool:
-    """Whether the weights of a group are shown and painted."""
+    """Whether Weight Paint mode is active with this group."""
     active = None if mesh_object is None else mesh_object.vertex_groups.active
     return context.mode == "PAINT_WEIGHT" and active is not None and active.name == name
 
@@ -161,13 +161,13 @@ def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
     if len(edges) == 0:
         raise mesh_data.InputError(
             f'No edge of "{mesh_object.name}" is {words}. Mark edges in Edit Mode '
-            "(Edge menu), or make the map from something else"
+            "(Edge menu), or choose another source for the map"
         )
     return nicmm.edge_map(mesh, edges)
 
 
 def _enter(context, mesh_object, mode: str) -> None:
-    """Switch the mesh to a mode, and make it active where a curve on it was."""
+    """Make the mesh active and switch it to a mode."""
     if context.view_layer.objects.active != mesh_object:
         context.view_layer.objects.active = mesh_object
     if mesh_object.mode != mode:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shows a curve that is not finished yet in every 3D viewport."""
+"""Shows an unfinished curve in every 3D viewport."""
 
 import bpy
 
@@ -11,20 +11,20 @@ WIDTH = 2.0
 
 
 class PartialCurve:
-    """A polyline in world space, drawn over everything until it is removed."""
+    """A polyline in world space, drawn in front of everything until it is removed."""
 
     def __init__(self) -> None:
         self._positions: list = []
         self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def show(self, points, closed: bool) -> None:
-        """Show other points, (n, 3)."""
+        """Replace the points, (n, 3)."""
         positions = points.tolist()
         self._positions = positions + positions[:1] if closed else positions
         viewports.redraw()
 
     def remove(self) -> None:
-        """Show nothing more."""
+        """Stop drawing."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")
         viewports.redraw()
 

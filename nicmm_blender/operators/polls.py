@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an operator can be used, and what Blender says where it cannot."""
+"""Checks whether an operator can be used, and the messages of disabled buttons."""
 
 OBJECT = ({"OBJECT"}, "Switch to Object Mode")
 OBJECT_OR_EDIT = ({"OBJECT", "EDIT_MESH"}, "Switch to Object Mode or Edit Mode")
@@ -7,16 +7,16 @@ OBJECT_EDIT_OR_WEIGHTS = (
     {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"},
     "Switch to Object Mode, Edit Mode or Weight Paint",
 )
-"""Modes that an operator works in, and what to do in others."""
+"""Modes that an operator works in, and the message in other modes."""
 
 NO_MESH = "Make a mesh object active"
-NO_CURVE = "Make a curve active that was designed on a mesh"
+NO_CURVE = "Make a designed curve active"
 NO_MESH_OR_CURVE = "Make a mesh or a designed curve active"
-"""What to do where the object that an operator needs is not the active one."""
+"""Messages where the active object is of the wrong kind."""
 
 
 def usable(operator, context, has_object: bool, missing: str, modes: tuple) -> bool:
-    """Whether the object that an operator needs is active, and the mode is right."""
+    """Whether the active object and the mode are right for an operator."""
     names, switch = modes
     if not has_object:
         operator.poll_message_set(missing)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work by turns: a thread that runs only while the caller waits for it.
+"""Long work in time slices ("turns"): a thread that runs only while the caller waits for it.
 
-The core works from beginning to end and only calls a progress function on its way. To let Blender
-draw its window in between, the work is done in a thread that is parked inside that function
-when its turn is over. Caller and thread never run at the same time, so Blender's Python sees one
-thread only. The work must not touch Blender's data.
+The core works from beginning to end and calls a progress function now and then. So that Blender
+can draw its window in between, the work runs in a thread that blocks inside this function at the
+end of each turn. Caller and thread never run at the same time, so Blender's Python sees only one
+thread. The work must not access Blender's data.
 """
 
 import atexit
@@ -14,19 +14,19 @@ import time
 import numpy as np
 
 STACK = 64 * 1024 * 1024
-"""Bytes; elsewhere than on Linux a thread gets far less than the main thread has."""
+"""Bytes. Except on Linux, the default stack of a thread is far smaller than the main thread's."""
 
-# Those that are parked; a thread must not be left behind when its work is no longer wanted.
+# Work whose thread is blocked; `stop_all` ends these threads.
 _parked: set = set()
 
 
 class Work:
-    """A function of a progress function, done by turns.
+    """A function that takes a progress function, run in turns.
 
     Attributes
     ----------
     fraction : float
-        How much is done.
+        Fraction of the work done.
     polyline : (n, 3) float array
         The curve so far.
     done : bool
@@ -43,7 +43,7 @@ class Work:
         self.done = False
 
     def turn(self, seconds: float) -> bool:
-        """Go on for about so long; return whether the work is done."""
+        """Continue for about this time; return whether the work is done."""
         if self.done:
             return True
         if self._thread is None:
@@ -57,13 +57,13 @@ class Work:
         return self.done
 
     def result(self):
-        """What the function returned, or raise what it raised; after it is done."""
+        """Return the result of the function, or raise its error; only when it is done."""
         if self._error is not None:
             raise self._error
         return self._result
 
     def cancel(self) -> None:
-        """Let the function stop, and wait until it has; its result is not wanted."""
+        """Stop the function, wait until it has stopped and discard its result."""
         self._stop = True
         if self._thread is None:
             self.done = True
@@ -73,7 +73,7 @@ class Work:
     def _start(self) -> None:
         before = threading.stack_size(STACK)
         try:
-            # A daemon, so that Blender can end in any case; `stop_all` joins it before that.
+            # A daemon, so that Blender can always quit; `stop_all` joins it first.
             self._thread = threading.Thread(target=self._run, name="nicmm", daemon=True)
             self._thread.start()
         finally:
@@ -84,7 +84,7 @@ class Work:
         self._go.acquire()
         try:
             self._result = self._function(self._progress)
-        except BaseException as error:  # raised again where the result is asked for
+        except BaseException as error:  # raised again in `result`
             self._error = error
         self.done = True
         self._back.release()
@@ -100,7 +100,7 @@ class Work:
 
 
 def stop_all() -> None:
-    """Cancel all that is parked: before Blender ends, opens another file or disables us."""
+    """Cancel all blocked work, before Blender quits or the extension is disabled."""
     for work in list(_parked):
         work.cancel()
 

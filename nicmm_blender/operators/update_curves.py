@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that designs curves of a mesh again."""
+"""The operator that designs the curves of a mesh again."""
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -10,7 +10,7 @@ from .long_solves import LongSolves
 
 
 class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
-    """Design curves again with their own settings, on the mesh and its weights as they are now"""
+    """Design curves again with their own settings, on the present mesh and weights"""
 
     bl_idname = "nicmm.update_curves"
     bl_label = "Update Curves"
@@ -18,19 +18,19 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
 
     curve: StringProperty(
         name="Curve",
-        description="Name of a designed curve. Without one, all curves on the mesh are updated",
+        description="Name of a designed curve. Leave empty to update all curves on the mesh",
         options={"SKIP_SAVE"},
     )
     use_panel: BoolProperty(
         name="Settings of the Panel",
-        description="Use the settings in the sidebar from now on, not those that each curve has",
+        description="Replace the settings of each curve by those in the sidebar",
         default=False,
     )
 
     @classmethod
     def poll(cls, context):
         if curve_record.mesh_of_context(context) is None:
-            cls.poll_message_set("Make a mesh active, or a curve that was designed on one")
+            cls.poll_message_set("Make a mesh or a designed curve active")
             return False
         return True
 
@@ -68,7 +68,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         done = f"{len(requests) - len(failed)} of {len(requests)} curves updated"
         moved = sum(request.moved for request in requests)
         if moved:
-            failed.append(f"{moved} control points lay on triangles that are gone and were moved")
+            failed.append(f"{moved} control points moved because their triangles were deleted")
         if failed:
             self.report({"WARNING"}, f"{done}; {'; '.join(failed)}")
         else:
@@ -77,21 +77,21 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
 
 
 def named(name: str):
-    """A designed curve by its name."""
+    """Return the designed curve with this name."""
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
         raise mesh_data.InputError(
-            f'There is no designed curve "{name}". Choose one from the list of curves'
+            f'There is no designed curve "{name}". Choose one in the list of curves'
         )
     return found
 
 
 def request_again(designed, chosen=None):
-    """A request for a curve once more, with its own settings or others."""
+    """A request to design a curve again, with its own settings or others."""
     mesh_object = curve_record.mesh_of(designed)
     if mesh_object is None:
         raise mesh_data.InputError(
-            f'The mesh that "{designed.name}" was designed on is gone. Draw the curve again'
+            f'The mesh that "{designed.name}" was designed on no longer exists. Draw the curve again'
         )
     mesh_data.synchronise(mesh_object)
     surface = mesh_data.triangles(mesh_object)

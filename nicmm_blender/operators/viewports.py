@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D viewports while an operator runs: events that turn the view, and drawing again."""
+"""The 3D viewports while an operator runs: navigation events and redrawing."""
 
 import bpy
 
@@ -14,11 +14,11 @@ NAVIGATION = {
     "MOUSESMARTZOOM",
     "NDOF_MOTION",
 }
-"""Events that turn or move the view, and that Blender itself handles."""
+"""Events that move the view; Blender handles them."""
 
 
 def redraw() -> None:
-    """Draw all viewports again."""
+    """Redraw all 3D viewports."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

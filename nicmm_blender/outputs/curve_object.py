@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a polyline on a mesh as a Blender curve object, and puts new objects into the scene."""
+"""Writes a polyline on a mesh as a Blender curve object, and links new objects to the scene."""
 
 import bpy
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 def polyline_object(mesh_object, polylines, thickness: float):
     """Make a curve object with one POLY spline for each (points, closed) pair.
 
-    POLY splines stay on the surface, where NURBS and Bézier splines would leave it. The points are
-    in the mesh's own space.
+    POLY splines lie on the surface; NURBS and Bézier splines would not. The points are in the
+    mesh's local space.
     """
     name = f"{mesh_object.name} Curve"
     curve = bpy.data.curves.new(name, "CURVE")
@@ -21,7 +21,7 @@ def polyline_object(mesh_object, polylines, thickness: float):
 
 
 def write_polylines(curve, polylines) -> None:
-    """Replace the splines of a curve by one for each (points, closed) pair."""
+    """Replace the splines of a curve, with one for each (points, closed) pair."""
     materials = [spline.material_index for spline in curve.splines]
     curve.splines.clear()
     for number, (points, closed) in enumerate(polylines):
@@ -36,14 +36,14 @@ def write_polylines(curve, polylines) -> None:
 
 
 def place(context, mesh_object, curve_object) -> None:
-    """Put a new curve beside the mesh, as its child, so that it follows the object."""
+    """Link a new curve to the scene as a child of the mesh object, so that it moves with it."""
     curve_object.parent = mesh_object
     link(context, mesh_object, curve_object)
     _select(context, curve_object)
 
 
 def link(context, mesh_object, new_object) -> None:
-    """Show a new object where the mesh is shown."""
+    """Link a new object to the collections of the mesh, and to the local view."""
     for collection in _collections(context, mesh_object):
         collection.objects.link(new_object)
     if getattr(context.space_data, "local_view", None):
@@ -51,13 +51,13 @@ def link(context, mesh_object, new_object) -> None:
 
 
 def _collections(context, mesh_object):
-    """The mesh's collections; the scene's own where all of them are linked from another file."""
+    """The mesh's collections, or the scene's one if all are linked from another file."""
     editable = [found for found in mesh_object.users_collection if found.library is None]
     return editable or [context.scene.collection]
 
 
 def remove(curve_object) -> None:
-    """Delete a curve object, and its data where nothing else has it."""
+    """Delete a curve object, and its data unless it has other users."""
     data = curve_object.data
     bpy.data.objects.remove(curve_object, do_unlink=True)
     if not data.users:
@@ -65,7 +65,7 @@ def remove(curve_object) -> None:
 
 
 def select_only(context, chosen) -> None:
-    """Make an object the active one and the only one selected; for Object Mode."""
+    """Make an object active and the only selected one; in Object Mode only."""
     for selected in context.selected_objects:
         selected.select_set(False)
     context.view_layer.objects.active = chosen
@@ -73,7 +73,7 @@ def select_only(context, chosen) -> None:
 
 
 def _select(context, curve_object) -> None:
-    """Select the curve. It becomes active too, unless the mesh is being edited and must stay so."""
+    """Select the curve. In Object Mode it becomes active; in Edit Mode the mesh stays active."""
     if context.mode == "OBJECT":
         select_only(context, curve_object)
     curve_object.select_set(True)

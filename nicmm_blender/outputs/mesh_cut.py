@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Carries a cut of the core over to a Blender mesh with everything that lives on it.
+"""Applies a cut of the core to a Blender mesh and interpolates all of its attributes.
 
-Faces that the curve does not touch stay as they are. New vertices, corners and edges take their
-values from those that they lie between: Blender itself interpolates every layer of a mesh, so that
-weights, shape keys, colours and each UV map come along, and corners do not mix over seams.
+Faces that the curve does not touch stay unchanged. Blender itself interpolates every layer of the
+mesh at new vertices, corners and edges: weights, shape keys, colours and each UV map. Corners are
+interpolated within one face, so values do not mix across seams.
 """
 
 from contextlib import contextmanager
@@ -17,7 +17,7 @@ from ..scene.mesh_data import InputError
 
 @contextmanager
 def editable(mesh_object):
-    """The mesh as a BMesh that is written back at the end, in Object Mode or Edit Mode."""
+    """Yield the mesh as a BMesh and write it back at the end; in Object Mode or Edit Mode."""
     mesh = mesh_object.data
     if mesh_object.mode == "EDIT":
         edited = bmesh.from_edit_mesh(mesh)
@@ -35,40 +35,41 @@ def editable(mesh_object):
 
 
 def check_editable(mesh_object, cuts: bool) -> None:
-    """Refuse a mesh that cannot be changed, or whose change would reach further than it seems."""
+    """Refuse a mesh that cannot be changed, or whose change would affect other objects."""
     mesh = mesh_object.data
     name = mesh_object.name
     library = mesh.library or mesh_object.library
     if library is not None:
         raise InputError(
             f'The mesh of "{name}" is linked from {library.filepath}. '
-            "Make it local (Object > Relations > Make Local) or choose an output that leaves "
-            "the mesh as it is"
+            "Make it local (Object > Relations > Make Local) or choose an output that does not "
+            "change the mesh"
         )
     if mesh.override_library is not None:
         raise InputError(
-            f'The mesh of "{name}" is a library override, whose faces Blender keeps. Make it local '
-            "or choose an output that leaves the mesh as it is"
+            f'The mesh of "{name}" is a library override, whose faces cannot be changed. Make it '
+            "local or choose an output that does not change the mesh"
         )
     users = mesh.users - mesh.use_fake_user
     if users > 1:
         raise InputError(
             f'The mesh of "{name}" is shared by {users} users, and all of them would change. '
             "Make it a single user (Object > Relations > Make Single User > "
-            "Object & Data) or choose an output that leaves the mesh as it is"
+            "Object & Data) or choose an output that does not change the mesh"
         )
     if cuts and any(modifier.type == "MULTIRES" for modifier in mesh_object.modifiers):
         raise InputError(
-            f'"{name}" has a Multiresolution modifier, whose details belong to the faces as they '
-            "are. Apply it first, or choose an output that does not cut"
+            f'"{name}" has a Multiresolution modifier, whose details belong to the present faces. '
+            "Apply it first, or choose an output that does not cut"
         )
 
 
 class CornerNormals:
-    """Custom normals of a mesh in Object Mode, to be set again after a cut.
+    """Custom normals of a mesh in Object Mode, to be restored after a cut.
 
-    Blender stores them relative to the faces round a vertex, so they cannot be interpolated as
-    they are. In Edit Mode they are, which is near enough where those faces are about flat.
+    Blender stores them relative to the faces round a vertex, so the stored values cannot be
+    interpolated. In Edit Mode they are nevertheless, which is a good approximation if these faces
+    are nearly flat.
     """
 
     def __init__(self, mesh_object) -> None:
@@ -80,7 +81,7 @@ class CornerNormals:
             self.loop_starts = _loop_starts(mesh)
 
     def after_cut(self, surface, cut, polygons, weights) -> np.ndarray:
-        """Normals of all corners, (n, 3): old faces that stay, in order, then the new ones."""
+        """Normals of all corners, (n, 3): unchanged faces in order, then the new ones."""
         counts = np.diff(self.loop_starts, append=len(self.values))
         stays = np.ones(len(counts), dtype=bool)
         stays[polygons.source] = False
@@ -106,7 +107,7 @@ def _loop_starts(mesh) -> np.ndarray:
 
 
 def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
-    """Cut a BMesh; return its vertices, and its faces: old ones that stay, then the new ones.
+    """Cut a BMesh; return its vertices, and its faces: unchanged ones, then the new ones.
 
     Vertices are numbered as in the core's cut. Parameters: the BMesh, the mesh that it was read
     from, the `mesh_data.Triangles` that the core was given, its `CutMesh`, the `CutPolygons` made
@@ -152,7 +153,7 @@ def _new_vertices(edited, surface, cut, vertices: list) -> list:
             if w > 0.0
         ]
         place = sum((vertex.co * w for w, vertex in around[1:]), around[0][1].co * around[0][0])
-        # Layers that cannot be interpolated, such as whole numbers, are those of the nearest one.
+        # Layers that cannot be interpolated, such as integers, come from the nearest vertex.
         new = edited.verts.new(place, around[0][1])
         (first, one), (second, other) = around[:2]
         new.copy_from_vert_interp((one, other), second / (first + second))
@@ -166,7 +167,7 @@ def _new_vertices(edited, surface, cut, vertices: list) -> list:
 
 
 def _split_edges(edited, surface, cut, vertices: list) -> list:
-    """Make the parts of cut edges, as their whole was, and return the old ones."""
+    """Divide cut edges; the parts take the attributes of the old edges, which are returned."""
     along: dict = {}
     n_input = len(surface.local)
     for new, (face, weight) in enumerate(
@@ -190,7 +191,7 @@ def _split_edges(edited, surface, cut, vertices: list) -> list:
 
 
 class _SourceTriangles:
-    """The triangles of polygons as faces, from which corners are interpolated."""
+    """Temporary faces for the triangles of polygons, from which corners are interpolated."""
 
     def __init__(self, edited, mesh, surface, old_faces: dict) -> None:
         self.edited, self.surface, self.old_faces = edited, surface, old_faces
@@ -205,7 +206,7 @@ class _SourceTriangles:
         places = (self.surface.loops[triangle] - self.loop_starts[polygon]).tolist()
         face.loops[place].copy_from(source.loops[places[int(np.argmax(weight))]])
         if np.max(weight) < 1.0:
-            # Looked up again: copying makes Blender forget the corner's Python object.
+            # Looked up again: copying invalidates the corner's Python object.
             loop = face.loops[place]
             loop.copy_from_face_interp(self._face(triangle, source, places), False, False)
 
@@ -213,7 +214,7 @@ class _SourceTriangles:
         if len(source.loops) == 3:
             return source
         if triangle not in self.faces:
-            # On vertices of its own, since two faces cannot have the same ones.
+            # On separate vertices, since two faces cannot have the same ones.
             corners = [self.edited.verts.new(source.loops[place].vert.co) for place in places]
             helper = self.edited.faces.new(corners)
             for corner, place in enumerate(places):

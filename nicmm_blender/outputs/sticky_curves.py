@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a curve as a hair curves object that follows its mesh through every deformation.
+"""Writes a curve as a hair curves object that follows its deforming mesh.
 
-Each point has the polygon that it lies on, the three vertices of its triangle and its barycentric
-coordinates as attributes; a Geometry Nodes group (`sticky_nodes`) reads the vertices' places after
-all modifiers.
+The attributes of each point are its polygon, the three vertices of its triangle and its barycentric
+coordinates. A Geometry Nodes group (`sticky_nodes`) reads the positions of these vertices after all
+modifiers.
 """
 
 import bpy
@@ -15,15 +15,15 @@ from . import sticky_nodes
 def are_drawn_with_all_points() -> bool:
     """Whether Blender draws hair curves point by point, in the viewport and in EEVEE.
 
-    Before Blender 5.0 it draws every strand with 8 points, or 16, 32 or 64 where the scene's
-    Additional Subdivision says so. The shape Cylinder came together with all points.
+    Before Blender 5.0 it draws every strand with 8 points, or 16, 32 or 64 with the scene's
+    Additional Subdivision. Versions that draw all points also have the shape Cylinder.
     """
     shapes = bpy.types.RenderSettings.bl_rna.properties["hair_type"].enum_items
     return "CYLINDER" in shapes
 
 
 def add(mesh_object, surface, curves, radius: float, tube: bool):
-    """Make the object, not yet in any collection."""
+    """Create the object without linking it to a collection."""
     name = f"{mesh_object.name} Curve"
     data = bpy.data.hair_curves.new(name)
     write(data, surface, curves, radius)
@@ -33,7 +33,7 @@ def add(mesh_object, surface, curves, radius: float, tube: bool):
 
 
 def write(data, surface, curves, radius: float | None = None) -> None:
-    """Replace the curves of a hair curves data-block; without a radius they keep that of before."""
+    """Replace the curves of a hair curves data-block; without a `radius`, keep the present one."""
     if radius is None:
         before = data.attributes.get("radius")
         radius = before.data[0].value if before is not None and len(before.data) else 0.0

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group that keeps points on their triangles, and makes a tube of the strands.
+"""The Geometry Nodes group that keeps points on their triangles, and can give the strands a tube.
 
-A file keeps the group that it was saved with; one without the tube gets it when it is used again.
+A file keeps the group that it was saved with. A group without a tube is extended when it is used
+again.
 """
 
 import bpy
 
 GROUP_NAME = "NICMM Sticky Curve"
 CORNERS = ("vertex_1", "vertex_2", "vertex_3")
-"""Attributes of a point with the vertices of its triangle."""
+"""Attributes of a point: the vertices of its triangle."""
 
 SURFACE, TUBE = "Surface", "Tube"
 """Inputs of the group: the mesh object, and whether to make a tube."""
 SIDES = 12
-"""Of the tube: as many as the bevel of Blender's own curves has at first."""
+"""Sides of the tube: as many as Blender's default bevel of curves."""
 
 
 def add_modifier(curves_object, mesh_object, tube: bool) -> None:
-    """Let a hair curves object follow a mesh object."""
+    """Add the modifier with which a hair curves object follows a mesh object."""
     modifier = curves_object.modifiers.new(GROUP_NAME, "NODES")
     modifier.node_group = node_group()
     _set_input(modifier, SURFACE, mesh_object)
@@ -25,7 +26,7 @@ def add_modifier(curves_object, mesh_object, tube: bool) -> None:
 
 
 def node_group():
-    """The group of the file, made where it has none."""
+    """The group of the file, created if it is missing or incomplete."""
     group = bpy.data.node_groups.get((GROUP_NAME, None))  # not one that is linked
     if group is None or not _is_whole(group):
         group = _new_group()
@@ -58,12 +59,12 @@ def _new_group():
         corners.append(_output(sample, "Value"))
     weights = column.node("ShaderNodeSeparateXYZ", 2)
     column.link(column.named_attribute("barycentric", "FLOAT_VECTOR"), weights.inputs[0])
-    # From the last corner on, so that rounding of the weights' sum moves nothing.
+    # Relative to the last corner, so that rounding in the sum of the weights has no effect.
     place = corners[2]
     for corner, weight in zip(corners[:2], weights.outputs, strict=False):
         place = column.moved_towards(place, corner, corners[2], weight)
     target = column.node("GeometryNodeSetPosition", 5)
-    # Hair curves are Catmull-Rom splines, and Blender lets only nodes change that safely.
+    # Hair curves are Catmull-Rom splines; only nodes change the type reliably.
     straight = column.node("GeometryNodeCurveSplineType", 4)
     straight.spline_type = "POLY"
     column.link(_output(inputs, "Geometry"), straight.inputs["Curve"])

@@ -1,8 +1,7 @@
-"""The two sides of a curve, among whatever a surface is made of: its vertices or its faces.
+"""The two sides of a curve: which of them each vertex, or each face, of a surface lies on.
 
-Two of these lie on the same side where a way leads from one to the other that crosses the curve an
-even number of times. Where a way round the surface crosses it an odd number of times, the curve
-bounds nothing there.
+Two vertices or faces lie on the same side if a path between them crosses the curve an even number
+of times. If a closed path crosses it an odd number of times, the curve bounds no region there.
 """
 
 from __future__ import annotations
@@ -15,27 +14,27 @@ from .array_types import BoolArray, IntArray
 
 
 def two_sides(count: int, neighbours: IntArray, crossed: BoolArray) -> tuple[IntArray, IntArray]:
-    """Parts that hang together, and the two sides in each.
+    """Connected components, and the two sides in each.
 
     Parameters
     ----------
     count : int
         Of vertices, or of faces.
     neighbours : (m, 2) int array
-        Which of them lie beside each other.
+        Pairs of adjacent ones.
     crossed : (m,) bool array
-        Whether the curve passes between them an odd number of times.
+        Whether the curve passes between each pair an odd number of times.
 
     Returns
     -------
     (count,) int array
-        A number for each part.
+        The component of each.
     (count,) int array
-        1 or -1; 0 in parts in which a way leads from one side to the other.
+        1 or -1; 0 in components in which the two sides are connected.
     """
     one, other = neighbours.T
     odd = crossed.astype(np.int64)
-    # Each stands twice in the graph, once for either side.
+    # The graph has two nodes for each, one for either side.
     rows = np.concatenate([one, one + count])
     columns = np.concatenate([other + odd * count, other + (1 - odd) * count])
     graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)

@@ -130,11 +130,11 @@ def _sides(cut: CutMesh) -> IntArray:
     beside = _faces_beside(cut)
     with_curve = np.isin(part, part[beside])
     if (side == 0)[with_curve].any():
-        kind = "It is closed, but leads" if cut.closed else "It is open and leaves a way"
+        reason = "It runs round a handle or a tube" if cut.closed else "It is open"
         raise CurveError(
-            f"curve bounds no region: a way on the surface leads from one side of it to the other. "
-            f"{kind} round a handle, a tube or its ends; cut the mesh along it instead, or design "
-            "a closed curve that encloses a part of the surface"
+            f"curve bounds no region: its two sides are connected on the surface. {reason}; cut "
+            "the mesh along it instead, or design a closed curve that encloses a part of the "
+            "surface"
         )
     return np.where(with_curve, side, 0)
 

@@ -564,7 +564,7 @@ def test_missing_mesh_is_said(monkey):
 def test_only_designed_curves_are_converted(empty_scene):
     bpy.ops.curve.primitive_bezier_circle_add()
     assert not bpy.ops.nicmm.convert_curve.poll()
-    with pytest.raises(RuntimeError, match="Make a curve active that was designed"):
+    with pytest.raises(RuntimeError, match="Make a designed curve active"):
         bpy.ops.nicmm.convert_curve()
 
 

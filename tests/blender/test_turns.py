@@ -201,7 +201,7 @@ def test_escape_stops_a_long_solve(window):
     assert threading.active_count() == before
     assert not window.timers and window.texts[-1] is None
     assert not scenes.curves()
-    assert window.reports == [({"INFO"}, "Cancelled; nothing has changed")]
+    assert window.reports == [({"INFO"}, "Cancelled without changes")]
 
 
 def test_only_navigation_passes_a_long_solve(window):
