@@ -102,7 +102,7 @@ def parser() -> argparse.ArgumentParser:
     points.add_argument(
         "--points",
         metavar="A,B,C",
-        help='vertex indices, from 0, or positions in the object\'s local space: "0.5 0 1, 0 0 2, 41"',
+        help='vertex indices from 0, or positions in the local space: "0.5 0 1, 0 0 2, 41"',
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
     options = made.add_argument_group("settings", "As in the sidebar.")

@@ -124,7 +124,11 @@ class OutputProperties:
                 "One polygon on each side of the curve where the face is flat enough, as with "
                 "the Knife tool",
             ),
-            ("TRIANGLES", "Triangles", "Triangles. The shape of the surface stays exactly the same"),
+            (
+                "TRIANGLES",
+                "Triangles",
+                "Triangles. The shape of the surface stays exactly the same",
+            ),
         ),
         default="POLYGONS",
     )

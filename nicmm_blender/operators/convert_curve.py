@@ -12,7 +12,7 @@ from .long_solves import reporting
 
 
 class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
-    """Convert a designed curve to another kind of curve, or to edges, a region or parts of its mesh"""
+    """Convert a designed curve to another object, or to edges, a region or parts of its mesh"""
 
     bl_idname = "nicmm.convert_curve"
     bl_label = "Convert Designed Curve"

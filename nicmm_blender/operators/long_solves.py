@@ -39,7 +39,7 @@ _running: list = []
 
 
 class LongSolves:
-    """A mixin for operators that define `requests(context)` and `finish(context, requests, answers)`.
+    """A mixin for operators with `requests(context)` and `finish(context, requests, answers)`.
 
     An answer is a design of the core or an error.
     """

@@ -91,7 +91,8 @@ def request_again(designed, chosen=None):
     mesh_object = curve_record.mesh_of(designed)
     if mesh_object is None:
         raise mesh_data.InputError(
-            f'The mesh that "{designed.name}" was designed on no longer exists. Draw the curve again'
+            f'The mesh that "{designed.name}" was designed on no longer exists. '
+            "Draw the curve again"
         )
     mesh_data.synchronise(mesh_object)
     surface = mesh_data.triangles(mesh_object)

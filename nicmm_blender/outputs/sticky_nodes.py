@@ -76,9 +76,9 @@ def _new_group():
 
 
 def _add_tube(group) -> None:
-    """Put a tube, and the choice of it, between what a group has made so far and its output."""
+    """Insert a tube, and the switch for it, before the output of a group."""
     socket = group.interface.new_socket(TUBE, in_out="INPUT", socket_type="NodeSocketBool")
-    socket.description = "A mesh round the strands, as thick as they are"
+    socket.description = "Show the strands as a mesh with their radius"
     curves = _made(group)
     column = _Column(group)
     radius = _output(column.node("GeometryNodeInputRadius", 6), "Radius")
@@ -88,7 +88,7 @@ def _add_tube(group) -> None:
     column.link(radius, _input(widest, "Attribute"))
     circle = column.node("GeometryNodeCurvePrimitiveCircle", 6)
     circle.inputs["Resolution"].default_value = SIDES
-    # Strands without a radius are lines, and so is their tube: without a profile it has edges only.
+    # Strands without a radius are lines; without a profile, the tube consists of edges only.
     profile = column.switch(7, _output(widest, "Max"), None, _output(circle, "Curve"))
     mesh = column.node("GeometryNodeCurveToMesh", 8)
     mesh.inputs["Fill Caps"].default_value = True
@@ -104,7 +104,7 @@ def _add_tube(group) -> None:
 
 
 def _is_whole(group) -> bool:
-    """Whether a group of the name is ours, and not one that somebody has taken apart."""
+    """Whether a group with this name has the parts that the modifier needs."""
     return (
         group.bl_idname == "GeometryNodeTree"
         and _interface_input(group, SURFACE) is not None
@@ -113,7 +113,7 @@ def _is_whole(group) -> bool:
 
 
 def _made(group):
-    """The socket with what a group gives, or None where nothing leads to its output."""
+    """The socket linked to the output of a group, or None."""
     outputs = _group_output(group)
     links = () if outputs is None else outputs.inputs[0].links
     return links[0].from_socket if links else None
@@ -151,7 +151,7 @@ class _Column:
         return _output(node, "Attribute")
 
     def switch(self, column: int, condition, if_false, if_true):
-        """One geometry or the other; None is nothing."""
+        """Switch between two geometries, of which either may be None (empty)."""
         node = self.node("GeometryNodeSwitch", column)
         node.input_type = "GEOMETRY"
         for name, source in (("Switch", condition), ("False", if_false), ("True", if_true)):
@@ -160,7 +160,7 @@ class _Column:
         return _output(node, "Output")
 
     def moved_towards(self, place, corner, base, weight):
-        """Place + weight · (corner - base)."""
+        """Add weight · (corner - base) to a position."""
         step = self._vector("SUBTRACT", 3, corner, base)
         scaled = self.node("ShaderNodeVectorMath", 4)
         scaled.operation = "SCALE"
@@ -177,7 +177,7 @@ class _Column:
 
 
 def _output(node, name: str):
-    """The socket in use; before Blender 5 a node has one of each name for every data type."""
+    """The enabled socket; before Blender 5 a node has one of each name for every data type."""
     return next(socket for socket in node.outputs if socket.name == name and socket.enabled)
 
 

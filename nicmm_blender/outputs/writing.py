@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a curve as an object of its own, or as cut edges, a region or parts of the mesh."""
+"""Writes a curve as a separate object, or as cut edges, a region or parts of the mesh."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ REGION_NAME = "Region"
 
 @dataclass
 class _Cutting:
-    """A mesh object with one curve on it, cut by the core but not yet in Blender."""
+    """A mesh object with a curve on it, cut by the core but not yet in Blender."""
 
     mesh_object: object
     surface: object
@@ -30,9 +30,9 @@ class _Cutting:
 
 
 def apply(context, mesh_object, surface, curves, settings, asked) -> str:
-    """Make the output that is chosen and return what was done, in words.
+    """Create the chosen output and return a summary for the report.
 
-    `asked` is the `curve_record.Asked` that the curves answer.
+    `asked` holds the settings of the curves, a `curve_record.Asked`.
     """
     if settings.output in {"CURVE", "STICKY"}:
         made = as_object(mesh_object, surface, curves, settings)
@@ -42,7 +42,7 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
     if len(curves) != 1:
         raise InputError(
             f"There are {len(curves)} curves, and only one can be cut. Choose the output Curve to "
-            "look at them"
+            "see them"
         )
     changes_mesh = {"EDGES": _cut_edges, "REGION": _region, "PARTS": _parts}
     mesh_cut.check_editable(mesh_object, cuts=settings.output != "REGION" or settings.region_cut)
@@ -50,7 +50,7 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
 
 
 def as_object(mesh_object, surface, curves, settings):
-    """Make a curve object, not yet in any collection."""
+    """Create a curve object without linking it to a collection."""
     thickness = settings.thickness * surface.diagonal
     if settings.output == "STICKY":
         return sticky_curves.add(mesh_object, surface, curves, thickness, settings.tube)
@@ -58,7 +58,7 @@ def as_object(mesh_object, surface, curves, settings):
 
 
 def redraw(drawn, surface, curves) -> None:
-    """Put other curves into a curve object; its thickness, materials and modifiers stay."""
+    """Replace the curves in a curve object; its thickness, materials and modifiers stay."""
     if drawn.type == "CURVES":
         sticky_curves.write(drawn.data, surface, curves)
     else:
@@ -78,7 +78,7 @@ def check_replaceable(designed) -> None:
 
 
 def replace(designed, request, answer) -> None:
-    """Give a curve object the curve that has been found."""
+    """Replace the curve in a curve object by that of an answer."""
     if isinstance(answer, Exception):
         raise InputError(str(answer)) from answer
     if not answer.curves:
@@ -130,7 +130,7 @@ def _region(context, mesh_object, surface, curve, settings) -> str:
     if settings.region_as == "SELECTION":
         context.tool_settings.mesh_select_mode = (False, False, True)
     with mesh_cut.editable(mesh_object) as edited:
-        # New layers come first: they make Blender forget the Python objects of what has them.
+        # New layers first: adding one invalidates the Python objects of the elements.
         layer = _region_layer(edited, settings.region_as)
         if settings.region_cut:
             vertices, faces = _cut_in_blender(edited, cutting)
@@ -177,7 +177,7 @@ def _parts(context, mesh_object, surface, curve, settings) -> str:
             _take_inside(edited, other_data)
     if not as_objects:
         _set_normals(mesh_object, normals, cutting)
-        return f"parted along {len(edges)} edges{_normals_in_words(mesh_object)}"
+        return f"separated along {len(edges)} edges{_normals_in_words(mesh_object)}"
     other = mesh_object.copy()
     other.data = other_data
     curve_object.link(context, mesh_object, other)
@@ -190,7 +190,7 @@ def _parts(context, mesh_object, surface, curve, settings) -> str:
 
 
 def _take_inside(edited, other_data) -> None:
-    """Move the faces that are marked as inside to another mesh."""
+    """Move the faces marked as inside to another mesh."""
     other = edited.copy()
     try:
         for part, kept in ((edited, 0), (other, 1)):
@@ -229,7 +229,7 @@ def _enclosed(cutting: _Cutting, other_side: bool):
 
 
 def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
-    """Which faces of the cut Blender mesh are inside: those that stay, then the new ones."""
+    """Which faces of the cut Blender mesh are inside: unchanged ones, then the new ones."""
     n_polygons = int(cutting.surface.polygons.max()) + 1
     by_polygon = np.zeros(n_polygons, dtype=bool)
     by_polygon[cutting.surface.polygons[cutting.cut.source_face]] = region.cut_faces
@@ -240,7 +240,7 @@ def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
 
 
 def _mostly_inside(cutting: _Cutting, region) -> np.ndarray:
-    """Which faces of the Blender mesh as it was are inside by more than half of their area."""
+    """Which faces of the original Blender mesh are inside with more than half of their area."""
     polygons, areas = cutting.surface.polygons, cutting.core_mesh.face_areas
     within = np.bincount(polygons, areas * region.share)
     return within > 0.5 * np.bincount(polygons, areas)
@@ -277,7 +277,7 @@ def _set_normals(mesh_object, normals, cutting: _Cutting) -> None:
 
 
 def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
-    """Corners of each face of the cut Blender mesh."""
+    """Number of corners of each face of the cut Blender mesh."""
     counts = np.diff(normals.loop_starts, append=len(normals.values))
     stays = np.ones(len(counts), dtype=bool)
     stays[cutting.polygons.source] = False
@@ -286,5 +286,7 @@ def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
 
 def _normals_in_words(mesh_object) -> str:
     if mesh_object.data.has_custom_normals and mesh_object.mode == "EDIT":
-        return ". Custom normals beside it are approximate; in Object Mode they are interpolated"
+        return (
+            ". Custom normals near the cut are approximate; cut in Object Mode to interpolate them"
+        )
     return ""

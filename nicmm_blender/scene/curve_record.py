@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a curve object remembers of the surface that it lies on, also in a saved file.
+"""The record that a curve object stores of its design, also in a saved file.
 
-Each point is kept by the three vertices of its triangle and its barycentric coordinates: vertices
-keep their numbers when the mesh is moved or deformed, and when the file is opened again. Control
-points are kept so too, with what else the curve was asked for, so that it can be edited again.
+Each point is stored by the three vertices of its triangle and its barycentric coordinates: vertices
+keep their indices when the mesh is moved or deformed, and when the file is opened again. Control
+points are stored in the same form, together with the settings, so that the curve can be edited.
 """
 
 import hashlib
@@ -18,22 +18,22 @@ from .mesh_data import InputError
 
 KEY = "nicmm_curve"
 VERSION = 1
-"""Of the record's format. Those of version 0.1.0 have none and count as 0."""
+"""Version of the record's format. Records of release 0.1.0 have none and count as 0."""
 DESIGNED_ON = "nicmm_designed_on"
 
 
 def identifier(name: str) -> str:
-    """A choice of the core as Blender writes it."""
+    """The Blender identifier of a choice of the core."""
     return name.upper().replace("-", "_")
 
 
 def property_name(option) -> str:
-    """What Blender calls an option of the core: weights are those of a vertex group."""
+    """The Blender property for a core option; weights come from a vertex group."""
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
 def _default(option):
-    """The value of a Blender property that nobody has set."""
+    """The default of the Blender property."""
     if option.kind is Kind.WEIGHTS:
         return ""
     if option.kind is Kind.CHOICE:
@@ -44,7 +44,7 @@ def _default(option):
 RECORDED = tuple(
     option for option in OPTIONS if option.kind is not Kind.POINTS and option.name != "order"
 )
-"""Options that a record keeps; its control points are in the order visited."""
+"""Options in a record. The order is not: the control points are stored in the order visited."""
 
 Asked = make_dataclass(
     "Asked",
@@ -53,18 +53,18 @@ Asked = make_dataclass(
         for option in RECORDED
     ],
     frozen=True,
-    namespace={"__doc__": "What a curve is asked for, besides its control points."},
+    namespace={"__doc__": "The settings of a curve, besides its control points."},
 )
 
 
 def groups_of(asked: Asked) -> list:
-    """The vertex groups that a curve depends on."""
+    """Names of the vertex groups that a curve depends on."""
     names = [property_name(option) for option in RECORDED if option.kind is Kind.WEIGHTS]
     return [getattr(asked, name) for name in names]
 
 
 def arguments_of(asked: Asked, weights) -> dict:
-    """Options as the core takes them; `weights` gives those of a vertex group, None for no name."""
+    """Arguments of the core; `weights` maps the name of a vertex group to weights, "" to None."""
     values = {}
     for option in RECORDED:
         value = getattr(asked, property_name(option))
@@ -80,14 +80,14 @@ def arguments_of(asked: Asked, weights) -> dict:
 
 
 def asked_by(properties) -> Asked:
-    """The same from an operator's or the scene's properties."""
+    """The settings in the properties of an operator or the scene."""
     return Asked(**{field.name: getattr(properties, field.name) for field in fields(Asked)})
 
 
 def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=None) -> None:
-    """Store where the points of curves are on the mesh, and what they were asked for.
+    """Store the positions of curves on the mesh, and their settings.
 
-    The control points are `controls`, the core's SurfacePoints, or by default those on the curves.
+    `controls` are the control points as SurfacePoints of the core; by default those of the curves.
     """
     if controls is None:
         found = [curve.control_index[curve.control_index >= 0] for curve in curves]
@@ -111,12 +111,12 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
         "control_positions": surface.points(control_faces, control_barycentric).ravel().tolist(),
         "asked": asdict(asked),
     }
-    # With the points themselves, so that undo brings both back together.
+    # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DESIGNED_ON] = digest(mesh_object, surface, asked)
 
 
 def digest(mesh_object, surface, asked: Asked) -> str:
-    """What is different whenever something has changed that a curve depends on."""
+    """A hash of everything that a curve depends on."""
     found = hashlib.blake2b(repr(asked).encode(), digest_size=16)
     found.update(surface.solved.tobytes())
     found.update(surface.faces.tobytes())
@@ -127,34 +127,34 @@ def digest(mesh_object, surface, asked: Asked) -> str:
 
 
 def is_current(curve_object, now: str) -> bool:
-    """Whether a curve was designed on what has this digest."""
+    """Whether a curve was designed with this digest."""
     return curve_object.data.get(DESIGNED_ON) == now
 
 
 def _readable(curve_object):
-    """The record of a curve, of a version that is known here."""
+    """The record of a curve, if its version is supported."""
     record = curve_object[KEY]
     if record.get("version", 0) > VERSION:
         raise InputError(
             f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
-            "Update the extension to go on with it"
+            "Update the extension to use it"
         )
     return record
 
 
 def has_record(candidate) -> bool:
-    """Whether an object is a curve that was designed on a mesh."""
+    """Whether an object is a designed curve."""
     return candidate is not None and KEY in candidate
 
 
 def mesh_of(curve_object):
-    """The mesh object that a curve was designed on, or None where it is gone."""
+    """The mesh object that a curve was designed on, or None if it no longer exists."""
     found = curve_object[KEY].get("mesh")
     return found if found is not None and found.type == "MESH" else None
 
 
 def present_mesh(context, curve_object):
-    """The mesh object that a curve was designed on, which has to be in the scene."""
+    """The mesh object that a curve was designed on, or an error if it is not in the scene."""
     found = mesh_of(curve_object)
     if found is None or found.name not in context.view_layer.objects:
         raise InputError(
@@ -165,7 +165,7 @@ def present_mesh(context, curve_object):
 
 
 def mesh_of_context(context):
-    """The mesh whose curves are meant: the active one, or that of the active designed curve."""
+    """The active mesh, or the mesh of the active designed curve."""
     active = context.active_object
     if has_record(active):
         return mesh_of(active)
@@ -182,9 +182,9 @@ def curves_on(context, mesh_object) -> list:
 
 
 def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
-    """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's own space.
+    """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's local space.
 
-    Those whose triangle is gone are left out; a closed curve ends with its first point.
+    Points whose triangle no longer exists are left out; a closed curve ends with its first point.
     """
     record = curve_object[KEY]
     found = []
@@ -202,36 +202,36 @@ def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lies_on(curve_object, surface) -> bool:
-    """Whether all triangles that a curve runs over are still there."""
+    """Whether all triangles of a curve still exist."""
     record = curve_object[KEY]
     return bool((_recalled(record, "corners", "barycentric", surface)[0] >= 0).all())
 
 
 def designed_on(mesh_object) -> list:
-    """The curve objects that were designed on a mesh object, by name."""
+    """The curve objects designed on a mesh object, by name."""
     found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
     return sorted(found, key=lambda each: each.name)
 
 
 def asked_of(curve_object) -> Asked:
-    """What a curve was asked for."""
+    """The settings of a curve."""
     stored = curve_object[KEY].get("asked")
-    if stored is None:  # drawn before this was remembered
+    if stored is None:  # from a version that did not record them
         return Asked(closed=bool(curve_object[KEY]["closed"][0]))
     return Asked(**{field.name: field.type(stored[field.name]) for field in fields(Asked)})
 
 
 def recall(curve_object, surface) -> list:
-    """The curves of the core that an object remembers, on the mesh as it is now."""
+    """The recorded curves as curves of the core, on the present mesh."""
     from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
     faces, barycentric = _recalled(record, "corners", "barycentric", surface)
     if (faces < 0).any():
         raise InputError(
-            f'The mesh has changed since "{curve_object.name}" was drawn: '
-            f"{(faces < 0).sum()} of its {len(faces)} points lie on triangles that are gone. "
-            "Draw the curve again, or edit it, which puts its control points on the mesh as it is"
+            f'The mesh has changed since "{curve_object.name}" was designed: '
+            f"the triangles of {(faces < 0).sum()} of its {len(faces)} points no longer exist. "
+            "Draw the curve again, or edit it, which moves its control points to the present mesh"
         )
     curves, start, control = [], 0, 0
     for count, closed, controls in zip(
@@ -247,15 +247,15 @@ def recall(curve_object, surface) -> list:
 
 
 def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
-    """The control points of a curve as SurfacePoints, and places for those that are none any more.
+    """The control points of a curve as SurfacePoints, and the positions at its design.
 
-    Gives the points with the face -1 where the triangle is gone, and the positions in the object's
-    own space where they were when the curve was drawn, (k, 3).
+    The face is -1 where the triangle no longer exists. The positions, (k, 3), are in the object's
+    local space.
     """
     from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
-    if "control_corners" not in record:  # drawn before these were remembered
+    if "control_corners" not in record:  # from a version that did not record them
         (curve,) = recall(curve_object, surface)
         index = curve.control_index
         found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
@@ -266,10 +266,10 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
 
 
 def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
-    """The control points of a curve on the mesh as it is now, and how many had to be moved.
+    """The control points of a curve on the present mesh, and how many of them were moved.
 
-    Those whose triangles are gone take the nearest place to where they were. `mesh` is the core's
-    mesh of the surface, where there is one already.
+    A point whose triangle no longer exists moves to the nearest point of the surface. `mesh` is the
+    core's mesh of the surface, if it exists already.
     """
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
@@ -286,18 +286,18 @@ def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
 
 
 def _recalled(record, corners_name: str, weights_name: str, surface):
-    """Faces, (n,), -1 where they are gone, and barycentrics, (n, 3), of remembered points."""
+    """Faces, (n,), -1 if they no longer exist, and barycentrics, (n, 3), of recorded points."""
     corners = np.array(record[corners_name], dtype=np.int64).reshape(-1, 3)
     barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
     faces, order = _find_triangles(surface.faces, corners)
     if record["vertices"] > len(surface.local):
-        # Vertices were removed, and the others have other numbers now.
+        # Vertices were deleted, so the indices of the others may have changed.
         faces = np.full(len(corners), -1, dtype=np.int64)
     return faces, np.take_along_axis(barycentric, order, axis=1)
 
 
 def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The triangle that has three vertices, or -1, and for each of its corners which of these."""
+    """The triangle with the given vertices, or -1, and which of them each of its corners is."""
     known = {key: face for face, key in enumerate(map(tuple, np.sort(faces, axis=1).tolist()))}
     keys = map(tuple, np.sort(corners, axis=1).tolist())
     found = np.array([known.get(key, -1) for key in keys], dtype=np.int64)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A curve that is asked for, as plain arrays: read from Blender, then answered by the core.
+"""A request for a curve as plain arrays: read from Blender, then answered by the core.
 
-Reading takes place in Blender's thread. The answer touches no Blender data, so that it can be
-found by turns (`operators.turns`).
+Blender's thread reads the data. `answer` accesses no Blender data, so it can run in time slices
+(`operators.turns`).
 """
 
 from dataclasses import dataclass, replace
@@ -18,8 +18,8 @@ from .curve_record import Asked
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points` are control points and `options` options as the core takes them; `moved` of the
-    points are not where they were when the curve was designed before.
+    `points` and `options` are arguments of the core; `moved` counts the points that are no longer
+    at their positions of the previous design.
     """
 
     mesh_name: str
@@ -74,17 +74,17 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
 
 
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
-    """A request for a designed curve once more, on the mesh as it is now."""
+    """A request to design a curve again, on the present mesh."""
     points, moved = curve_record.controls_now(curve_object, surface)
     return replace(for_points(mesh_object, surface, points, "given", asked), moved=moved)
 
 
 def answer(request: DesignRequest, progress):
-    """Let the core design the curve; touches no Blender data."""
+    """Design the curve with the core, without access to Blender data."""
     from ... import nicmm_core as nicmm
 
     asked = request.asked
-    with designers.lent(request.surface.solved, request.surface.faces) as designer:
+    with designers.exclusive(request.surface.solved, request.surface.faces) as designer:
         try:
             return designer.design(
                 request.points, order=request.order, progress=progress, **request.options

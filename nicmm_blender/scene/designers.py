@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the core's factorisations of the last meshes.
+"""A cache of the core's designers, with their factorisations, for the last meshes.
 
-The redo panel runs the operator again for every change of a setting, on the same mesh.
+The redo panel runs the operator again on the same mesh for every change of a setting.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ _designers: dict = {}
 
 
 def designer_for(vertices: np.ndarray, faces: np.ndarray):
-    """The core's designer for a mesh, made anew only where the mesh has changed."""
+    """The core's designer for a mesh, created only if the mesh has changed."""
     fingerprint = _fingerprint(vertices, faces)
     designer = _taken(fingerprint, vertices, faces)
     _keep(fingerprint, designer)
@@ -23,11 +23,11 @@ def designer_for(vertices: np.ndarray, faces: np.ndarray):
 
 
 @contextmanager
-def lent(vertices: np.ndarray, faces: np.ndarray):
-    """The same for work by turns: nobody else gets this designer until it is given back.
+def exclusive(vertices: np.ndarray, faces: np.ndarray):
+    """Yield the designer for a mesh, without sharing it meanwhile; for work in time slices.
 
-    A designer works on one curve at a time, and who waited for one that is parked would do so for
-    ever.
+    A designer works on one curve at a time: a caller that waited for one whose thread is blocked
+    would wait for ever.
     """
     fingerprint = _fingerprint(vertices, faces)
     designer = _taken(fingerprint, vertices, faces)
@@ -38,7 +38,7 @@ def lent(vertices: np.ndarray, faces: np.ndarray):
 
 
 def forget() -> None:
-    """Give the memory back."""
+    """Free the memory."""
     _designers.clear()
 
 
@@ -49,7 +49,7 @@ def _fingerprint(vertices: np.ndarray, faces: np.ndarray) -> bytes:
 
 
 def _taken(fingerprint: bytes, vertices: np.ndarray, faces: np.ndarray):
-    """The designer for a mesh, which is kept no longer."""
+    """Remove the designer for a mesh from the cache, or create one."""
     from ... import nicmm_core as nicmm
 
     designer = _designers.pop(fingerprint, None)
@@ -57,7 +57,7 @@ def _taken(fingerprint: bytes, vertices: np.ndarray, faces: np.ndarray):
 
 
 def _keep(fingerprint: bytes, designer) -> None:
-    """Keep a designer as the most recently used, and not too many."""
+    """Store a designer as the most recently used, and drop the oldest ones."""
     _designers[fingerprint] = designer
     while len(_designers) > preferences.kept_meshes():
         del _designers[next(iter(_designers))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads what the core needs from a mesh object: triangles, selected vertices, vertex groups.
+"""Reads the data for the core from a mesh object: triangles, selected vertices, vertex groups.
 
 Blender keeps a separate copy of a mesh that is being edited: call `synchronise` first.
 """
@@ -11,17 +11,17 @@ import numpy as np
 import bmesh
 
 FLAT = 1e-6
-"""Least scale of an object relative to its largest one; single precision knows no less."""
+"""Least scale along an axis relative to the largest one, limited by single precision."""
 
 
 class InputError(Exception):
-    """The Blender data does not say what was asked for; the message says what to change."""
+    """The Blender data cannot be used; the message says what to change."""
 
 
 def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
-    """The core's message as a user reads it: points count from one, and the map is named.
+    """The core's message for the user: points are counted from one, and the map is named.
 
-    `vertices` are the indices of the vertices that the control points are at, if they are.
+    `vertices` are the vertices of the control points, or None if they are not at vertices.
     """
     text = str(error)
     for point in getattr(error, "points", ()):
@@ -36,12 +36,12 @@ def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
 
 @dataclass(frozen=True)
 class Triangles:
-    """A mesh as the core takes it.
+    """A triangulated mesh for the core.
 
-    `local` and `solved` hold the (V, 3) positions in the object's own space and in the space where
-    lengths are what the user sees; `faces` holds the (F, 3) vertex indices, `loops` the (F, 3)
-    indices of the mesh's corners and `polygons` the (F,) faces of the mesh that they are parts of.
-    `linear` is the (3, 3) map from the one space to the other.
+    `local` and `solved` hold the (V, 3) positions in the object's local space and in a space with
+    the lengths of the scene. `faces` holds the (F, 3) vertex indices, `loops` the (F, 3) indices of
+    the mesh's corners and `polygons` the (F,) faces of the mesh that the triangles are parts of.
+    `linear` is the (3, 3) map from the local space to the other.
     """
 
     local: np.ndarray
@@ -52,20 +52,20 @@ class Triangles:
     linear: np.ndarray
 
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Positions in the object's own space of points given by face and barycentrics."""
+        """Positions in the object's local space of points given by face and barycentrics."""
         return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal in the object's own space."""
+        """Length of the bounding box's diagonal in the object's local space."""
         return float(np.linalg.norm(np.ptp(self.local, axis=0)))
 
 
 def mesh_object(context):
-    """The mesh to draw on: the active object, or the mesh that the active curve was drawn on.
+    """The mesh to design on: the active object, or the mesh of the active curve.
 
-    Blender shows the redo panel only while the operator could run again, and by then the new curve
-    is the active object.
+    Blender shows the redo panel only while the operator can run again, and then the new curve is
+    the active object.
     """
     active = context.active_object
     if active is not None and active.type in {"CURVE", "CURVES"}:
@@ -74,13 +74,13 @@ def mesh_object(context):
 
 
 def synchronise(mesh_object) -> None:
-    """Bring the mesh up to date with what is being edited."""
+    """Update the mesh from Edit Mode."""
     if mesh_object.mode == "EDIT":
         mesh_object.update_from_editmode()
 
 
 def triangles(mesh_object) -> Triangles:
-    """Positions and triangles; quads and larger faces are cut as Blender draws them."""
+    """Positions and triangles; quads and larger faces are triangulated as Blender draws them."""
     mesh = mesh_object.data
     positions = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertices.foreach_get("co", positions.ravel())
@@ -97,8 +97,8 @@ def triangles(mesh_object) -> Triangles:
     stretches = np.linalg.svd(linear, compute_uv=False)
     if stretches[-1] <= FLAT * stretches[0]:
         raise InputError(
-            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Give it another '
-            "scale (Object > Clear > Scale)"
+            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Reset it '
+            "(Object > Clear > Scale)"
         )
     if _keeps_proportions(linear):
         linear = np.eye(3)
@@ -109,14 +109,15 @@ def triangles(mesh_object) -> Triangles:
 def _keeps_proportions(linear: np.ndarray) -> bool:
     """Whether a transform is a rotation, mirror image or uniform scale, up to rounding.
 
-    Then the curve is the same in the object's own space, and turning the object does not change it.
+    Then the core works in the object's local space, so that rotating the object does not change the
+    curve by rounding.
     """
     gram = linear.T @ linear
     return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))
 
 
 def shown_beyond_the_mesh(mesh_object) -> str:
-    """What makes an object look other than the mesh that is solved on, in words."""
+    """Name the modifiers and shape keys, which the curve ignores; empty if there are none."""
     shown = []
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
         shown.append("modifiers")
@@ -136,7 +137,7 @@ def selected_vertices(mesh_object) -> np.ndarray:
 
 
 def selection_history(mesh_object) -> np.ndarray:
-    """Indices of the vertices that Blender remembers as selected one by one, oldest first."""
+    """Indices of the vertices in Blender's selection history, oldest first."""
     mesh = mesh_object.data
     if mesh_object.mode == "EDIT":
         return _history(bmesh.from_edit_mesh(mesh))
@@ -149,7 +150,7 @@ def selection_history(mesh_object) -> np.ndarray:
 
 
 def _history(edited) -> np.ndarray:
-    # list() at once: some Blenders give an iterator that a generator expression refuses.
+    # list() first: in some Blender versions a generator expression fails on this iterator.
     elements = list(edited.select_history)
     vertices = [found.index for found in elements if isinstance(found, bmesh.types.BMVert)]
     return np.array(vertices, dtype=np.int64)
@@ -158,8 +159,8 @@ def _history(edited) -> np.ndarray:
 def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     """Return the selected vertices and the core's order for them, "given" or "shortest".
 
-    Box, circle and lasso selection leave no history and old entries stay in it, so the history
-    counts only where it holds exactly the selected vertices.
+    Box, circle and lasso selection are not recorded and old entries stay in the history, so it is
+    used only if it holds exactly the selected vertices.
     """
     selected = selected_vertices(mesh_object)
     if len(selected) == 0:
@@ -174,7 +175,7 @@ def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
         return history, "given"
     if order == "GIVEN":
         raise InputError(
-            f"Blender remembers the order of {np.isin(selected, history).sum()} of the "
+            f"Blender has recorded the order of {np.isin(selected, history).sum()} of the "
             f"{len(selected)} selected vertices. Select them one by one with Shift-click, "
             "or set Order to Automatic or Shortest"
         )
@@ -197,9 +198,9 @@ def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str
 
 
 def given_points(surface, text: str, order: str) -> tuple[np.ndarray, str]:
-    """Return the control points of a script as the core takes them, and their order.
+    """Return the control points of a script for the core, and their order.
 
-    The text holds vertex indices or places in the object's own space, "12, 80, 0.5 0 1".
+    The text holds vertex indices or positions in the object's local space, "12, 80, 0.5 0 1".
     """
     core_order = "shortest" if order == "SHORTEST" else "given"
     given = [_given_point(word, len(surface.local)) for word in text.split(",")]
@@ -213,7 +214,7 @@ def given_points(surface, text: str, order: str) -> tuple[np.ndarray, str]:
 
 
 def _given_point(word: str, count: int) -> int | np.ndarray:
-    """A vertex index, or a place in the object's own space, (3,)."""
+    """A vertex index, or a position in the object's local space, (3,)."""
     numbers = word.split()
     try:
         point = int(word) if len(numbers) == 1 else np.array(numbers, dtype=np.float64)
@@ -221,8 +222,8 @@ def _given_point(word: str, count: int) -> int | np.ndarray:
         point = np.zeros(0)
     if isinstance(point, np.ndarray) and point.shape != (3,):
         raise InputError(
-            f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Give '
-            'points with commas and coordinates with spaces, such as "12, 80, 0.5 0 1"'
+            f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Separate '
+            'points by commas and coordinates by spaces, such as "12, 80, 0.5 0 1"'
         )
     if isinstance(point, int) and not 0 <= point < count:
         raise InputError(
@@ -232,7 +233,7 @@ def _given_point(word: str, count: int) -> int | np.ndarray:
 
 
 def marked_edges(mesh_object, mark: str) -> np.ndarray:
-    """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
+    """Vertices, (n, 2), of the edges with a mark, such as "use_seam"."""
     edges = mesh_object.data.edges
     marked = np.empty(len(edges), dtype=bool)
     edges.foreach_get(mark, marked)
@@ -257,7 +258,7 @@ def check_local(mesh_object, consequence: str) -> None:
 
 
 def vertex_group(mesh_object, name: str):
-    """A vertex group by its name."""
+    """Return the vertex group with this name."""
     group = mesh_object.vertex_groups.get(name)
     if group is None:
         groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)

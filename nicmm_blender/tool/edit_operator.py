@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool that edits a curve live: mouse and keys become changes of an `edit_session`."""
+"""The tool that edits a curve interactively: mouse and keys change an `edit_session`."""
 
 import time
 from dataclasses import replace
@@ -18,13 +18,13 @@ from .edit_view import view_of
 from .edited_curve import chosen, keep, open_session
 
 INTERVAL = 1.0 / 60.0
-"""Seconds between two steps of a curve that is coming to rest."""
+"""Seconds between two steps of a curve that is converging."""
 
 PAUSE = 0.15
-"""Seconds that the mouse has to rest before a curve is designed anew while a point is dragged."""
+"""Seconds without mouse movement before a dragged curve is designed from scratch."""
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
-"""How near the mouse has to be to a point and to the curve, in pixels at a scale of 1."""
+"""Greatest distance of the mouse from a point and from the curve, in pixels at a scale of 1."""
 
 PASSED_ON = NAVIGATION | {
     "HOME",
@@ -35,13 +35,13 @@ PASSED_ON = NAVIGATION | {
     "NUMPAD_MINUS",
     "NUMPAD_SLASH",
 }
-"""Events that Blender itself handles, so that the view can be turned while editing."""
+"""Events that Blender handles, so that the view can be moved while editing."""
 
 HINTS = (
-    ("MOUSE_LMB", "Add, move, insert on the curve"),
+    ("MOUSE_LMB", "Add, Move, Insert on the Curve"),
     ("EVENT_CTRL", ""),
     ("MOUSE_LMB", "Remove"),
-    ("EVENT_C", "Closed or open"),
+    ("EVENT_C", "Closed or Open"),
     ("EVENT_O", "Obstacles"),
     ("EVENT_A", "Alignment"),
     ("EVENT_UP_ARROW", ""),
@@ -61,13 +61,13 @@ class NICMM_PG_control_point(bpy.types.PropertyGroup):
 
     position: bpy.props.FloatVectorProperty(
         name="Position",
-        description="Place on the surface in the object's own space",
+        description="Position on the surface in the object's local space",
         subtype="XYZ",
     )
 
 
 class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
-    """Draw a curve on the surface of the mesh point by point, or edit one that was drawn before"""
+    """Draw a curve on the surface of the mesh point by point, or edit a designed curve"""
 
     bl_idname = "nicmm.edit_curve"
     bl_label = "Edit Curve on Surface"
@@ -75,7 +75,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
     output: bpy.props.EnumProperty(
         name="Output",
-        description="What a new curve becomes",
+        description="Type of a new curve object",
         items=(
             ("CURVE", "Curve", "A curve object of polylines"),
             ("STICKY", "Sticky Curves", "A hair curves object that follows the mesh"),
@@ -86,19 +86,19 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     tube: _OUTPUT["tube"]
     curve: bpy.props.StringProperty(
         name="Curve Object",
-        description="The designed curve to edit. Empty for the active one, or for a new curve "
-        "where a mesh is active",
+        description="Name of the designed curve to edit. Leave empty to edit the active curve, or "
+        "to draw a new one if a mesh is active",
         options={"SKIP_SAVE", "HIDDEN"},
     )
     points: bpy.props.CollectionProperty(
         name="Control Points",
-        description="Control points of the curve, in scripts. Empty for those that it has",
+        description="Control points of the curve, for scripts. Leave empty to keep its points",
         type=NICMM_PG_control_point,
         options={"SKIP_SAVE", "HIDDEN"},
     )
     at_mouse: bpy.props.BoolProperty(
         name="At Mouse",
-        description="Begin with a click where the mouse is",
+        description="Begin with a click at the mouse position",
         default=False,
         options={"SKIP_SAVE", "HIDDEN"},
     )
@@ -140,11 +140,11 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
                 "z)}, …], or draw with the mouse in the 3D viewport"
             )
-        session.settle()
+        session.converge()
         return self._keep(context, opened, edited)
 
     def _asked_for(self, context, edited) -> Asked:
-        """What was set for this call, over what the curve was asked for, or the panel says."""
+        """The settings of the curve or the panel, with those set for this call."""
         if edited is None:
             asked = curve_record.asked_by(context.scene.nicmm_curves)
         else:
@@ -172,24 +172,27 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         if self.at_mouse:
             clicked = self._clicked(context, event)
             if clicked is None:
-                # Beside the mesh a click selects, as with Blender's own tools.
+                # Off the mesh a click selects, as with Blender's own tools.
                 bpy.ops.view3d.select("INVOKE_DEFAULT")
                 return {"CANCELLED"}
             edited = clicked[0]
         self._opened = opened = open_session(context, edited, self._asked_for(context, edited))
         self._edited_name = "" if edited is None else edited.name
-        self._curtain = _Curtain(opened.mesh_object, edited)
+        self._hidden = _Hidden(opened.mesh_object, edited)
         self._overlay = Overlay(opened.mesh_object, opened.session)
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
-        self._say(context)
+        self._show_status(context)
         if self.at_mouse:
             self._press(context, event)
         viewports.redraw()
         return {"RUNNING_MODAL"}
 
     def _clicked(self, context, event) -> tuple | None:
-        """The designed curve under the mouse, or None for a new one; nothing beside the mesh."""
+        """A tuple of the designed curve under the mouse, or of None for a new one.
+
+        None if the mouse is neither on the mesh nor on a curve.
+        """
         mesh_object = mesh_data.mesh_object(context)
         mesh_data.synchronise(mesh_object)
         surface = mesh_data.triangles(mesh_object)
@@ -218,17 +221,15 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         return result
 
     def cancel(self, context):
-        """Called by Blender where the tool cannot end by itself, as when it quits."""
+        """Called by Blender if it ends the tool, for example when it quits."""
         self._end(context)
 
     def _modal(self, context, event):
         session = self._opened.session
         if event.type == "TIMER":
             idle = time.monotonic() - self._last_move > PAUSE
-            # A new design takes longer than a frame: not while the mouse moves.
-            if not session.resting and (
-                idle or not (session.waiting and self._grabbed is not None)
-            ):
+            # A design from scratch takes longer than a frame, so it waits until the mouse stops.
+            if not session.idle and (idle or not (session.waiting and self._grabbed is not None)):
                 session.step()
                 self._show(context)
             return {"RUNNING_MODAL"}
@@ -345,7 +346,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             self._end(context)
             return {"CANCELLED"}
         self._release(context)
-        session.settle()
+        session.converge()
         if session.what_is_missing():
             self._show(context)
             return {"RUNNING_MODAL"}
@@ -356,9 +357,9 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         return bpy.data.objects.get(self._edited_name) if self._edited_name else None
 
     def _end(self, context) -> None:
-        """Leave everything in the window as it was."""
+        """Restore the window."""
         self._overlay.remove()
-        self._curtain.open()
+        self._hidden.restore()
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
         if self._area is not None:
@@ -366,7 +367,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         viewports.redraw()
 
     def _keep(self, context, opened, edited):
-        """Write the curve of a session, and remember how it was made for the redo panel."""
+        """Write the curve of a session, and store its settings for the redo panel."""
         session = opened.session
         missing = session.what_is_missing()
         if missing:
@@ -381,7 +382,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         self.report({"INFO"}, f'"{made.name}" through {count} points{opened.remark}')
         return {"FINISHED"}
 
-    # What the user sees.
+    # Display.
 
     def _view(self, context, event, anywhere: bool = False):
         opened = self._opened
@@ -391,7 +392,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     def _view_on(self, context, event, mesh_object, surface, mesh, anywhere: bool = False):
         """The view under the mouse and the pixel in its region; None over panels and elsewhere.
 
-        With `anywhere` also beyond the edge of the region where the mouse was pressed.
+        With `anywhere` also outside the region in which the mouse button was pressed.
         """
         for region in self._area.regions:
             inside = (
@@ -415,18 +416,18 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         return view_of(region, region.data, mesh_object, surface, mesh), pixel
 
     def _show(self, context) -> None:
-        self._say(context)
+        self._show_status(context)
         viewports.redraw()
 
-    def _say(self, context) -> None:
+    def _show_status(self, context) -> None:
         session = self._opened.session
         self._area.header_text_set(in_words(session) + self._opened.remark)
         problem = session.problem or session.state.notice
         context.workspace.status_text_set(lambda header, _context: _draw_hints(header, problem))
 
 
-class _Curtain:
-    """Hides what would be in the way while editing: the old curve, and modifiers of the mesh."""
+class _Hidden:
+    """Hides the old curve and the modifiers of the mesh while editing."""
 
     def __init__(self, mesh_object, edited) -> None:
         self._modifiers = [each for each in mesh_object.modifiers if each.show_viewport]
@@ -436,7 +437,7 @@ class _Curtain:
         if self._edited is not None:
             self._edited.hide_set(True)
 
-    def open(self) -> None:
+    def restore(self) -> None:
         for modifier in self._modifiers:
             modifier.show_viewport = True
         if self._edited is not None:
@@ -453,7 +454,7 @@ def _draw_hints(header, problem: str) -> None:
 
 
 def in_words(session) -> str:
-    """One line on what the curve is asked for."""
+    """The settings of the curve in one line."""
     asked = session.asked
     count = len(session.points)
     parts = [
@@ -464,7 +465,7 @@ def in_words(session) -> str:
         f"alignment: {asked.alignment_group or 'none'}",
     ]
     if asked.closed and count == 2:
-        parts[1] = "closed from three points on"
+        parts[1] = "closed with three or more points"
     return ", ".join(parts)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws a curve that is being edited, with its control points, over the 3D viewports.
+"""Draws the edited curve and its control points over the 3D viewports.
 
-What the mesh hides is drawn too, but dimmed.
+Parts hidden by the mesh are dimmed.
 """
 
 import bpy
@@ -19,17 +19,17 @@ POINT = (1.0, 1.0, 1.0, 1.0)
 UNDER_MOUSE = (0.35, 0.85, 1.0, 1.0)
 OUTLINE = (0.05, 0.05, 0.05, 1.0)
 HIDDEN = 0.22
-"""Opacity of what the mesh hides."""
+"""Opacity of parts hidden by the mesh."""
 
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
 """In pixels at a resolution scale of 1."""
 
 CORNERS = 20
-"""Of a round point."""
+"""Number of corners of the disc that shows a point."""
 
 
 class Overlay:
-    """What is drawn of an editing session; `hover` is the number of the point under the mouse."""
+    """The drawing of an editing session; `hover` is the index of the point under the mouse."""
 
     def __init__(self, mesh_object, session) -> None:
         self.mesh_object, self.session = mesh_object, session
@@ -113,7 +113,7 @@ class Overlay:
 
 
 def _disc() -> np.ndarray:
-    """Triangles of a disc of radius 1, three corners after each other, (n, 2)."""
+    """Triangles of a disc of radius 1, as consecutive corners, (n, 2)."""
     angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
     rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.stack([np.zeros((CORNERS, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
@@ -123,9 +123,9 @@ _DISC = _disc()
 
 
 def _towards_the_eye(region_3d, mesh_object, surface):
-    """The model-view matrix, but a little nearer, so that lines on the surface lie in front of it.
+    """The model-view matrix, moved slightly towards the eye: lines lie in front of the mesh.
 
-    In perspective towards the eye, so that nothing moves on the screen.
+    In perspective it scales about the eye, so that no point moves on the screen.
     """
     world = mesh_object.matrix_world
     step = OFFSET * surface.diagonal * max(world.to_scale(), key=abs)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A curve while it is edited: its control points, what it is asked for, and what can be taken back.
+"""An editing session: the control points and settings of a curve, with undo.
 
-Nothing here knows of windows and events. Every change is answered by a bounded amount of work:
-a few iterations from the last curve, and `step` goes on until it has converged. Where the last
-curve cannot be used, as after a long jump of a point, `waiting` says that the curve has to be
-designed anew, which takes longer; `step` does that too. A request that cannot be met leaves the
-last curve that could, and `problem` says why.
+It does not depend on windows and events. Every change does a bounded amount of work: a few
+iterations from the last curve, which `step` continues until the curve has converged. If the last
+curve cannot be used, for example after a point jumps far, the curve has to be designed from
+scratch, which takes longer: `waiting` is set, and `step` does it. If a request cannot be met, the
+last curve stays, and `problem` holds the reason.
 """
 
 from collections.abc import Callable
@@ -19,24 +19,24 @@ from ..scene.curve_record import Asked
 from ..scene.mesh_data import InputError, in_words
 
 ITERATIONS = 3
-"""Of a step: a frame or two of live drawing."""
+"""Iterations in a step, which take one or two frames."""
 
 MOST_STEPS = 60
-"""Steps from a change until the curve is taken as it is; most need fewer than five."""
+"""Steps after a change before the curve is designed from scratch; most need fewer than five."""
 
 SMOOTHER = 1.25
-"""Factor of one step of smoothness."""
+"""Factor between two levels of smoothness."""
 
 SMOOTHNESS_LIMITS = (0.01, 100.0)
 
 
 @dataclass(frozen=True)
 class State:
-    """What one step of undo brings back.
+    """The state that one undo step restores.
 
-    `points` are the core's SurfacePoints. `found` is the last Design, a SurfaceCurve that was
-    opened, or None, and `problem` says why it does not answer the request; `notice` is a remark on
-    it. `converged` says whether it is the final one for these points.
+    `points` are SurfacePoints of the core. `found` is the last Design, the SurfaceCurve that was
+    opened, or None; `problem` is the reason why it does not meet the request, `notice` a remark on
+    it, and `converged` whether it is the final one for these points.
     """
 
     points: object
@@ -56,10 +56,10 @@ class EditSession:
     designer : nicmm_core.Designer
         Of the same triangles.
     weights : callable
-        From the name of a vertex group to its weights, None for no name.
+        Maps the name of a vertex group to its weights, and "" to None.
     asked : Asked
     points, curve : optional
-        Control points and curve to go on from.
+        Control points and curve to start with.
     """
 
     def __init__(
@@ -102,50 +102,50 @@ class EditSession:
 
     @property
     def curve(self):
-        """The curve as it is now, the core's SurfaceCurve, or None before there is one."""
+        """The present curve, a SurfaceCurve of the core, or None before there is one."""
         found = self.state.found
         return found.curves[0] if isinstance(found, self._nicmm.Design) else found
 
     @property
     def problem(self) -> str:
-        """Why the curve is not the one that was asked for; empty where it is."""
+        """Why the curve does not meet the request; empty if it does."""
         return self.state.problem
 
     @property
     def closed(self) -> bool:
-        """Whether the points ask for a closed curve now: two of them can only be joined."""
+        """Whether the curve is closed now: two points are joined by an open curve."""
         return self.asked.closed and len(self.points) >= FEWEST_CLOSED
 
     @property
-    def resting(self) -> bool:
-        """Whether nothing is left to be done by `step`."""
+    def idle(self) -> bool:
+        """Whether `step` has no work left."""
         return not self.waiting and not self._steps_left
 
     @property
     def untouched(self) -> bool:
-        """Whether nothing was done that undo could take back."""
+        """Whether there is nothing to undo."""
         return not self._done
 
     def positions(self) -> np.ndarray:
-        """Where the control points are in the object's own space, (k, 3)."""
+        """Positions of the control points in the object's local space, (k, 3)."""
         return self.surface.points(self.points.faces, self.points.barycentric)
 
     def polyline(self) -> np.ndarray:
-        """The curve's points in the object's own space, (n, 3); the first again if closed."""
+        """The curve's points in the object's local space, (n, 3); the first again if closed."""
         if self.curve is None:
             return np.zeros((0, 3))
         line = self.surface.points(self.curve.faces, self.curve.barycentric)
         return np.concatenate([line, line[:1]]) if self.curve.closed else line
 
-    # Changes; each can be taken back.
+    # Changes; each can be undone.
 
     def add(self, face: int, barycentric) -> int:
-        """Put a point after the last one, and return its number."""
+        """Append a point and return its index."""
         self._keep()
         return self._insert(len(self.points), face, barycentric)
 
     def set_points(self, positions: np.ndarray) -> None:
-        """Replace all points by places on the surface in the object's own space, (k, 3)."""
+        """Replace all points by positions on the surface in the object's local space, (k, 3)."""
         from ...nicmm_core.geometry.surface_points import locate_points
 
         solved = positions @ self.surface.linear.T
@@ -155,9 +155,9 @@ class EditSession:
         self._ask()
 
     def insert(self, segment: int, share: float) -> int:
-        """Put a point on the curve, between two of its points; return the new one's number.
+        """Insert a point on the curve, between two of its points; return its index.
 
-        Parameters: which segment of `polyline`, and how far along it.
+        Parameters: the segment of `polyline`, and the fraction of its length.
         """
         from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
 
@@ -167,18 +167,18 @@ class EditSession:
         return self._insert(number, place.faces[0], place.barycentric[0])
 
     def remove(self, number: int) -> None:
-        """Take a point away."""
+        """Remove a point."""
         self._keep()
         left = np.delete(np.arange(len(self.points)), number)
         self.state = replace(self.state, points=self.points[left])
         self._ask()
 
     def grab(self) -> None:
-        """Begin to move points; all moves until `drop` are one step of undo."""
+        """Begin to move a point; all moves until `drop` are one undo step."""
         self._before_drag, self._dragging = self.state, True
 
     def move(self, number: int, face: int, barycentric) -> None:
-        """Move a point that was grabbed."""
+        """Move the grabbed point."""
         if self._before_drag is not None:
             self._keep(self._before_drag)
             self._before_drag = None
@@ -194,39 +194,39 @@ class EditSession:
         self._dragging = False
 
     def drop_back(self) -> None:
-        """End a move and take it back."""
+        """End a move and undo it."""
         if self._dragging and self._before_drag is None:
             self.undo()
             self._undone.pop()
         self.drop()
 
     def ask_for(self, **changes) -> None:
-        """Change what the curve is asked for, by the names of `Asked`."""
+        """Change settings of the curve, named as in `Asked`."""
         asked = replace(self.asked, **changes)
         if asked != self.asked:
             self._keep()
             self.state = replace(self.state, asked=asked)
-            # Other maps may lead to another course.
-            self._ask(anew=changes.keys() != {"smoothness"})
+            # With other maps the best course may be a different one.
+            self._ask(from_scratch=changes.keys() != {"smoothness"})
 
     def smoother(self, steps: int) -> None:
-        """Raise the smoothness by some steps, or lower it by a negative number of them."""
+        """Raise the smoothness by some levels, or lower it by a negative number of them."""
         wanted = self.asked.smoothness * SMOOTHER**steps
         self.ask_for(smoothness=float(np.clip(wanted, *SMOOTHNESS_LIMITS)))
 
     def undo(self) -> bool:
-        """Take the last change back; False where there is none."""
+        """Undo the last change; False if there is none."""
         return self._go(self._done, self._undone)
 
     def redo(self) -> bool:
-        """Make the last change that was taken back again; False where there is none."""
+        """Redo the last change that was undone; False if there is none."""
         return self._go(self._undone, self._done)
 
     # Work.
 
     def step(self) -> bool:
-        """Do a bounded amount of work, or design anew where `waiting`; whether something was."""
-        if self.resting:
+        """Do a bounded amount of work, or design from scratch if `waiting`; False if idle."""
+        if self.idle:
             return False
         if self.waiting:
             self._design()
@@ -234,17 +234,17 @@ class EditSession:
             self._go_on()
         return True
 
-    def settle(self) -> None:
+    def converge(self) -> None:
         """Work until the curve has converged."""
         while self.step():
             pass
 
     def what_is_missing(self) -> str:
-        """Why there is no curve to keep, in words; empty where there is."""
+        """Why there is no curve to keep; empty if there is one."""
         if self.problem:
             return self.problem
         if self.curve is None:
-            return "A curve needs two points at least, a closed one three. Click on the surface"
+            return "A curve needs at least two points, a closed one three. Click on the surface"
         return ""
 
     def _keep(self, state: State | None = None) -> None:
@@ -257,7 +257,7 @@ class EditSession:
         target.append(self.state)
         self.state = source.pop()
         self.drop()
-        self._rest()
+        self._drop_work()
         if not (self.problem or self.state.converged):
             self._ask()
         return True
@@ -271,17 +271,17 @@ class EditSession:
         self._ask()
         return number
 
-    def _rest(self) -> None:
+    def _drop_work(self) -> None:
         self.waiting, self._steps_left = False, 0
 
-    def _ask(self, anew: bool = False) -> None:
-        """Answer a change: at once as far as bounded work goes, or later where `anew`."""
-        self._rest()
+    def _ask(self, from_scratch: bool = False) -> None:
+        """Respond to a change, with bounded work now, or with a design `from_scratch` later."""
+        self._drop_work()
         if len(self.points) < FEWEST_OPEN:
             self.state = replace(self.state, found=None, problem="", notice="", converged=True)
             return
         self.state = replace(self.state, converged=False, problem="")
-        if anew or self.state.found is None:
+        if from_scratch or self.state.found is None:
             self.waiting = True
             return
         self._steps_left = MOST_STEPS
@@ -292,11 +292,11 @@ class EditSession:
         try:
             design = self._answer(start=self.state.found, max_iterations=ITERATIONS)
         except self._nicmm.CurveError:
-            self._rest()
+            self._drop_work()
             self.waiting = True
             return
         if design is None:
-            self._rest()
+            self._drop_work()
         elif design.status is not self._nicmm.Status.ITERATION_LIMIT:
             self._steps_left = 0
         elif not self._steps_left:
@@ -304,11 +304,11 @@ class EditSession:
         self._take(design)
 
     def _design(self) -> None:
-        self._rest()
+        self._drop_work()
         self._take(self._answer())
 
     def _answer(self, **bounds):
-        """The core's design, or None where it has none; `problem` says why."""
+        """The core's design, or None with the reason in `problem`."""
         self.state = replace(self.state, problem="")
         try:
             return self.designer.design(self.points, **self._options(), **bounds)
@@ -319,7 +319,7 @@ class EditSession:
             return None
 
     def _take(self, design) -> None:
-        """Show what a design brought."""
+        """Store a design."""
         nicmm = self._nicmm
         if design is None:
             return
@@ -328,11 +328,11 @@ class EditSession:
             self.state,
             found=design,
             notice="" if design.status in good else str(design.status),
-            converged=self.resting,
+            converged=self.idle,
         )
 
     def _options(self) -> dict:
-        """The options of the core; points in the order given, and its method that goes on."""
+        """The options of the core, with the method that can continue from a curve."""
         options = curve_record.arguments_of(self.asked, self._weights_of)
         return {**options, "closed": self.closed, "method": "nicmm"}
 
@@ -342,5 +342,5 @@ class EditSession:
         return self._weights[name]
 
     def _in_words(self, error: Exception) -> str:
-        """The core's message, with its points numbered as the user counts them."""
+        """The core's message for the user, with points counted from one."""
         return in_words(error, self.asked.obstacle_group)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is under the mouse: between the pixels of a viewport and places on a mesh.
+"""Maps between the pixels of a viewport and points of a mesh.
 
-Positions of the mesh are in the object's own space; pixels are those of the region.
+Positions of the mesh are in the object's local space, pixels in the region.
 """
 
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 OFFSET = 2e-3
-"""How far in front of the surface things on it are drawn and looked for, in mesh diagonals."""
+"""Offset towards the eye in drawing and in tests of visibility, in mesh diagonals."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A viewport's region looking at a mesh.
+    """A mesh in a viewport's region.
 
-    `perspective` is the (4, 4) matrix from the object's own space to clip space, `size` the
+    `perspective` is the (4, 4) matrix from the object's local space to clip space, `size` the
     region's width and height in pixels; `surface` is the `mesh_data.Triangles` and `mesh` the
     core's mesh of them.
     """
@@ -27,14 +27,14 @@ class View:
     mesh: object
 
     def project(self, positions: np.ndarray) -> np.ndarray:
-        """Pixels of positions, (n, 2); NaN where they are behind the eye."""
+        """Pixels of positions, (n, 2); NaN if they are behind the eye."""
         clip = positions @ self.perspective[:, :3].T + self.perspective[:, 3]
         behind = clip[:, 3] <= 0.0
         depth = np.where(behind, np.nan, clip[:, 3])
         return (clip[:, :2] / depth[:, None] + 1.0) * 0.5 * self.size
 
     def ray(self, pixel) -> tuple[np.ndarray, np.ndarray]:
-        """Where a pixel's line of sight enters the view, and the vector to where it leaves it."""
+        """The near end of a pixel's line of sight in the view, and the vector to its far end."""
         inverse = np.linalg.inv(self.perspective)
         flat = 2.0 * np.asarray(pixel, dtype=np.float64) / self.size - 1.0
         ends = np.array([[*flat, -1.0, 1.0], [*flat, 1.0, 1.0]]) @ inverse.T
@@ -42,7 +42,7 @@ class View:
         return near, far - near
 
     def place_at(self, pixel) -> tuple[int, np.ndarray] | None:
-        """Face and barycentrics of the surface under a pixel; None beside the mesh."""
+        """Face and barycentrics of the surface under a pixel; None off the mesh."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
         rays = [vector[None] @ self.surface.linear.T for vector in self.ray(pixel)]
@@ -51,7 +51,7 @@ class View:
         return None if face < 0 else (face, points.barycentric[0])
 
     def visible(self, positions: np.ndarray) -> np.ndarray:
-        """Which positions no part of the mesh hides, (n,)."""
+        """Which positions are not hidden by the mesh, (n,)."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
         if not len(positions):
@@ -74,9 +74,9 @@ class View:
         return int(near[away[near].argmin()]) if len(near) else None
 
     def nearest_on_line(self, pixel, line: np.ndarray, reach: float) -> tuple[int, float] | None:
-        """Segment of a polyline, (n, 3), nearest to a pixel, and how far along; None beyond reach.
+        """The segment of a polyline, (n, 3), nearest to a pixel, and the fraction along it.
 
-        Only visible parts count.
+        None if no visible part is within reach.
         """
         flat = self.project(line)
         start, step = flat[:-1], np.diff(flat, axis=0)

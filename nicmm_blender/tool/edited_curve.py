@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between curve objects in the file and editing sessions: opens one, and keeps what it made."""
+"""Opens an editing session on a curve object, and writes its curve back."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ from .edit_session import EditSession
 
 @dataclass(frozen=True)
 class Opened:
-    """A session, the mesh object that it is on, and what is to be said of them."""
+    """A session, its mesh object, and a remark for the user."""
 
     mesh_object: object
     session: EditSession
@@ -22,7 +22,7 @@ class Opened:
 
 
 def chosen(context, name: str):
-    """The designed curve with a name, or the active one; None where a new curve is wanted."""
+    """The designed curve with a name, or the active one; None for a new curve."""
     import bpy
 
     if not name:
@@ -31,14 +31,14 @@ def chosen(context, name: str):
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
         raise InputError(
-            f'There is no designed curve "{name}". Give the name of a curve object that was drawn '
-            "on a mesh, or none for a new curve"
+            f'There is no designed curve "{name}". Give the name of a designed curve, or no name '
+            "for a new curve"
         )
     return found
 
 
 def open_session(context, edited, asked: Asked) -> Opened:
-    """A session on the mesh of a curve with its points, or without points on the active mesh."""
+    """Open a session with the points of a curve, or without points on the active mesh."""
     if edited is None:
         mesh_object = mesh_data.mesh_object(context)
     else:
@@ -56,12 +56,12 @@ def open_session(context, edited, asked: Asked) -> Opened:
         group = getattr(asked, name)
         if edited is not None and group and group not in mesh_object.vertex_groups:
             asked = replace(asked, **{name: ""})
-            remarks.append(f'without the vertex group "{group}", which is gone')
+            remarks.append(f'without the vertex group "{group}", which no longer exists')
     points = curve = None
     if edited is not None:
         points, moved = curve_record.controls_now(edited, surface, designer.mesh)
         if moved:
-            remarks.append(f"the mesh has changed: {moved} points are at the nearest place")
+            remarks.append(f"the mesh has changed: {moved} points moved to the nearest positions")
         elif asked == replace(curve_record.asked_of(edited), method=asked.method):
             curve = _curve_of(edited, surface)
 
@@ -73,9 +73,9 @@ def open_session(context, edited, asked: Asked) -> Opened:
 
 
 def keep(context, opened: Opened, edited, settings):
-    """Write a session's curve into the object that was edited, or a new one; return that.
+    """Write a session's curve into the edited object, or a new one; return the object.
 
-    `settings` has the `output`, the `thickness` and the `tube` of a new one.
+    `settings` holds the `output`, `thickness` and `tube` of a new one.
     """
     session, mesh_object = opened.session, opened.mesh_object
     surface, curves = session.surface, [session.curve]
@@ -100,7 +100,7 @@ def _check_editable(edited) -> None:
 
 
 def _curve_of(edited, surface):
-    """The curve that an object remembers; None where it has to be designed anew."""
+    """The recorded curve of an object; None if it has to be designed again."""
     if not curve_record.lies_on(edited, surface):
         return None
     curves = curve_record.recall(edited, surface)

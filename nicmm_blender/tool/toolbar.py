@@ -22,7 +22,7 @@ class _SurfaceCurve:
     bl_label = "Surface Curve"
     bl_description = (
         "Draw a curve on the surface of the active mesh point by point.\n"
-        "A click on a curve that was drawn before edits it again"
+        "Click on a designed curve to edit it"
     )
     bl_icon = ICON
     bl_widget = None

@@ -27,7 +27,7 @@ def activate(chosen):
 
 
 def nearest_vertices(mesh_object, points):
-    """The vertices nearest to points in the object's own space."""
+    """The vertices nearest to points in the object's local space."""
     vertices = positions(mesh_object)
     return [int(np.argmin(np.linalg.norm(vertices - point, axis=1))) for point in points]
 
@@ -44,7 +44,7 @@ def ring(mesh_object, count, height=0.0):
 def select(mesh_object, vertices, history=None):
     """Select exactly these vertices in Object Mode, as if clicked one by one in their order.
 
-    With `history`, Blender remembers those vertices instead, as after a box selection.
+    With `history`, the selection history holds those vertices instead, as after a box selection.
     """
     edited = bmesh.new()
     edited.from_mesh(mesh_object.data)
@@ -75,7 +75,7 @@ def curves():
 
 
 def points(curve_object, spline=0):
-    """Positions of a curve's points in its own space."""
+    """Positions of a curve's points in its local space."""
     return np.array([point.co[:3] for point in curve_object.data.splines[spline].points])
 
 

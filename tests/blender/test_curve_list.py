@@ -1,4 +1,4 @@
-"""The curves on a mesh, designing them again, and keeping them up to date."""
+"""The list of curves on a mesh, *Update Curves* and *Live*."""
 
 import time
 from importlib import import_module
@@ -22,7 +22,7 @@ def sphere(empty_scene):
 
 
 VERTICES = (42, 120, 123, 128)
-"""Of the sphere, once round it."""
+"""Vertices of the sphere, once round it."""
 
 
 def draw(mesh_object, **settings):
@@ -36,7 +36,7 @@ def draw(mesh_object, **settings):
 
 
 def places(curve):
-    """Positions of the curve's points, of either kind of object, in its own space."""
+    """Positions of the curve's points, for either type of object, in its local space."""
     if curve.type == "CURVE":
         return scenes.points(curve)
     values = np.empty(3 * len(curve.data.points), dtype=np.float32)
@@ -188,7 +188,7 @@ def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
     assert bpy.context.selected_objects == [mine[0]]
 
 
-# Live update. A timer cannot tick in a test, so the tests do.
+# Live update. Timers do not run in a test, so the tests call the timer function.
 
 
 @pytest.fixture
@@ -197,8 +197,8 @@ def live(empty_scene, sphere):
     return module(empty_scene, "operators.live_update")
 
 
-def settle(live):
-    """Let the timer tick until it has nothing more to do; return how often it did."""
+def run_timer(live):
+    """Call the timer function until no work is left; return the number of calls."""
     bpy.context.view_layer.update()
     ticks = 0
     while bpy.app.timers.is_registered(live.tick):
@@ -214,7 +214,7 @@ def test_live_update_is_off_at_first(empty_scene, sphere):
     curve = draw(sphere)
     before = places(curve)
     pull(sphere)
-    assert settle(live) == 0
+    assert run_timer(live) == 0
     np.testing.assert_array_equal(places(curve), before)
 
 
@@ -222,9 +222,9 @@ def test_live_update_is_off_at_first(empty_scene, sphere):
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 def test_live_update_follows_the_mesh(live, sphere, output):
     curve = draw(sphere, output=output)
-    settle(live)
+    run_timer(live)
     pull(sphere)
-    assert settle(live) > 0
+    assert run_timer(live) > 0
     expected = draw(sphere)
     np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
 
@@ -233,34 +233,34 @@ def test_live_update_follows_the_mesh(live, sphere, output):
 def test_live_update_follows_weights_and_edit_mode(live, sphere):
     walls = sphere.vertex_groups.new(name="Walls")
     curve = draw(sphere, obstacle_group="Walls")
-    settle(live)
+    run_timer(live)
     before = places(curve)
     near = np.linalg.norm(scenes.positions(sphere) - before[len(before) // 8], axis=1) < 0.3
     walls.add(np.flatnonzero(near).tolist(), 1.0, "REPLACE")
     sphere.data.update_tag()
-    settle(live)
+    run_timer(live)
     assert scenes.distances_to(before, places(curve)).max() > 0.02
     bpy.ops.object.mode_set(mode="EDIT")
-    settle(live)
+    run_timer(live)
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.transform.translate(value=(0, 0, 1))
-    settle(live)
+    run_timer(live)
     assert places(curve)[:, 2].min() > 0.5
 
 
 @pytest.mark.slow
 def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch):
     curve = draw(sphere)
-    settle(live)
+    run_timer(live)
     pull(sphere)
-    settle(live)
+    run_timer(live)
     written = []
     monkeypatch.setattr(live.writing, "replace", lambda *_: written.append(1))
     for _ in range(3):
         bpy.context.view_layer.update()
-        settle(live)
+        run_timer(live)
     sphere.data.update_tag()  # said to be changed, but as it was
-    settle(live)
+    run_timer(live)
     assert not written
     assert places(curve) is not None
 
@@ -269,13 +269,13 @@ def test_live_update_does_not_feed_itself(live, sphere, empty_scene, monkeypatch
 def test_live_update_survives_undo(live, sphere):
     name, mesh_name = draw(sphere).name, sphere.name
     bpy.ops.ed.undo_push(message="Curve")
-    settle(live)
+    run_timer(live)
     pull(sphere)
     bpy.ops.ed.undo_push(message="Pull")
-    settle(live)
+    run_timer(live)
     pulled = places(bpy.data.objects[name])
     bpy.ops.ed.undo()
-    settle(live)
+    run_timer(live)
     sphere = bpy.data.objects[mesh_name]
     expected = places(draw(sphere))
     np.testing.assert_allclose(places(bpy.data.objects[name]), expected, atol=ROUNDING)
@@ -285,13 +285,13 @@ def test_live_update_survives_undo(live, sphere):
 @pytest.mark.slow
 def test_change_during_work_starts_it_again(live, sphere):
     curve = draw(sphere)
-    settle(live)
+    run_timer(live)
     pull(sphere)
     bpy.context.view_layer.update()
     time.sleep(0.35)
     live.tick()
     pull(sphere, share=0.3)
-    settle(live)
+    run_timer(live)
     expected = draw(sphere)
     np.testing.assert_allclose(places(curve), places(expected), atol=ROUNDING)
 
@@ -299,30 +299,30 @@ def test_change_during_work_starts_it_again(live, sphere):
 def test_what_cannot_be_updated_is_said_once(live, sphere):
     wall = sphere.vertex_groups.new(name="Wall")
     curve = draw(sphere, obstacle_group="Wall")
-    settle(live)
+    run_timer(live)
     before = places(curve)
     wall.add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
     sphere.data.update_tag()
-    settle(live)
+    run_timer(live)
     (message,) = live.messages(sphere)
     assert message.startswith(curve.name) and '"Wall"' in message
     np.testing.assert_array_equal(places(curve), before)
     wall.remove(range(len(sphere.data.vertices)))
     sphere.data.update_tag()
-    settle(live)
+    run_timer(live)
     assert not live.messages(sphere)
 
 
 @pytest.mark.slow
 def test_live_update_in_a_reopened_file(live, sphere, tmp_path):
     name = draw(sphere).name
-    settle(live)
+    run_timer(live)
     before = places(bpy.data.objects[name])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
     assert bpy.context.scene.nicmm_live_update
-    settle(live)
+    run_timer(live)
     np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
     pull(bpy.data.objects["Icosphere"])
-    settle(live)
+    run_timer(live)
     assert np.abs(places(bpy.data.objects[name])[:, 2].max() - before[:, 2].max()) > 0.05

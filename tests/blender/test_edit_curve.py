@@ -1,4 +1,4 @@
-"""The editing tool: its operator in scripts, what curves remember, and its mouse and keys.
+"""The editing tool: its operator in scripts, the record of curves, and its mouse and keys.
 
 Blender has no window here. Events are handed to the operator's own methods, with a view that the
 test makes; `tests/window` does the same in a real window.
@@ -18,7 +18,7 @@ ROUNDING = 2e-6
 
 
 def on_surface(mesh_object, positions):
-    """The places on the object nearest to positions."""
+    """The points of the object nearest to positions."""
     return [list(mesh_object.closest_point_on_mesh(place)[1]) for place in positions]
 
 
@@ -74,7 +74,7 @@ def test_settings_reach_the_core(empty_scene, sphere, places, settings):
     curve = edit(points=as_points(places), **settings)
     expected = expected_curve(empty_scene.core, sphere, places, **settings)
     np.testing.assert_allclose(scenes.points(curve), expected.points, atol=ROUNDING)
-    # And a curve that is there already is asked for something else.
+    # An existing curve gets other settings.
     bpy.context.view_layer.objects.active = sphere
     other = edit(points=as_points(places))
     assert edit(**settings) == other
@@ -153,7 +153,7 @@ def test_poll_gives_reasons(empty_scene):
     assert "Switch to Object Mode or Edit Mode" in refusal()
 
 
-# What curves remember.
+# The record of a curve.
 
 
 def controls(curve):
@@ -176,7 +176,7 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     edited_curve = module(empty_scene, "tool.edited_curve")
     record = module(empty_scene, "scene.curve_record")
     opened = edited_curve.open_session(bpy.context, curve, record.asked_of(curve))
-    assert opened.session.resting and opened.session.state.converged
+    assert opened.session.idle and opened.session.state.converged
     assert not opened.session.asked.closed and opened.session.asked.smoothness == 2.0
     np.testing.assert_allclose(opened.session.positions(), places, atol=ROUNDING)
     np.testing.assert_allclose(opened.session.polyline(), before, atol=ROUNDING)
@@ -285,7 +285,7 @@ def test_a_mesh_that_is_gone_is_named(sphere, places):
 
 
 def test_the_redo_panel_runs_it_again(sphere, places):
-    """As Blender does it: with the properties of the call before, on what was there before."""
+    """As in Blender: with the properties of the last call, on the state before it."""
     bpy.ops.ed.undo_push(message="Before")
     bpy.ops.nicmm.edit_curve("EXEC_DEFAULT", True, points=as_points(places), closed=False)
     last = bpy.context.window_manager.operators
@@ -295,7 +295,7 @@ def test_the_redo_panel_runs_it_again(sphere, places):
     assert not scenes.curves()
 
 
-# Where it is found.
+# Its places in the interface.
 
 
 def test_the_tool_is_in_the_toolbar(empty_scene):
@@ -357,9 +357,9 @@ class Tool:
         self.wait()
 
     def wait(self):
-        """Timer events until the curve is at rest."""
+        """Timer events until the session is idle."""
         for _ in range(100):
-            if self.session.resting:
+            if self.session.idle:
                 return
             self.send("TIMER", "NOTHING")
         raise AssertionError("never at rest")
@@ -395,7 +395,7 @@ def test_clicks_add_points(empty_scene):
 
 
 def test_a_point_is_dragged_with_the_mouse(tool):
-    """It keeps its distance from the pointer, and follows it; beside the mesh it stays."""
+    """It follows the pointer at a constant distance; off the mesh it stays still."""
     grip = np.array([4.0, -3.0])
     tool.send("LEFTMOUSE", "PRESS", CLICKS[1] + grip)
     for step in range(1, 6):
@@ -419,7 +419,7 @@ def test_right_click_ends_a_drag_as_it_began(tool):
     tool.send("MOUSEMOVE", "NOTHING", CLICKS[1] + [0, 20.0])
     tool.send("RIGHTMOUSE")
     assert tool.session.state == before
-    # And where nothing had moved yet it takes nothing else back.
+    # If nothing has moved yet, it undoes nothing else.
     tool.send("LEFTMOUSE", "PRESS", CLICKS[1])
     tool.send("RIGHTMOUSE")
     assert tool.session.state == before
@@ -492,9 +492,9 @@ def test_enter_without_a_curve(empty_scene):
 
 
 def test_enter_in_the_middle_of_things(tool):
-    """What is kept has come to rest, also straight after a change."""
+    """The curve that is kept has converged, also immediately after a change."""
     tool.send("C")
-    assert not tool.session.resting
+    assert not tool.session.idle
     assert tool.send("RET") == {"FINISHED"}
     assert tool.session.state.converged and not tool.session.curve.closed
 

@@ -1,4 +1,4 @@
-"""A curve while it is edited, without a window: points, requests, undo, failures, the view."""
+"""The editing session without a window: points, settings, undo, failures, the view."""
 
 from importlib import import_module
 from types import SimpleNamespace
@@ -35,7 +35,7 @@ def start(parts, mesh_object, **asked):
 
 
 def at(session, position):
-    """Face and barycentrics of the place nearest to a position in the object's own space."""
+    """Face and barycentrics of the point nearest to a position in the object's local space."""
     nearest = import_module(type(session.points).__module__).nearest_points
     solved = np.array([position], dtype=float) @ session.surface.linear.T
     points, _ = nearest(session.designer.mesh, solved)
@@ -49,16 +49,16 @@ def ring(heights=(0.1, -0.2, 0.1, 0.2, -0.1)):
 
 
 def filled(parts, mesh_object, positions=None, **asked):
-    """A session with points and a curve at rest."""
+    """A session with points and a converged curve."""
     session = start(parts, mesh_object, **asked)
     for position in ring() if positions is None else positions:
         session.add(*at(session, position))
-    session.settle()
+    session.converge()
     return session
 
 
 def assert_passes(session):
-    """The curve is at rest, passes all points in order and is closed if it should be."""
+    """The curve has converged, passes all points in order and is closed if it should be."""
     assert session.state.converged and not session.problem
     curve = session.curve
     assert curve.closed == session.closed
@@ -73,7 +73,7 @@ def test_curve_grows_with_the_points(parts):
     assert session.untouched
     for number, position in enumerate(ring()):
         assert session.add(*at(session, position)) == number
-        session.settle()
+        session.converge()
         if number == 0:
             assert session.curve is None
             assert "two points" in session.what_is_missing()
@@ -89,25 +89,25 @@ def test_open_curve(parts):
     assert_passes(session)
     assert not session.curve.closed
     session.ask_for(closed=True)
-    session.settle()
+    session.converge()
     assert_passes(session)
     assert session.curve.closed
 
 
 @pytest.mark.parametrize("leg", range(5))
 def test_insert_on_the_curve(parts, leg):
-    """The point comes between those of its leg, and the curve stays as it was."""
+    """The point comes between those of its leg, and the curve stays unchanged."""
     session = filled(parts, scenes.sphere())
     before = session.polyline()
     bounds = [*session.curve.control_index, len(session.curve.faces)]
     segment = (bounds[leg] + bounds[leg + 1]) // 2
     number = session.insert(segment, 0.25)
     assert number == leg + 1
-    assert session.resting
+    assert session.idle
     assert_passes(session)
     expected = 0.75 * before[segment] + 0.25 * before[segment + 1]
     np.testing.assert_allclose(session.positions()[number], expected, atol=1e-9)
-    # Its nodes are spaced anew, with one more leg.
+    # Its nodes are spaced again, with one more leg.
     assert scenes.distances_to(session.polyline(), before).max() < 0.01
 
 
@@ -121,7 +121,7 @@ def test_inserted_point_is_dragged_from_there(parts):
         session.move(number, *at(session, place))
         assert not session.waiting
     session.drop()
-    session.settle()
+    session.converge()
     assert_passes(session)
 
 
@@ -133,7 +133,7 @@ def test_remove(parts, number, closed):
     session = filled(parts, scenes.sphere(), closed=closed)
     left = np.delete(session.positions(), number, axis=0)
     session.remove(number)
-    session.settle()
+    session.converge()
     np.testing.assert_array_equal(session.positions(), left)
     assert_passes(session)
 
@@ -143,14 +143,14 @@ def test_remove_all(parts):
     session = filled(parts, scenes.sphere(), ring()[:3])
     for count in (2, 1, 0):
         session.remove(0)
-        session.settle()
+        session.converge()
         assert len(session.points) == count
         assert (session.curve is None) == (count < 2)
         assert not session.problem
 
 
 def test_every_frame_of_a_drag_is_bounded(parts, monkeypatch):
-    """A move asks the core for a few iterations and never for a design from nothing."""
+    """A move takes a few iterations of the core and never a design from scratch."""
     session = filled(parts, scenes.sphere(4))
     asked, spent = [], []
     design = session.designer.design
@@ -167,13 +167,13 @@ def test_every_frame_of_a_drag_is_bounded(parts, monkeypatch):
         session.move(1, *at(session, [*ring()[1, :2], height]))
         assert len(spent) == 1 and spent.pop() <= 3
     session.drop()
-    session.settle()
+    session.converge()
     assert all(named["start"] is not None for named in asked)
     assert_passes(session)
 
 
-def test_after_a_jump_the_curve_is_designed_anew(parts):
-    """The last curve stays until then; over a fold it would come out with a loop."""
+def test_after_a_jump_the_curve_is_designed_from_scratch(parts):
+    """The last curve stays until then; relaxed over the fold it would have a loop."""
     session = filled(parts, scenes.sphere(4))
     before = session.curve
     session.grab()
@@ -181,7 +181,7 @@ def test_after_a_jump_the_curve_is_designed_anew(parts):
     assert session.waiting and not session.state.converged
     assert session.curve is before
     session.drop()
-    session.settle()
+    session.converge()
     assert_passes(session)
     expected = parts.core.design_curve(session.designer.mesh, session.points).curves[0]
     np.testing.assert_array_equal(session.curve.points, expected.points)
@@ -189,12 +189,12 @@ def test_after_a_jump_the_curve_is_designed_anew(parts):
 
 @pytest.mark.slow
 def test_undo_and_redo(parts):
-    """Each change is one step, a drag with all its moves too; the same curves come back."""
+    """Each change is one step, and so is a drag with all its moves; undo restores equal curves."""
     session = filled(parts, scenes.sphere())
     states = [session.state]
 
     def after():
-        session.settle()
+        session.converge()
         states.append(session.state)
 
     session.grab()
@@ -212,12 +212,12 @@ def test_undo_and_redo(parts):
     after()
     for state in states[-2::-1]:
         assert session.undo()
-        session.settle()
+        session.converge()
         assert session.state == state or session.state.found is state.found
         assert_passes(session)
     for state in states[1:]:
         assert session.redo()
-        session.settle()
+        session.converge()
         assert session.state.found is state.found
         assert session.asked == state.asked
     assert not session.redo()
@@ -241,17 +241,17 @@ def test_a_click_that_moves_nothing_is_no_step(parts):
 def test_drag_goes_on_after_undo(parts):
     session = filled(parts, scenes.sphere())
     session.remove(4)
-    session.settle()
+    session.converge()
     session.undo()
     session.grab()
     session.move(2, *at(session, [*ring()[2, :2], 0.2]))
     assert not session.waiting
-    session.settle()
+    session.converge()
     assert_passes(session)
 
 
 def test_what_cannot_be_met_keeps_the_last_curve(parts):
-    """The same point twice, and a point on another part of the mesh; a move away mends it."""
+    """The same point twice, and a point on another part of the mesh; moving it away helps."""
     bpy.ops.mesh.primitive_ico_sphere_add(location=(4, 0, 0), subdivisions=2)
     sphere = scenes.sphere()
     bpy.ops.object.select_all(action="SELECT")
@@ -260,17 +260,17 @@ def test_what_cannot_be_met_keeps_the_last_curve(parts):
     good = session.curve
     session.grab()
     session.move(1, *at(session, (4, 0, 1)))
-    session.settle()
+    session.converge()
     assert session.curve is good
     assert "Point 1 and point 2 lie on different components" in session.problem
     assert session.what_is_missing() == session.problem
     session.move(1, *at(session, [*ring()[1, :2], 0.1]))
     session.drop()
-    session.settle()
+    session.converge()
     assert_passes(session)
     good = session.curve
     session.add(*at(session, session.positions()[0]))
-    session.settle()
+    session.converge()
     assert session.curve is good
     assert "are the same point" in session.problem
     session.undo()
@@ -285,14 +285,14 @@ def test_walls_and_missing_groups_are_named(parts):
     session = filled(parts, sphere)
     good = session.curve
     session.ask_for(obstacle_group="Wall")
-    session.settle()
+    session.converge()
     assert session.curve is good
     assert 'obstacles: the vertex group "Wall"' in session.problem
     session.ask_for(obstacle_group="Gone")
-    session.settle()
+    session.converge()
     assert 'no vertex group "Gone"' in session.problem
     session.ask_for(obstacle_group="")
-    session.settle()
+    session.converge()
     assert_passes(session)
 
 
@@ -307,13 +307,13 @@ def test_groups_reach_the_curve(parts):
     session = filled(parts, sphere)
     plain = session.curve
     session.ask_for(obstacle_group="Island", clearance=0.1)
-    session.settle()
+    session.converge()
     assert_passes(session)
     nearest = np.linalg.norm(session.polyline() - middle, axis=1).min()
     assert nearest > 0.25
     assert np.linalg.norm(plain.points - middle, axis=1).min() < 0.2
     session.ask_for(obstacle_group="", alignment_group="Island")
-    session.settle()
+    session.converge()
     assert_passes(session)
     assert np.linalg.norm(session.polyline() - middle, axis=1).min() < 0.2
 
@@ -325,7 +325,7 @@ def test_smoothness_has_limits(parts):
     assert session.asked.smoothness == pytest.approx(1.25)
     session.smoother(100)
     assert session.asked.smoothness == 100.0
-    session.settle()
+    session.converge()
     steps = len(session._done)
     session.smoother(1)
     assert len(session._done) == steps

@@ -47,7 +47,7 @@ print("loaded:", *sorted(loaded & {"igl", "scipy", "torch"}), *(["core"] if core
 
 
 def entries(menu):
-    """Modules of the functions that were appended to a menu."""
+    """Modules of the functions appended to a menu."""
     return [draw.__module__ for draw in getattr(bpy.types, menu).draw._draw_funcs]
 
 
@@ -87,7 +87,7 @@ def test_menus_and_panel(extension):
 
 
 class Layout:
-    """Notes how entries of a menu call their operators; Blender's own menus often `execute`."""
+    """Records how menu entries call their operators; Blender's own menus often `execute`."""
 
     def __init__(self):
         self.operator_context, self.entries = "EXEC_REGION_WIN", []
@@ -163,7 +163,7 @@ def test_works_after_enabling_again(empty_scene, location):
 
 
 def test_properties_follow_the_options_of_the_core(empty_scene):
-    """Every option is a property of the operators; one that is added to the table would be too."""
+    """Every option in the table is a property of the operators."""
     table = import_module(f"{empty_scene.name}.nicmm_core.options")
     settings = import_module(f"{empty_scene.name}.nicmm_blender.settings")
     record = import_module(f"{empty_scene.name}.nicmm_blender.scene.curve_record")

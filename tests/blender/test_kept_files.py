@@ -1,4 +1,4 @@
-"""Files that earlier versions have saved: their curves are there, are edited and updated."""
+"""Files saved by earlier versions: their curves can be converted, edited and updated."""
 
 from importlib import import_module
 from pathlib import Path
@@ -26,7 +26,7 @@ def kept(request, extension):
 
 
 def drawn(curve):
-    """Positions of the points of either kind of object, in its own space."""
+    """Positions of the points of either type of object, in its local space."""
     if curve.type == "CURVE":
         return scenes.points(curve)
     return scenes.get(curve.data.points, "position", 3).astype(float)

@@ -9,9 +9,9 @@ import build
 
 DOCUMENT = build.ROOT / "docs" / "troubleshooting.md"
 SHORTEST, WORDS = 12, 6
-"""Letters of a piece of a message that is worth looking for, and how much of it is."""
+"""Shortest part of a message to search for, in letters, and its words that are compared."""
 
-# Of the core: what is said to a request, a start or an argument.
+# Modules of the core with messages about a request, a start or an argument.
 CORE = (
     "arguments.py",
     "design.py",
@@ -33,7 +33,7 @@ KINDS = {
 
 
 def pieces(node):
-    """The fixed parts of a message, without those that are put together from others."""
+    """The fixed parts of a message, without inserted values."""
     found = [
         part.value
         for part in ast.walk(node)
@@ -46,7 +46,7 @@ def pieces(node):
 
 
 def plain(text):
-    """Text without marks, as the document may write it."""
+    """Text in lower case without punctuation."""
     return " ".join(re.sub(r"[\W_]+", " ", text).split()).lower()
 
 
@@ -69,16 +69,16 @@ def of_core():
 
 
 def polls():
-    """What grey buttons say: constants of polls.py, and what other modules say directly."""
+    """Messages of disabled buttons: the constants of polls.py, and those in other modules."""
     for path in sorted((build.ROOT / "nicmm_blender").rglob("*.py")):
         text = path.read_text("utf-8")
-        for said in re.findall(r'poll_message_set\("([^"]+)"\)', text):
-            yield path.name, [plain(said)]
+        for message in re.findall(r'poll_message_set\("([^"]+)"\)', text):
+            yield path.name, [plain(message)]
         if path.name == "polls.py":
             values = [part.value for part in ast.parse(text).body if isinstance(part, ast.Assign)]
-            for said in (part for value in values for part in ast.walk(value)):
-                if isinstance(said, ast.Constant) and " " in said.value:
-                    yield path.name, [plain(said.value)]
+            for part in (part for value in values for part in ast.walk(value)):
+                if isinstance(part, ast.Constant) and " " in part.value:
+                    yield path.name, [plain(part.value)]
 
 
 @pytest.mark.parametrize("source", [of_blender, of_core, polls])

@@ -1,4 +1,4 @@
-"""The operator, in the installed extension, against the core's own answer."""
+"""The operator in the installed extension, compared with the core."""
 
 import sys
 from importlib import import_module
@@ -19,7 +19,7 @@ def design(core, mesh_object, vertices, scale=(1.0, 1.0, 1.0), **arguments):
 
 
 def reported_error(**arguments):
-    """Run the operator, which must refuse and leave the file as it was; return its report."""
+    """Run the operator, which must fail and leave the file unchanged; return its report."""
     before = [(found.name, found.select_get()) for found in bpy.data.objects]
     active = bpy.context.active_object
     with pytest.raises(RuntimeError) as caught:
@@ -308,7 +308,7 @@ def test_separate_parts_are_reported(empty_scene):
 
 @pytest.mark.slow
 def test_open_curve_is_not_cyclic(empty_scene):
-    """From the first vertex selected to the last; two are enough."""
+    """From the first selected vertex to the last; two are enough."""
     sphere = scenes.sphere()
     for count in (2, 4):
         vertices = scenes.ring(sphere, 4)[:count]

@@ -1,4 +1,4 @@
-"""What becomes of a curve in Blender, in the installed extension."""
+"""The outputs of a curve in Blender, in the installed extension."""
 
 import bpy
 import numpy as np
@@ -19,7 +19,7 @@ def monkey(empty_scene):
 
 
 def design(mode, **settings):
-    """Run the operator in a mode and come back to Object Mode."""
+    """Run the operator in a mode and return to Object Mode."""
     bpy.ops.object.mode_set(mode=mode)
     bpy.ops.ed.undo_push(message="Mode")
     assert bpy.ops.nicmm.design_curve("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
@@ -52,7 +52,7 @@ def euler(mesh_object):
 
 
 def assert_sound(mesh_object):
-    """Blender finds nothing to repair, and edges have the faces that they had."""
+    """Blender finds nothing to repair, and edges keep their faces."""
     assert not mesh_object.data.validate(verbose=True)
     edited = bmesh.new()
     edited.from_mesh(mesh_object.data)
@@ -62,7 +62,7 @@ def assert_sound(mesh_object):
 
 
 def distances(points, mesh_edges, place):
-    """Of points to the nearest of some edges."""
+    """Distances of points to the nearest of some edges."""
     start, end = place[mesh_edges.T]
     along = end - start
     offset = points[:, None] - start
@@ -114,7 +114,7 @@ def test_open_curve_is_cut(monkey):
 
 
 def with_everything(mesh_object):
-    """Layers of every kind whose values say where they came from; returns the maps of faces."""
+    """Add layers of every type whose values identify their source; return the maps of faces."""
     data = mesh_object.data
     generator = np.random.default_rng(0)
     n_faces = len(data.polygons)
@@ -497,7 +497,7 @@ def test_undo_of_converting_brings_the_curve_back(monkey):
 
 
 def refused(operator, **settings):
-    """Run an operator that must refuse and leave the mesh as it was."""
+    """Run an operator that must fail and leave the mesh unchanged."""
     mesh_objects = [found for found in bpy.data.objects if found.type == "MESH"]
     before = [scenes.positions(found) for found in mesh_objects]
     names = [found.name for found in bpy.data.objects]

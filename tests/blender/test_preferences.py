@@ -1,4 +1,4 @@
-"""Preferences, and what all operators and panels have in common."""
+"""Preferences, and properties common to all operators and panels."""
 
 import importlib.metadata
 import importlib.util

@@ -1,4 +1,4 @@
-"""Scenes as users have them: each gives a curve on the surface, or says what would mend it."""
+"""Difficult scenes: each gives a curve on the surface, or a message with the remedy."""
 
 from importlib import import_module
 
@@ -15,7 +15,7 @@ OUTPUTS = ("CURVE", "STICKY", "EDGES", "REGION", "PARTS")
 
 
 def refusal(**arguments):
-    """The report of the operator, which must leave the file as it was."""
+    """The report of the operator, which must leave the file unchanged."""
     before = [(found.name, found.data) for found in bpy.data.objects], bpy.context.mode
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.nicmm.design_curve(**arguments)
@@ -24,7 +24,7 @@ def refusal(**arguments):
 
 
 def assert_on_surface(core, curve, mesh_object):
-    """A curve object's points are on the mesh, in its own space."""
+    """A curve object's points are on the mesh, in its local space."""
     mesh = core.Mesh(scenes.positions(mesh_object), scenes.triangles(mesh_object))
     surface_points = import_module(f"{core.__name__}.geometry.surface_points")
     _, distance = surface_points.nearest_points(mesh, scenes.points(curve))
@@ -263,7 +263,7 @@ def test_flat_scale_is_said(empty_scene):
 
 @pytest.mark.parametrize("output", OUTPUTS)
 def test_large_and_bent_faces(empty_scene, output):
-    """A prism of which both ends are one face of sixteen corners, a star and not flat."""
+    """A prism with each end one face of sixteen corners, a star that is not flat."""
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     radius = np.where(np.arange(16) % 2, 0.6, 1.0)
     rings = [

@@ -1,4 +1,4 @@
-"""Sticky curves: they follow the mesh, as strands or as a tube round these."""
+"""Sticky curves: they follow the mesh, as strands or as a tube round them."""
 
 from importlib import import_module
 
@@ -24,7 +24,7 @@ def module(extension, name):
 
 
 def sticky(mesh_object, **settings):
-    """The sticky curve that a script gets."""
+    """The sticky curve created in a script."""
     bpy.context.view_layer.objects.active = mesh_object
     assert bpy.ops.nicmm.design_curve(output="STICKY", **settings) == {"FINISHED"}
     return bpy.context.active_object
@@ -37,7 +37,7 @@ def drawn_with(mesh_object, **settings):
 
 
 def on_deformed_mesh(mesh_object, curves_object):
-    """Where the stored triangles and coordinates are on the mesh after its modifiers."""
+    """Positions of the stored triangles and coordinates on the mesh after its modifiers."""
     bpy.context.view_layer.update()
     deformed = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     place = get(deformed.vertices, "co", 3).astype(float)
@@ -70,7 +70,7 @@ def test_sticky_curve_follows_a_cast_and_an_armature(monkey):
     monkey.location = (0.3, -1.0, 2.0)
     monkey.rotation_euler = (0.3, 0.5, -1.0)
     curves = sticky(monkey)
-    at_rest = evaluated_points(curves)
+    undeformed = evaluated_points(curves)
 
     bpy.ops.object.armature_add(location=monkey.location)
     armature = bpy.context.active_object
@@ -90,7 +90,7 @@ def test_sticky_curve_follows_a_cast_and_an_armature(monkey):
     armature.pose.bones[names[1]].rotation_quaternion = (0.8, -0.3, 0.0, 0.5)
     armature.pose.bones[names[1]].location = (0.2, 0.1, 0.4)
     bent = evaluated_points(curves)
-    assert np.linalg.norm(bent - at_rest, axis=1).max() > 0.1
+    assert np.linalg.norm(bent - undeformed, axis=1).max() > 0.1
     assert np.abs(bent - on_deformed_mesh(monkey, curves)).max() < 1e-6
 
     cast = monkey.modifiers.new("Cast", "CAST")
@@ -188,7 +188,7 @@ def test_tube_has_the_material_of_the_curve(monkey):
     assert [found.name for found in shown_mesh(curves).materials] == ["Rubber"]
 
 
-# Who gets one
+# Its default
 
 
 def test_blender_draws_all_points_since_5(extension):
@@ -200,7 +200,7 @@ def test_blender_draws_all_points_since_5(extension):
 
 @pytest.fixture(params=[True, False], ids=["all points", "few points"])
 def all_points(request, extension, monkeypatch):
-    """A Blender of either kind."""
+    """Blender with and without all points of hair curves."""
     sticky_curves = module(extension, "outputs.sticky_curves")
     monkeypatch.setattr(sticky_curves, "are_drawn_with_all_points", lambda: request.param)
     return request.param

@@ -1,4 +1,4 @@
-"""Long work by turns, and the operators that do it, without a window."""
+"""Long work in turns, and the operators that use it, without a window."""
 
 import threading
 from importlib import import_module
@@ -19,7 +19,7 @@ def turns(extension):
 
 
 def counting(steps, seen, thread=None):
-    """Work that reports each of its steps and notes where it ran."""
+    """Work that reports each of its steps and records its thread."""
 
     def work(progress):
         for step in range(steps):
@@ -92,7 +92,7 @@ def test_disabling_ends_what_is_parked(empty_scene, turns):
 
 
 class Window:
-    """What an operator in a window has of Blender."""
+    """The parts of Blender's context that an operator in a window uses."""
 
     def __init__(self, operators, mesh_object):
         self.events, self.texts, self.timers, self.reports = [], [], [], []
@@ -119,7 +119,7 @@ class Window:
 
 @pytest.fixture
 def window(empty_scene, monkeypatch):
-    """An operator as the window runs it, with no patience at all; background has no events."""
+    """An operator as the window runs it, with no waiting time; background mode has no events."""
     design_curve = import_module(f"{empty_scene.name}.nicmm_blender.operators.design_curve")
     long_solves = import_module(f"{empty_scene.name}.nicmm_blender.operators.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
@@ -155,7 +155,7 @@ def window(empty_scene, monkeypatch):
 
 
 def slow(answer_all):
-    """Answers that have something to show before they come."""
+    """Answers that show a partial curve first."""
 
     def answer(requests, progress):
         for step in range(3):

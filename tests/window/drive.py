@@ -155,7 +155,7 @@ def step(text: str) -> None:
     print(f"-- {text}", flush=True)
 
 
-RESTS = "(lambda s: s is not None and s.resting and not s.problem)(helper.session())"
+IDLE = "(lambda s: s is not None and s.idle and not s.problem)(helper.session())"
 
 
 def check(condition: bool, what: str) -> None:
@@ -165,8 +165,8 @@ def check(condition: bool, what: str) -> None:
 
 def count_points(blender: Blender, count: int, more: str = "True") -> None:
     blender.wait(
-        f"{RESTS} and len(helper.session().points) == {count} and {more}",
-        f"{count} points and a curve at rest",
+        f"{IDLE} and len(helper.session().points) == {count} and {more}",
+        f"{count} points and a converged curve",
     )
 
 
@@ -221,25 +221,27 @@ def drive(blender: Blender, archive: Path) -> None:
     frames = blender.do("value = helper.frames")
     moves = sorted(
         spent
-        for kind, grabbed, anew, spent in frames
-        if grabbed and kind == "MOUSEMOVE" and not anew
+        for kind, grabbed, from_scratch, spent in frames
+        if grabbed and kind == "MOUSEMOVE" and not from_scratch
     )
     most = max(spent for _, grabbed, _, spent in frames if grabbed)
-    anew = sum(grabbed and waiting for _, grabbed, waiting, _ in frames)
+    from_scratch = sum(grabbed and waiting for _, grabbed, waiting, _ in frames)
     print(
         f"   {len(moves)} moves: median {moves[len(moves) // 2]:.0f} ms of CPU, most "
         f"{moves[-1]:.0f} ms, {sum(spent > FRAME for spent in moves)} above {FRAME:.0f} ms; any "
-        f"event {most:.0f} ms; {anew} events with a design from nothing due"
+        f"event {most:.0f} ms; {from_scratch} events with a design from scratch due"
     )
 
-    step("Drag another over the brow to the crown, where the curve is designed anew")
+    step("Drag another over the brow to the crown, where the curve is designed from scratch")
     dragged = f"helper.session().positions()[{JUMPING}]"
     before = blender.do(f"value = {dragged}.tolist()")
     start = grab(blender, JUMPING)
     for part in range(1, 11):
         blender.mouse("mousemove", round(start[0] + 6.0 * part), round(start[1] - 8.0 * part))
         time.sleep(0.1)
-    blender.wait(f"{RESTS} and {dragged}.tolist() != {before}", "a curve while the mouse rests")
+    blender.wait(
+        f"{IDLE} and {dragged}.tolist() != {before}", "a curve while the mouse stays still"
+    )
     blender.shot("3-drag")
     blender.mouse("mouseup", 1)
     count_points(blender, 5)
@@ -247,9 +249,9 @@ def drive(blender: Blender, archive: Path) -> None:
 
     step("Ctrl-Z and back, insert on the curve, remove with Ctrl-click")
     blender.key("ctrl+z")
-    blender.wait(f"{RESTS} and {dragged}.tolist() == {before}", "undo inside the tool")
+    blender.wait(f"{IDLE} and {dragged}.tolist() == {before}", "undo inside the tool")
     blender.key("ctrl+shift+z")
-    blender.wait(f"{RESTS} and {dragged}.tolist() == {after}", "redo inside the tool")
+    blender.wait(f"{IDLE} and {dragged}.tolist() == {after}", "redo inside the tool")
     line = "helper.session().polyline()"
     middle = "int(helper.session().curve.control_index[:2].mean())"
     (on_curve,) = blender.do(f"value = helper.pixels({line}[{middle}])")
@@ -317,7 +319,7 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.click(on_curve)
     count_points(blender, 6)
     again = blender.do("value = helper.session().polyline().tolist()")
-    # It has one point more, and its nodes are spaced anew.
+    # It has one point more, and its nodes are spaced again.
     apart = max(min(math.dist(one, other) for other in kept) for one in again)
     check(apart < 0.02, f"the curve of the file ({apart})")
     start = grab(blender, 1)
