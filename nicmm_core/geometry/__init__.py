@@ -1,4 +1,5 @@
-"""Meshes, points and polylines on them, traces over their faces, and the tolerances of all.
+"""Meshes, points and polylines on them, traces over their faces, and the tolerances.
 
-It imports nothing but `errors` and `progress` from above; start with `mesh` and `surface_points`.
+Read `mesh` and `surface_points` first. Of the modules outside, it imports only `errors`, `options`
+and `progress`.
 """

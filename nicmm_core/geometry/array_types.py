@@ -1,4 +1,4 @@
-"""Names for the array types in signatures; shapes stand in the docstrings."""
+"""Names for the array types in signatures; docstrings give the shapes."""
 
 from __future__ import annotations
 
@@ -12,4 +12,4 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 Array = Any
-"""A NumPy array or a tensor, where functions are written once for both."""
+"""A NumPy array or a tensor, in functions that take both."""

@@ -1,7 +1,7 @@
-"""Where a polyline on a mesh crosses or touches itself, exactly face by face.
+"""Finds where a polyline on a mesh crosses or touches itself, face by face.
 
-Every segment lies in one face, so two strands can only meet inside a face that both pass, or at a
-point of an edge that belongs to segments of both sides, or at a vertex.
+Every segment lies in one face. So two strands can meet only inside a face that both pass, at a
+point of an edge between their faces, or at a vertex.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .surface_points import SurfacePoints, weights_at
 
 TOUCHING = 1e-12
-"""Distance in barycentric coordinates at which strands touch: where they cross on an edge, rounding
-may put the point on the near side of it in either face."""
+"""Distance in barycentric coordinates at which strands touch. If they cross on an edge, rounding
+may place the crossing on the near side of the edge in both faces."""
 
 
 def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool) -> IntArray:
-    """Pairs of segments, not consecutive, that have a point in common, shape (p, 2).
+    """Pairs of non-consecutive segments that have a common point, shape (p, 2).
 
     Parameters
     ----------
     all_faces : (F, 3) int array
-        Of the mesh.
+        Faces of the mesh.
     polyline : SurfacePoints
-        Each in the face of the segment after it.
+        Each point in the face of the segment after it.
     closed : bool
     """
     n = len(polyline)
@@ -40,8 +40,8 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     count = np.unique(faces, return_counts=True)[1]
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
-    # Boxes first: they part most pairs, and collinear segments pass the other tests wherever they
-    # lie on their common line.
+    # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if
+    # they are disjoint.
     low, high = np.minimum(start, end), np.maximum(start, end) + TOUCHING
     for axis in range(2):
         overlap = low[first, axis] <= high[second, axis]
@@ -59,7 +59,7 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
 def _vertices_passed_twice(
     all_faces: IntArray, polyline: SurfacePoints, n_segments: int
 ) -> IntArray:
-    """Segments from a vertex that strands of different faces pass, shape (p, 2)."""
+    """Pairs of segments that begin at the same vertex in different strands, shape (p, 2)."""
     n = len(polyline)
     here = polyline.barycentric > 0.0
     place = np.flatnonzero(here.sum(axis=1) == 1)
@@ -73,7 +73,7 @@ def _vertices_passed_twice(
 
 
 def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
-    """All pairs of places within consecutive groups of the sizes given."""
+    """All pairs of positions within consecutive groups of the given sizes."""
     first, second = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     begin = np.concatenate([[0], np.cumsum(count)[:-1]])
     for size in np.unique(count[count > 1]).tolist():
@@ -85,7 +85,7 @@ def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _reaches_across(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:
-    """Whether c and d lie on different sides of the line ab, or one of them on it."""
+    """Whether c and d lie on different sides of the line ab, or one of them lies on it."""
     one, other = _turn(a, b, c), _turn(a, b, d)
     width = TOUCHING * np.linalg.norm(b - a, axis=1)
     return (np.minimum(one, other) <= width) & (np.maximum(one, other) >= -width)

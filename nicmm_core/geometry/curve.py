@@ -1,4 +1,4 @@
-"""A curve on a mesh: a polyline whose every segment lies in one face."""
+"""A curve on a mesh: a polyline each of whose segments lies in one face."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .surface_points import SurfacePoints, in_faces
 from .tolerances import BARYCENTRIC_SUM
 
 ROUNDING = 1e-12
-"""Barycentric coordinates up to this are zeros that came out of a computation."""
+"""Barycentric coordinates up to this are zero up to rounding."""
 
 
 @dataclass(frozen=True)
@@ -23,17 +23,17 @@ class SurfaceCurve:
     Attributes
     ----------
     closed : bool
-        Whether the last point joins the first, which is not repeated.
+        Whether the last point is joined to the first, which is not repeated.
     faces : (n,) int array
-        The input mesh's face that carries each point.
+        The face of the input mesh in which each point lies.
     barycentric : (n, 3) float array
-        Coordinates in that face: not negative, sum 1.
+        Coordinates in that face, not negative, with sum 1.
     points : (n, 3) float array
         Positions, ``sum_j barycentric[:, j] * vertices[faces[:, j]]``. Two consecutive points
         lie on one common face.
     control_index : (k,) int array
-        Which point is each control point, in the order visited; -1 for one that this curve
-        does not pass (never when the design has converged).
+        The index of each control point among the points, in the order visited; -1 for one that
+        this curve does not pass (never if the design has converged).
     """
 
     closed: bool
@@ -58,14 +58,14 @@ class SurfaceCurve:
 def curve_on_mesh(
     mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray, control_index: IntArray
 ) -> SurfaceCurve:
-    """Build a curve whose positions are those that its barycentrics give."""
+    """Build a curve from its faces and barycentrics."""
     corners = mesh.vertices[mesh.faces[faces]]
     points = (barycentric[:, :, None] * corners).sum(axis=1)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
-    """Whether curves are a single one, closed or open, through all control points."""
+    """Whether there is exactly one curve, closed or open as given, through all control points."""
     if len(curves) != 1 or curves[0].closed != closed:
         return False
     return bool((curves[0].control_index >= 0).all())
@@ -82,9 +82,9 @@ def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float
 
 
 def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
-    """The index of the control point that begins the leg of a segment."""
+    """The index of the control point at which the leg of a segment begins."""
     order = np.argsort(curve.control_index)
-    # A segment before all control points belongs to the leg that passes the end of the list.
+    # A segment before all control points belongs to the last leg, which closes the curve.
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
@@ -146,7 +146,7 @@ def _readable(curve: SurfaceCurve) -> SurfaceCurve:
 
 
 def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
-    """Coordinates below a margin set to zero, and the others to the sum 1."""
+    """Set coordinates up to a margin to zero, and scale the others to the sum 1."""
     kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
     return kept / kept.sum(axis=1, keepdims=True)
 
@@ -157,17 +157,18 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = T
     Parameters
     ----------
     points : (n, 3) float array
-        Evenly spaced, or the values of short segments are noise: see `resample`.
+        Evenly spaced, see `resample`; otherwise the values at short segments are noise.
     normals : (n, 3) float array
         Unit surface normals at the points.
     closed : bool, default True
-        Whether the last point joins the first.
+        Whether the last point is joined to the first.
 
     Returns
     -------
     (n,) float array
-        Signed, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i); positive
-        where the curve turns left seen against the normal. Zero at the ends of an open polyline.
+        Signed, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i). Positive
+        where the curve turns left, seen from the tip of the normal. Zero at the ends of an open
+        polyline.
     """
     if not closed:
         return np.pad(_turns(points[:-2], points[1:-1], points[2:], normals[1:-1]), 1)
@@ -177,7 +178,7 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = T
 def _turns(
     previous: FloatArray, points: FloatArray, following: FloatArray, normals: FloatArray
 ) -> FloatArray:
-    """Geodesic curvature at points between two neighbours each."""
+    """Geodesic curvature at points, each with two neighbours."""
     before, after = previous - points, following - points
     before -= (before * normals).sum(axis=1, keepdims=True) * normals
     after -= (after * normals).sum(axis=1, keepdims=True) * normals
@@ -188,9 +189,9 @@ def _turns(
 
 
 def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[FloatArray, IntArray]:
-    """Points at equal distances along a polyline, and the segment that each lies on.
+    """Points at equal distances along a polyline, and the segment of each.
 
-    They begin at its first point, and end at the last one where it is open.
+    The first one is the first point of the polyline; on an open polyline the last one is its last.
 
     Returns
     -------
@@ -231,6 +232,6 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
 
 
 def _holds(corners: IntArray, support: IntArray) -> BoolArray:
-    """Whether faces have all vertices of a support, which is filled up with -1."""
+    """Whether faces have all vertices of a support, which is padded with -1."""
     found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
     return (found | (support < 0)).all(axis=1)

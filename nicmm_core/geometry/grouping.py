@@ -10,17 +10,17 @@ from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 
 LARGE = 2_000_000
-"""Keys that are sorted at once: a fifth of a second, in which a design cannot be cancelled."""
+"""Keys sorted at once. This takes a fifth of a second, in which a design cannot be cancelled."""
 
 SAMPLED = 64
-"""Keys that are looked at for each part, to find where parts of about the same size begin."""
+"""Sampled keys for each part, to divide them into parts of about equal size."""
 
 
 def stable_order(keys: IntArray | FloatArray) -> IntArray:
     """Indices that sort the keys, (n,); equal keys stay in their order.
 
-    The same as ``np.argsort(keys, kind="stable")`` of keys without NaN, by parts where they are
-    many: the parts hold keys of different sizes.
+    The same as ``np.argsort(keys, kind="stable")`` of keys without NaN. Many keys are divided into
+    ranges of values that are sorted one after the other.
     """
     checkpoint()
     n_parts = -(-len(keys) // LARGE)
@@ -37,7 +37,7 @@ def stable_order(keys: IntArray | FloatArray) -> IntArray:
 
 
 def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Indices of equal keys, side by side.
+    """Sort keys into groups of equal ones.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     (n,) int array
         Indices that sort the keys; equal keys stay in their order.
     (g,) int array
-        Where in that order each group of equal keys begins.
+        Where each group begins in that order.
     (g,) int array
-        How many keys each group has.
+        Number of keys in each group.
     """
     order = stable_order(keys)
     checkpoint()
@@ -61,10 +61,10 @@ def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
 
 
 def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
-    """The first of each set of equal rows, and which set each row belongs to.
+    """The first of each set of equal rows, and the set of each row.
 
-    The same as ``return_index`` and ``return_inverse`` of ``np.unique(rows, axis=0)``, which sorts
-    rows as text and takes many times as long.
+    The same as ``return_index`` and ``return_inverse`` of ``np.unique(rows, axis=0)``, but many
+    times faster.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def _distinct(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
-    """The first index of each key, ascending by key, and the number of each key among them."""
+    """The first index of each distinct key, ascending by key, and the rank of each key."""
     order, start, count = grouped(keys)
     number = np.empty(len(keys), dtype=np.int64)
     number[order] = np.repeat(np.arange(len(start)), count)
@@ -98,16 +98,16 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     Parameters
     ----------
     size : int
-        Of nodes.
+        Number of nodes.
     one, other : (m,) int array
-        The nodes at both ends of each arc.
+        The nodes at the ends of each arc.
 
     Returns
     -------
     int
-        How many there are.
+        Number of components.
     (size,) int array
-        Which one each node belongs to, numbered by their first nodes.
+        The component of each node, numbered by their first nodes.
     """
     checkpoint()
     graph = sparse.csr_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(size, size))

@@ -1,4 +1,4 @@
-"""The input mesh: checked once, never changed."""
+"""The input mesh: checked once and immutable."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
 
 LARGEST, SMALLEST = 1e50, 1e-50
-"""Of coordinates, and of the mesh's diagonal: powers of lengths beyond are no numbers any more."""
+"""Bounds on coordinates and on the mesh's diagonal; powers of other lengths overflow or underflow."""
 
 FACES_OF_A_TREE = 100_000
-"""At most; a tree of them is built in a tenth of a second, in which nobody can be asked."""
+"""At most. A tree of this size takes a tenth of a second, in which a design cannot be cancelled."""
 
 
 class Mesh:
-    """A triangle mesh with checked arrays and the adjacency that the pipeline asks for.
+    """A triangle mesh with checked arrays and the adjacency that the other modules use.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Mesh:
     ------
     MeshError
         If an array has the wrong shape or type, a position is not finite, an index is out of
-        range, a face names one vertex twice, there are no faces, or they are all at one place.
+        range, a face has one vertex twice, there are no faces, or all have the same position.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
@@ -51,7 +51,7 @@ class Mesh:
         self.faces = _checked_faces(faces, len(self.vertices))
         if self.diagonal < SMALLEST:
             raise MeshError(
-                f"vertices of all faces lie within {self.diagonal:g}, as good as at one place; "
+                f"vertices of all faces lie within {self.diagonal:g}, too close to compute with; "
                 "scale the mesh"
             )
         self.vertices.setflags(write=False)
@@ -70,16 +70,16 @@ class Mesh:
 
     @cached_property
     def face_normals(self) -> FloatArray:
-        """Unit normal of each face, shape (F, 3); zero where it has no area."""
+        """Unit normal of each face, shape (F, 3); zero if it has no area."""
         normal = _area_vectors(self.vertices, self.faces)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return normal / np.where(length > 0.0, length, 1.0)
 
     @cached_property
     def face_neighbours(self) -> IntArray:
-        """The face beyond the side opposite each corner, shape (F, 3).
+        """The face across the side opposite each corner, shape (F, 3).
 
-        -1 where there is none, or where more than two faces have the side.
+        -1 at a boundary edge, or at an edge of more than two faces.
         """
         n_faces = len(self.faces)
         order, first, count = grouped(side_keys(self.faces))  # side 3 f + j of face f, corner j
@@ -101,7 +101,7 @@ class Mesh:
 
     @cached_property
     def unpaired_edges(self) -> tuple[IntArray, IntArray]:
-        """Edges that one face has, or more than two, and how many; (e, 2) and (e,), ascending."""
+        """Edges of one face or of more than two, and their number; (e, 2) and (e,), ascending."""
         face, corner = np.nonzero(self.face_neighbours < 0)
         start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]
         size = len(self.vertices)
@@ -109,12 +109,12 @@ class Mesh:
 
     @cached_property
     def has_nonmanifold_edges(self) -> bool:
-        """Whether more than two faces share some edge."""
+        """Whether any edge has more than two faces."""
         return bool((self.unpaired_edges[1] > 1).any())
 
     @cached_property
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:
-        """Trees of boxes round faces, to find the nearest one, and which faces are in each."""
+        """Bounding-box trees for parts of the faces, each with the range of its faces."""
         trees = []
         for first in range(0, len(self.faces), FACES_OF_A_TREE):
             checkpoint()
@@ -140,7 +140,7 @@ class Mesh:
         return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
 
     def faces_at(self, vertices: IntArray) -> IntArray:
-        """Faces that have any of some vertices, ascending."""
+        """Faces at any of the given vertices, ascending."""
         begin, end = self.vertex_faces.indptr[vertices], self.vertex_faces.indptr[vertices + 1]
         count = end - begin
         place = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
@@ -148,16 +148,16 @@ class Mesh:
 
     @cached_property
     def face_component(self) -> IntArray:
-        """Which connected component each face belongs to, shape (F,).
+        """The connected component of each face, shape (F,).
 
-        Faces are connected when they share a vertex.
+        Faces are connected if they share a vertex.
         """
         one, other = self.faces[:, :2].T.ravel(), self.faces[:, 1:].T.ravel()
         return components(len(self.vertices), one, other)[1][self.faces[:, 0]]
 
     @cached_property
     def referenced(self) -> BoolArray:
-        """Which vertices at least one face uses, shape (V,)."""
+        """Which vertices belong to at least one face, shape (V,)."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces] = True
         return used
@@ -169,14 +169,14 @@ def real_array(values: ArrayLike) -> FloatArray:
     Raises
     ------
     TypeError, ValueError
-        If that would lose something: complex numbers, text, ragged lists.
+        If values cannot be converted: complex numbers, text, ragged lists.
     """
     given = np.array(values)
     if np.iscomplexobj(given):
         raise TypeError("they are complex")
     try:
         return given.astype(np.float64)
-    except OverflowError as error:  # whole numbers of hundreds of digits
+    except OverflowError as error:  # integers with hundreds of digits
         raise ValueError(str(error)) from error
 
 
@@ -186,7 +186,7 @@ def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Normals that are twice as long as the areas, shape (F, 3)."""
+    """Normals with twice the areas as their lengths, shape (F, 3)."""
     checkpoint()
     corner = vertices[faces]
     checkpoint()
@@ -199,20 +199,20 @@ def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Undirected edges of the faces and how many faces each has.
+    """Undirected edges of the faces, and the number of faces of each.
 
     Returns
     -------
     (E, 2) int array
         Smaller index first, sorted.
     (E,) int array
-        1 on the boundary, 2 inside, more where the surface branches.
+        1 on the boundary, 2 inside, more at non-manifold edges.
     """
     return _edges(side_keys(faces), int(faces.max()) + 1)
 
 
 def side_keys(faces: IntArray) -> IntArray:
-    """A number for the side opposite each corner, shape (3 F,), the same for sides of one edge."""
+    """A key for the side opposite each corner, shape (3 F,), equal for the sides of one edge."""
     size = int(faces.max()) + 1
     keys = np.empty(faces.shape, dtype=np.int64)
     for corner in range(3):
@@ -222,19 +222,19 @@ def side_keys(faces: IntArray) -> IntArray:
 
 
 def _edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
-    """One number an edge: rows of two columns would take several times as long to sort."""
+    """One key for each edge, which sorts several times faster than rows of two columns."""
     return np.minimum(start, end) * size + np.maximum(start, end)
 
 
 def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
-    """Edges that have some keys, (E, 2), and how often each is there, (E,)."""
+    """Distinct edges of some keys, (E, 2), and how often each occurs, (E,)."""
     order, first, count = grouped(keys)
     distinct = keys[order[first]]
     return np.stack([distinct // size, distinct % size], axis=1), count
 
 
 def unoriented_vertices(faces: IntArray) -> IntArray:
-    """Vertices of edges that two faces run along in the same direction, ascending."""
+    """Vertices of edges that two faces have in the same direction, ascending."""
     size = int(faces.max()) + 1
     checkpoint()
     start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
@@ -260,8 +260,8 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
         )
     if checked.size and np.abs(checked).max() > LARGEST:
         raise MeshError(
-            f"vertices has coordinates up to {np.abs(checked).max():g}, with which nothing can be "
-            f"computed; remove them, or scale the mesh to less than {LARGEST:g}"
+            f"vertices has coordinates up to {np.abs(checked).max():g}, too large to compute with; "
+            f"remove them, or scale the mesh to less than {LARGEST:g}"
         )
     return checked
 
@@ -271,7 +271,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
         given = np.array(faces)
         if given.size and not np.issubdtype(given.dtype, np.integer):
             given = real_array(given)
-            # Beyond 2^53 floats skip whole numbers, and no mesh has as many vertices.
+            # From 2^53 on, floats do not represent all integers, and no mesh has so many vertices.
             if not (np.abs(given) < 2.0**53).all() or (given != np.round(given)).any():
                 raise ValueError("some are not whole numbers")
         checked = given.astype(np.int64)
@@ -298,7 +298,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
     if repeated.any():
         first = int(repeated.argmax())
         raise MeshError(
-            f"faces[{first}] = {checked[first].tolist()} names a vertex twice "
+            f"faces[{first}] = {checked[first].tolist()} has a vertex twice "
             f"({repeated.sum()} such faces); remove degenerate faces"
         )
     return checked

@@ -20,13 +20,13 @@ from .surface_points import SurfacePoints
 from .tolerances import TINY
 
 RESOLUTION = 1e-7
-"""Of coordinates that are compared, in square roots of the area: far coarser than rounding."""
+"""Unit of the coordinates compared, in square roots of the area; far coarser than rounding."""
 
 FARTHEST = 2.0**60
-"""Greatest coordinate that is told from others."""
+"""Bound at which coordinates are clipped."""
 
 SYMMETRIC = 1e-6
-"""Skewness along an axis up to which the surface is symmetric about the plane across it."""
+"""Skewness along an axis up to which the surface counts as symmetric in that direction."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def renumbered(mesh: Mesh) -> Renumbered:
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
-    """Places of the vertices in the principal frame, in units of `RESOLUTION`, shape (V, 3)."""
+    """Coordinates of the vertices in the principal frame, in units of `RESOLUTION`, (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
     unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
@@ -114,11 +114,11 @@ class PrincipalFrame:
     ----------
     centre : (3,) float array
     deviation : float
-        Root mean square distance of the surface from it.
+        Root mean square distance of the surface from the centroid.
     axes : (3, 3) float array
-        An axis in each column, of either sign.
+        One axis in each column, with arbitrary sign.
     skewness : (3,) float array
-        Along each axis; positive where the surface reaches farther in its direction.
+        Along each axis; positive if the surface extends farther in its direction.
     """
 
     centre: FloatArray
@@ -140,7 +140,7 @@ class PrincipalFrame:
 def principal_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> PrincipalFrame:
-    """The frame of a surface, by the centroids and areas of its faces."""
+    """The frame of a surface, computed from the centroids and areas of its faces."""
     centroids = vertices[faces].mean(axis=1)
     share = face_areas / face_areas.sum()
     centre = share @ centroids
@@ -152,7 +152,7 @@ def principal_frame(
 
 
 def uniform_hash(coordinates: IntArray) -> FloatArray:
-    """A number between 0 and 1 for each row of whole numbers, (n,), as good as random."""
+    """A pseudo-random number between 0 and 1 for each row of integers, (n,)."""
     mixed = np.zeros(len(coordinates), dtype=np.uint64)
     for column in coordinates.astype(np.uint64).T:
         mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)

@@ -1,4 +1,4 @@
-"""Control points: vertices, points in space or faces with barycentrics, brought to one form."""
+"""Control points: vertices, points in space or faces with barycentrics, converted to one form."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class SurfacePoints:
     Attributes
     ----------
     faces : (k,) int array
-        The face that carries each point.
+        The face in which each point lies.
     barycentric : (k, 3) float array
-        Coordinates in that face, in the order of its corners; not negative, sum 1.
+        Coordinates in that face, in the order of its corners; not negative, with sum 1.
     """
 
     faces: IntArray
     barycentric: FloatArray
 
     def positions(self, mesh: Mesh) -> FloatArray:
-        """Where the points are in space, shape (k, 3)."""
+        """Positions of the points in space, shape (k, 3)."""
         return np.einsum("kc,kcd->kd", self.barycentric, mesh.vertices[mesh.faces[self.faces]])
 
     def __len__(self) -> int:
@@ -48,7 +48,7 @@ class SurfacePoints:
 def locate_control_points(
     mesh: Mesh, control_points: ArrayLike | SurfacePoints, closed: bool, connected: bool = True
 ) -> SurfacePoints:
-    """Bring any accepted form of control points to faces and barycentrics, and check them.
+    """Convert any accepted form of control points to faces and barycentrics, and check them.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def locate_control_points(
     control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
         Vertex indices, points on the surface, or faces with barycentrics.
     closed : bool
-        Whether a closed curve is wanted; it needs three points, an open one two.
+        Whether the curve is closed; it needs three points, an open one two.
     connected : bool
         Whether points on different components of the mesh are refused.
 
@@ -81,7 +81,7 @@ def locate_control_points(
 
 
 def control_point_names(controls: IntArray) -> list[PointName]:
-    """What messages call control points, by their indices."""
+    """Names of control points in messages, by their indices."""
     return [PointName("control_points", index) for index in controls.tolist()]
 
 
@@ -91,14 +91,14 @@ def check_connected(mesh: Mesh, points: SurfacePoints) -> None:
 
 
 def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> SurfacePoints:
-    """Bring any number of points to faces and barycentrics, each checked for itself.
+    """Convert any number of points to faces and barycentrics, and check each of them.
 
     Parameters
     ----------
     mesh : Mesh
     given : (k,) int array_like, (k, 3) float array_like or SurfacePoints
     name : str
-        Of the argument, for messages.
+        Name of the argument, for messages.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> Surf
             "one row a face"
         )
     _check_range(f"{name}.faces", faces, len(mesh.faces), "faces")
-    with np.errstate(over="ignore", invalid="ignore"):  # of what is refused
+    with np.errstate(over="ignore", invalid="ignore"):  # of values that are refused below
         sums = barycentric.sum(axis=1)
     bad = (
         ~np.isfinite(barycentric).all(axis=1)
@@ -159,7 +159,7 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> Surf
     if bad.any():
         first = int(bad.argmax())
         raise ControlPointError(
-            f"{name}.barycentric[{first}] = {barycentric[first].tolist()} is no point of "
+            f"{name}.barycentric[{first}] = {barycentric[first].tolist()} is not a point of "
             "its face; coordinates must not be negative and must sum to 1"
         )
     return SurfacePoints(faces.astype(np.int64), barycentric)
@@ -186,8 +186,8 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
     if bad.any():
         first = PointName(name, int(bad.argmax()))
         raise ControlPointError(f"{first} is NaN or infinite; pass finite positions", first)
-    # What is far from the box is far from the surface; so far that squares overflow, no nearest
-    # point would be found.
+    # A point far from the bounding box is far from the surface. Its squared distances might
+    # overflow, and no nearest point would be found.
     corners = mesh.vertices[mesh.referenced]
     beyond = np.maximum(corners.min(axis=0) - positions, positions - corners.max(axis=0))
     distance = beyond.max(axis=1)
@@ -209,7 +209,7 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
 
 
 def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
-    """Barycentrics of the nearest point of a triangle without area, which is its longest edge."""
+    """Barycentrics of the nearest point of a triangle without area, on its longest edge."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     start = int(lengths.argmax())
     end = (start + 1) % 3
@@ -232,12 +232,12 @@ def nearest_points(
     mesh : Mesh
     positions : (k, 3) float array
     among : (q,) int array, optional
-        The faces to look in, by default all.
+        The faces to search, by default all.
 
     Returns
     -------
     SurfacePoints
-        With coordinates that are NaN in a face without area.
+        Coordinates are NaN in a face without area.
     (k,) float array
         Distances.
     """
@@ -256,7 +256,7 @@ def nearest_points(
 
 
 def _nearest_of_all(mesh: Mesh, positions: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Squared distance, face and place of the points nearest to k positions."""
+    """Squared distance, face and position of the points nearest to k positions."""
     squared = np.full(len(positions), np.inf)
     nearest = np.zeros(len(positions), dtype=np.int64)
     places = np.zeros((len(positions), 3))
@@ -272,7 +272,7 @@ def _nearest_of_all(mesh: Mesh, positions: FloatArray) -> tuple[FloatArray, IntA
 def first_hits(
     mesh: Mesh, origins: FloatArray, directions: FloatArray
 ) -> tuple[SurfacePoints, FloatArray]:
-    """Where rays first meet a mesh, from either side of its faces.
+    """First intersections of rays with a mesh, from either side of its faces.
 
     Parameters
     ----------
@@ -282,9 +282,9 @@ def first_hits(
     Returns
     -------
     SurfacePoints
-        The face is -1 where a ray meets nothing.
+        The face is -1 if a ray misses the mesh.
     (k,) float array
-        How far along each ray, in lengths of its direction; infinite where it meets nothing.
+        Ray parameters, in lengths of the direction; infinite if a ray misses the mesh.
     """
     rays = [np.ascontiguousarray(ends, dtype=np.float64) for ends in (origins, directions)]
     faces, along = np.full(len(origins), -1), np.full(len(origins), np.inf)
@@ -325,11 +325,11 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
 
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
-    """Refuse two points that are the same."""
+    """Refuse coincident points."""
     if len(points) < 2:
         return
     tolerance = tolerances.COINCIDENT * mesh.diagonal
-    # Against the other of the two nearest, since every point is the nearest of its own.
+    # The second of the two nearest, since the nearest one is the point itself.
     distance, nearest = cKDTree(points.positions(mesh)).query(points.positions(mesh), k=2)
     same = distance[:, 1] <= tolerance
     if same.any():
@@ -351,15 +351,15 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName
         apart = names[int(other.argmax())]
         raise UnreachableError(
             f"{names[0]} and {apart} lie on different components of the mesh, so no curve joins "
-            "them; join the components, or merge vertices by distance where only hair-thin gaps "
-            "part them",
+            "them; join the components, or merge vertices by distance if only tiny gaps separate "
+            "them",
             names[0],
             apart,
         )
 
 
 def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
-    """Sets of points as one."""
+    """Concatenate sets of points."""
     return SurfacePoints(
         np.concatenate([part.faces for part in parts]),
         np.concatenate([part.barycentric for part in parts]),
@@ -367,7 +367,7 @@ def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
 
 
 def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
-    """The same points seen from other faces that hold them."""
+    """The same points, expressed in other faces that contain them."""
     corners = mesh.faces
     return SurfacePoints(
         faces, weights_at(corners[points.faces], points.barycentric, corners[faces])
@@ -375,13 +375,13 @@ def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoint
 
 
 def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
-    """Barycentric coordinates with respect to other vertices, as far as these are among their own.
+    """Barycentric coordinates with respect to other vertices.
 
     Parameters
     ----------
     corners : (n, 3) int array
     barycentric : (n, 3) float array
-        With respect to them.
+        Coordinates with respect to the corners.
     others : (n, m) int array
 
     Returns

@@ -1,11 +1,11 @@
-"""Straight traces over the faces of a mesh: between two points, and from a point by a length.
+"""Straight traces over the faces of a mesh: between two points, or from a point over a length.
 
-A trace is a normal section: the intersection of the surface with a plane that stands on it. It is
-followed from face to face by the signs of the plane at their corners, so that it cannot get lost
-between two faces, and all traces of one call advance together. Two consecutive points of one lie
-in one face, the one that carries the first of them.
+A trace is a normal section: the intersection of the surface with a plane that contains its normal.
+It is followed from face to face by the sides of the plane on which the corners lie, so it cannot
+get lost between two faces. All traces of a call advance together. Two consecutive points of a
+trace lie in one face, which is the face of the first of them.
 
-Costs follow the number of faces passed and not the size of the mesh.
+The cost depends on the number of faces passed, not on the size of the mesh.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from .mesh import Mesh
 from .surface_points import SurfacePoints
 
 MOST_FACES = 4096
-"""Faces that a trace may pass; one that goes round the surface is no short connection."""
+"""Most faces of a trace; a longer one runs round the surface and is not a short connection."""
 
 FOLDS = 4.0
-"""By how much a trace over folded faces may be longer on its way, in mean edge lengths."""
+"""Extra length allowed to a trace over folded faces, in mean edge lengths."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Traces:
     Attributes
     ----------
     reached : (m,) bool array
-        Whether the trace arrived. Those that did not have no crossings.
+        Whether the trace reached its end. The others have no crossings.
     pair : (q,) int array
-        The pair that each crossing of an edge belongs to, ascending.
+        The pair of each crossing with an edge, ascending.
     crossings : SurfacePoints
-        Where the traces cross edges, in order, each in the face that it enters there.
+        Crossings with edges, in order, each in the face that the trace enters there.
     """
 
     reached: BoolArray
@@ -56,8 +56,8 @@ def trace_between(
 ) -> Traces:
     """Trace from points inside faces to other points nearby.
 
-    A trace over faces that are folded back runs forth, back and forth again; what it runs back is
-    taken off its length.
+    A trace over folded faces runs forward, backward and forward again; the backward part is
+    subtracted from its length.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ def trace_between(
     start : SurfacePoints
         m points, each strictly inside its face.
     end : SurfacePoints
-        m points anywhere: a vertex counts as reached in every face round it.
+        m points anywhere; a vertex counts as reached in every face round it.
     normals : (m, 3) float array
         Directions that the planes contain.
     detour : float
-        Longest trace, relative to the straight distance in space.
+        Greatest length of a trace, relative to the straight distance in space.
     folded : (F,) bool array, optional
-        Which faces of the mesh are.
+        Which faces of the mesh are folded back.
     """
     origin, goal = start.positions(mesh), end.positions(mesh)
     forward = goal - origin
@@ -109,7 +109,7 @@ def trace_between(
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
-    """Crossings without those of a trace that turns about a vertex and crosses there once more."""
+    """Crossings with only the last one of each trace that passes a vertex several times in a row."""
     here = crossings.barycentric > 0.0
     vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
     vertex[here.sum(axis=1) > 1] = -1
@@ -125,10 +125,10 @@ def trace_from(
     length: FloatArray,
     folded: BoolArray | None = None,
 ) -> tuple[SurfacePoints, BoolArray, int]:
-    """Points moved along the surface.
+    """Move points along the surface.
 
-    Over faces that are folded back a trace runs back, so its remaining length grows there,
-    and it ends behind the fold; unless the point itself is in a fold.
+    Over folded faces a trace runs backward, so its remaining length grows there and it ends beyond
+    the fold. An exception is a point that starts in a fold.
 
     Parameters
     ----------
@@ -136,20 +136,20 @@ def trace_from(
     start : SurfacePoints
         m points, each strictly inside its face.
     direction : (m, 3) float array
-        Unit vectors about tangent to the faces.
+        Unit vectors, nearly tangent to the faces.
     length : (m,) float array
         Not negative.
     folded : (F,) bool array, optional
-        Which faces of the mesh are.
+        Which faces of the mesh are folded back.
 
     Returns
     -------
     SurfacePoints
         Strictly inside their faces.
     (m,) bool array
-        Which came to a boundary, or an edge of three faces, and stayed beside it.
+        Which points stopped at a boundary or a non-manifold edge.
     int
-        How many faces the point that passed most of them has passed: the cost of the call.
+        Greatest number of faces passed by a point, which is the cost of the call.
     """
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
@@ -185,9 +185,9 @@ def trace_from(
 
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:
-    """Coordinates drawn off the sides and corners of their faces by `tolerances.INSIDE`."""
-    drawn = np.maximum(barycentric, tolerances.INSIDE)
-    return drawn / drawn.sum(axis=1, keepdims=True)
+    """Coordinates moved away from the sides and corners of their faces by `tolerances.INSIDE`."""
+    moved = np.maximum(barycentric, tolerances.INSIDE)
+    return moved / moved.sum(axis=1, keepdims=True)
 
 
 _OF_EACH_FRONT = (
@@ -195,14 +195,14 @@ _OF_EACH_FRONT = (
     *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
     *("_fraction", "_crossing"),
 )
-"""Arrays of `_Fronts`."""
+"""Arrays of `_Fronts` with one row for each trace."""
 
 
 class _Fronts:
-    """Traces in progress, each in its plane, about to cross an edge of the face that it is in.
+    """Traces in progress, each in its plane, about to cross an edge of its present face.
 
-    Of that edge one end lies above the plane or in it, the other below. In the next face only the
-    third corner is new: its height says which of the two other sides comes next.
+    One end of this edge lies above the plane or in it, the other below. In the next face only the
+    third corner is new; the sign of its height determines the next edge.
     """
 
     def __init__(
@@ -215,7 +215,7 @@ class _Fronts:
         index: IntArray,
     ) -> None:
         self.mesh = mesh
-        self.index = index  # (w,) which of the caller's traces
+        self.index = index  # (w,) indices of the caller's traces
         self.faces = self._start = faces[index]
         self._origin = origin[index]
         self._across = np.cross(normals[index], forward[index])
@@ -242,7 +242,7 @@ class _Fronts:
         self._high, self._low = corners[rows, high], corners[rows, low]
         self._high_height, self._low_height = height[rows, high], height[rows, low]
         self._high_position, self._low_position = positions[rows, high], positions[rows, low]
-        # A plane that leaves its face nowhere belongs to no trace.
+        # Drop traces whose plane does not cross the sides of the face.
         self._keep(crossed[rows, side])
         self._find_crossing()
 
@@ -251,34 +251,34 @@ class _Fronts:
         return np.linalg.norm(self._crossing - self._position, axis=1)
 
     def beyond(self) -> IntArray:
-        """The face beyond that edge, -1 where there is none or more than one, shape (w,)."""
+        """The face beyond this edge, -1 if there is none or more than one, shape (w,)."""
         return self.mesh.face_neighbours[self.faces, self._side]
 
     def exit_barycentric(self) -> FloatArray:
-        """Where the traces leave their faces, in coordinates of these, shape (w, 3)."""
+        """Barycentric coordinates at which the traces leave their faces, shape (w, 3)."""
         return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
 
     def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Where the traces have entered their faces: face, ends of the edge and share of one."""
+        """Entry points of the faces: face, low and high end of the edge, fraction from high to low."""
         return self.faces, self._low, self._high, self._fraction
 
-    def enter_next_faces(self, goes: BoolArray) -> None:
-        """Take traces over their edges; those that may not or cannot continue are dropped.
+    def enter_next_faces(self, continues: BoolArray) -> None:
+        """Move traces across their edges; drop those that shall not or cannot continue.
 
-        So do those that come back to the face where they started: their section is closed.
+        Traces that return to their first face are dropped too, as their section is closed.
         """
         beyond = self.beyond()
-        goes = goes & (beyond >= 0) & (beyond != self._start)
-        if not goes.all():
-            self._keep(goes)
-            beyond = beyond[goes]
+        continues = continues & (beyond >= 0) & (beyond != self._start)
+        if not continues.all():
+            self._keep(continues)
+            beyond = beyond[continues]
         self.faces = beyond
         self._position = self._crossing
 
-    def leave_edges(self, goes: BoolArray) -> None:
-        """Find the next edge of traces that have just entered a face; others are dropped."""
-        if not goes.all():
-            self._keep(goes)
+    def leave_edges(self, continues: BoolArray) -> None:
+        """Find the next edge of traces that have just entered a face; drop the others."""
+        if not continues.all():
+            self._keep(continues)
         corners = self.mesh.faces[self.faces]
         third = corners.sum(axis=1) - self._low - self._high
         position = self.mesh.vertices[third]
@@ -307,14 +307,14 @@ class _Fronts:
 def _on_edges(
     mesh: Mesh, faces: IntArray, low: IntArray, high: IntArray, fraction: FloatArray
 ) -> FloatArray:
-    """Barycentric coordinates of points on edges, a share of the way from high to low, (p, 3)."""
+    """Barycentric coordinates, (p, 3), of points at a fraction of the edges from high to low."""
     corners = mesh.faces[faces]
     share = fraction[:, None]
     return (corners == high[:, None]) * (1.0 - share) + (corners == low[:, None]) * share
 
 
 def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
-    """Whether each point lies in its face: a vertex lies in every face round it."""
+    """Whether each point lies in the given face; a vertex lies in every face round it."""
     holds = points.faces == faces
     on_side = np.flatnonzero(~holds & (points.barycentric == 0.0).any(axis=1))
     if len(on_side):

@@ -1,5 +1,5 @@
-"""Meshes on which every stage works, made from meshes with defects, and the maps back.
+"""Repairs meshes with defects so that every stage works on them, and maps curves back.
 
-`mapped_mesh` is the map, `nonmanifold` and `degenerate_faces` mend, and `free_surface` takes
-obstacles away.
+`mapped_mesh` is the map, `nonmanifold` and `degenerate_faces` repair, and `free_surface` removes
+obstacles.
 """

@@ -1,4 +1,4 @@
-"""Faces without area: which they are, and moves of their corners that give them one."""
+"""Degenerate faces: finds faces without area and moves their corners to give them one."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from ..geometry.mesh import edge_lengths, unique_edges
 from ..progress import checkpoint
 
 ATTEMPTS = 4
-"""Of moving vertices, until every face has an area."""
+"""Attempts at moving vertices until every face has an area."""
 
 SEED = 0
-"""Of the ways in which vertices are moved; the same mesh is moved in the same way."""
+"""Seed of the random moves, so that the same mesh always gets the same moves."""
 
 
 def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
-    """Which faces have no area: a corner on another, or on the opposite edge.
+    """Which faces have no area: two corners coincide, or one lies on the opposite edge.
 
-    Needles have an area, however thin: their shortest edge stands across the longest.
+    A needle has an area, however thin it is, since its shortest edge is transverse to the longest.
 
     Parameters
     ----------
     vertices : (v, 3) float array
     faces : (f, 3) int array
     short : float
-        Length up to which an edge counts as none.
+        Length up to which the ends of an edge coincide.
 
     Returns
     -------
@@ -50,22 +50,22 @@ def with_areas(
     flat: BoolArray,
     moving: BoolArray | None = None,
 ) -> FloatArray:
-    """Vertices with which every face has an area where that is possible, shape (v, 3).
+    """Move vertices so that every face has an area where possible; return them, shape (v, 3).
 
-    Corners of flat faces are moved by a thousandth of their shortest edge that has a length, each
-    its own way.
+    Corners of flat faces are moved by a thousandth of their shortest edge with a length, each in a
+    random direction.
 
     Parameters
     ----------
     vertices : (v, 3) float array
-        Near the origin: far from it a small move would be lost to rounding.
+        Near the origin; far from it, rounding would remove small moves.
     faces : (f, 3) int array
     short : float
-        Length up to which an edge counts as none.
+        Length up to which the ends of an edge coincide.
     flat : (f,) bool array
-        As `flat_faces` gives them.
+        The result of `flat_faces`.
     moving : (v,) bool array, optional
-        Vertices that are moved in any case.
+        Vertices that are always moved.
     """
     start, still = vertices, flat
     checkpoint()
@@ -83,9 +83,9 @@ def with_areas(
 
 
 def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
-    """Length of the shortest edge longer than ``short`` at each vertex or at its place, shape (v,).
+    """Length of the shortest edge longer than ``short`` at each vertex, shape (v,).
 
-    Shorter ones join vertices to one place. Zero where no edge is longer.
+    Vertices joined by shorter edges count as one. Zero if no edge is longer.
     """
     edges, _ = unique_edges(faces)
     lengths = edge_lengths(vertices, edges)

@@ -1,4 +1,4 @@
-"""Faces whose sides are cut into segments, so that each segment can be joined to another face."""
+"""Subdivides the sides of faces into segments, so that each segment can join another face."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from ..progress import checkpoint
 
 @dataclass(frozen=True)
 class SubdividedFaces:
-    """Some triangles with their sides cut into segments, each segment joined to the centroid.
+    """Triangles with sides subdivided into segments, each joined to the centroid by a triangle.
 
     Attributes
     ----------
     faces : (m, 3) int array
-        The faces that are whole first. Vertices beyond the given ones are points of edges, then
-        centroids.
+        Undivided faces first. New vertices are points on edges, then centroids.
     parent : (m,) int array
         The face that each is a part of.
     corners : (m, 3, 3) float array
-        Barycentric coordinates of its corners in the parent.
+        Barycentric coordinates of the corners in the parent.
     edge_points : (p, 3) float array
-        New vertices on edges: both ends and the share of the second one.
+        New vertices on edges: both ends, and the weight of the second one.
     first_child : (3 f,) int array
-        The child at the first segment of each side, -1 for sides of whole faces. Its side there
-        is opposite corner 2, as that of the following segments, whose numbers follow.
+        The child at the first segment of each side, -1 for sides of undivided faces. The children
+        at the other segments have the following numbers. The segment is opposite corner 2 of its
+        child.
     """
 
     faces: IntArray
@@ -45,7 +45,7 @@ def subdivided(
     segments: IntArray,
     n_vertices: int,
 ) -> SubdividedFaces:
-    """Cut edges into segments of equal length, the same for all faces that share an edge.
+    """Subdivide edges into segments of equal length, alike in all faces of an edge.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def subdivided(
     low, high : (3 f,) int array
         The corner (3 face + place) at either end of each side; sides of one edge agree.
     edge_of_side : (3 f,) int array
-        The edge that each side belongs to, -1 for sides that stay whole.
+        The edge of each side, -1 for sides that are not subdivided.
     segments : (e,) int array
         Number of segments of each edge, at least 2.
     n_vertices : int
-        Vertices before.
+        Number of vertices before the subdivision.
     """
     cut = (edge_of_side >= 0).reshape(-1, 3).any(axis=1)
     whole, split = np.flatnonzero(~cut), np.flatnonzero(cut)
@@ -72,7 +72,7 @@ def subdivided(
     n_points = int((segments - 1).sum())
 
     def end(number: IntArray) -> tuple[IntArray, FloatArray]:
-        """Vertex and barycentrics of the points after so many segments, on each row's side."""
+        """Vertex and barycentrics of the points after a number of segments, on each row's side."""
         share = number / count[row]
         here, there = low[side[row]], high[side[row]]
         at_edge = n_vertices + inner[edge[row]] + number - 1
@@ -106,7 +106,7 @@ def subdivided(
 def _edge_points(
     faces: IntArray, low: IntArray, high: IntArray, edge_of_side: IntArray, segments: IntArray
 ) -> FloatArray:
-    """Ends and share of the second one, (p, 3), of the new vertices on edges."""
+    """Ends and weight of the second one, (p, 3), of the new vertices on edges."""
     side = np.full(len(segments), -1)
     sides = np.flatnonzero(edge_of_side >= 0)[::-1]
     side[edge_of_side[sides]] = sides  # the first side of each edge

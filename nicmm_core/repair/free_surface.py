@@ -1,9 +1,9 @@
-"""Which faces obstacles of weight 1 leave: there no curve has any length inside them.
+"""The part of the surface outside obstacles of weight 1, which curves never enter.
 
-Faces whose three corners have weight 1 are taken away, and with a clearance all faces near them.
-The rest is a surface with boundaries, which every stage handles: paths keep off them, coarse cells
-end there, and nodes that come to one stay. So avoiding obstacles needs no terms and no weights of
-its own, and a curve that cannot avoid them is found out before anything is solved.
+Faces whose three corners have weight 1 are removed, and with a clearance all faces near them. The
+remaining faces are a surface with boundaries, which every stage handles: paths avoid boundaries,
+coarse cells end there, and nodes that reach one stay there. So obstacles need no additional energy
+terms, and a curve that cannot avoid them is detected before anything is solved.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from .mapped_mesh import MappedMesh
 from .nonmanifold import welded_vertices
 
 HARD = 1.0
-"""Weight from which an obstacle is not to be entered; below, it costs in proportion."""
+"""Weight of an obstacle that curves must not enter; smaller weights cost in proportion."""
 
 
 def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> IntArray:
-    """Faces that are not inside obstacles nor closer to them than the clearance, ascending.
+    """Faces that are neither inside obstacles nor closer to them than the clearance, ascending.
 
     Parameters
     ----------
     mapped : MappedMesh
-        The whole original; distances are measured on the mesh.
+        A map of all faces; distances are measured on its mesh.
     obstacles : (V,) float array
     clearance : float
         Distance along the surface, in mesh units, that curves keep from obstacles of weight 1.
@@ -38,7 +38,7 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
         If no face is free.
     """
     faces = mapped.original.faces
-    # A vertex that is there several times, as along a seam, may be marked only once.
+    # Only one of several coincident vertices, as along a seam, may be marked.
     place = welded_vertices(mapped.original)
     hard_places = np.zeros(len(place), dtype=bool)
     hard_places[place[obstacles >= HARD]] = True
@@ -49,14 +49,14 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
     free = np.flatnonzero(~blocked)
     if not len(free):
         raise UnreachableError(
-            "obstacles leave nothing of the surface; paint less with weight 1, or use a smaller "
+            "obstacles cover the whole surface; paint less with weight 1, or use a smaller "
             "clearance"
         )
     return free
 
 
 def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArray:
-    """Distance of each vertex of the original from obstacles, (V,), up to the farthest."""
+    """Distance of each vertex of the original from obstacles, (V,), up to `farthest`."""
     mesh = mapped.mesh
     here = mapped.weights(hard.astype(np.float64))
     assert here is not None  # as there are weights
@@ -67,14 +67,14 @@ def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArr
 
 
 def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
-    """Raise UnreachableError where obstacles enclose points, or lie between them.
+    """Raise UnreachableError if obstacles contain points, or separate them.
 
     Parameters
     ----------
     free : MappedMesh
-        Of the faces that obstacles leave.
+        The map of the faces outside obstacles.
     named : dict of str to SurfacePoints
-        Points by the argument that they come from.
+        Points by the name of their argument.
     """
     component: dict[PointName, set[int]] = {}
     for argument, points in named.items():
@@ -91,8 +91,8 @@ def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
     for name, own in component.items():
         if not own & common:
             raise UnreachableError(
-                f"obstacles of weight 1 separate {name} from {first}; leave a way between them, or "
-                "lower the weights there",
+                f"obstacles of weight 1 separate {name} from {first}; leave a path between them, "
+                "or lower the weights there",
                 name,
                 first,
             )

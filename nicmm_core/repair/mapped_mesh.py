@@ -1,7 +1,7 @@
-"""A mesh that curves are computed on in place of another, and the map between the two.
+"""A repaired mesh on which curves are computed, and the map between it and the original.
 
 Each of its faces is a face of the original or a part of one. So points and curves on it are points
-and curves on the original, which stays as it is. `nonmanifold` makes such meshes.
+and curves on the original, which is not changed. `nonmanifold` creates such meshes.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from ..progress import checkpoint
 from .strand_separation import separated
 
 Holding = list[SurfacePoints]
-"""For each of some points, what it is in every face of the mapped mesh that holds it."""
+"""For each of some points, its representations in all faces of the mapped mesh that contain it."""
 
 
 @dataclass(frozen=True)
 class MappedMesh:
-    """A mesh and the original that each part of it comes from.
+    """A mesh and its map to the original.
 
     Attributes
     ----------
     original : Mesh
     mesh : Mesh
-        The same object where nothing differs.
+        The same object as the original if nothing differs.
     face : (f,) int array
-        The original face that each of its faces lies in.
+        The original face of each face of the mesh.
     corners : (f, 3, 3) float array or None
-        Barycentric coordinates of the corners in that face; None where all faces are whole, their
-        corners in the same order.
+        Barycentric coordinates of the corners in that face; None if no face is divided and the
+        corners have the same order.
     place : (v,) int array
-        The same number for vertices that are one point of the original.
+        Equal for vertices that are one point of the original.
     original_place : (V,) int array
         The same for the original's vertices.
     origin : (3,) float array
-        Where the mesh's origin is in the space of the original.
+        The mesh's origin in the space of the original.
     """
 
     original: Mesh
@@ -58,11 +58,11 @@ class MappedMesh:
 
     @property
     def differs(self) -> bool:
-        """Whether there are two meshes."""
+        """Whether the mesh is not the original itself."""
         return self.mesh is not self.original
 
     def holding(self, points: SurfacePoints) -> Holding:
-        """Where points of the original are; those in faces of their own faces come first."""
+        """Representations of points of the original; parts of a point's own face come first."""
         found = []
         around = _faces_holding(self.original, points)
         for face, barycentric, faces in zip(points.faces, points.barycentric, around, strict=True):
@@ -71,7 +71,7 @@ class MappedMesh:
         return found
 
     def _parts_with(self, faces: IntArray, weights: dict[int, float]) -> SurfacePoints:
-        """A point, by its weights at vertices, in the parts of some faces that hold it."""
+        """A point, given by its weights at vertices, in the parts of some faces that contain it."""
         parts = [self._parts_of(face) for face in faces.tolist()]
         parent = np.repeat(faces, [len(part) for part in parts])
         part = np.concatenate(parts)
@@ -88,7 +88,7 @@ class MappedMesh:
         return SurfacePoints(part, local)
 
     def common_component(self, holding: Holding) -> int | None:
-        """The largest component of the mesh that has all points; None where no component has."""
+        """The largest component of the mesh that contains all points, or None."""
         component = self.mesh.face_component
         common: set[int] | None = None
         for point in holding:
@@ -98,7 +98,7 @@ class MappedMesh:
         return max(common or (), key=lambda label: float(areas[label]), default=None)
 
     def points(self, holding: Holding, component: int) -> SurfacePoints:
-        """Points in faces of one component."""
+        """The points in faces of one component."""
         faces, barycentric = [], []
         for point in holding:
             first = int((self.mesh.face_component[point.faces] == component).argmax())
@@ -110,7 +110,7 @@ class MappedMesh:
         )
 
     def weights(self, weights: FloatArray | None) -> FloatArray | None:
-        """Weights at the vertices; the greatest of vertices that are one here."""
+        """Weights at the vertices of the mesh; the greatest one where vertices are joined."""
         if weights is None or not self.differs:
             return weights
         checkpoint()
@@ -124,10 +124,10 @@ class MappedMesh:
         return result
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
-        """A simple curve on the mesh as one on the original, simple there too.
+        """Map a simple curve on the mesh to a simple curve on the original.
 
-        Strands may pass different copies of one vertex, or of one point of an edge. There they
-        are separated.
+        Strands that pass different copies of one vertex, or of one point of an edge, are separated
+        there.
         """
         if not self.differs:
             return curve
@@ -146,7 +146,7 @@ class MappedMesh:
         )
 
     def carried(self, curve: SurfaceCurve) -> SurfaceCurve | None:
-        """A curve on the original as one on the mesh; None where that does not hold all of it."""
+        """Map a curve on the original to the mesh; None if the mesh lacks a part of it."""
         if not self.differs:
             return curve
         if self.corners is None:
@@ -160,7 +160,7 @@ class MappedMesh:
         return curve_on_mesh(self.mesh, curve.closed, faces, barycentric, curve.control_index)
 
     def _parts_of_segments(self, curve: SurfaceCurve) -> tuple[IntArray, FloatArray]:
-        """The part that holds each point and the next one, or -1, and the point's coordinates."""
+        """The part that contains each point and the next one, or -1, and the point's coordinates."""
         n = len(curve.faces)
         faces, barycentric = np.full(n, -1), np.zeros((n, 3))
         points = SurfacePoints(curve.faces, curve.barycentric)
@@ -175,9 +175,9 @@ class MappedMesh:
         return faces, barycentric
 
     def field(self, values: FloatArray) -> FloatArray:
-        """Level-set values at the vertices of the original: those of the copy nearest to the curve.
+        """Level-set values at the vertices of the original, from the copy nearest to the curve.
 
-        Vertices that the mesh lacks are outside.
+        Vertices that the mesh lacks get the greatest value.
         """
         used = np.flatnonzero(self.mesh.referenced)
         order = used[np.argsort(-np.abs(values[used]), kind="stable")]
@@ -193,13 +193,13 @@ class MappedMesh:
         return bool((np.bincount(self.place) > 1).any())
 
     def _parts_of(self, face: int) -> IntArray:
-        """The faces of the mesh that a face of the original is, or is made of."""
+        """The faces of the mesh that make up a face of the original."""
         order, begin = self._by_original
         return order[begin[face] : begin[face + 1]]
 
     @cached_property
     def _by_original(self) -> tuple[IntArray, IntArray]:
-        """Faces of the mesh in the order of their originals, and where each original begins."""
+        """Faces of the mesh sorted by original face, and the start index of each original face."""
         order, first, count = grouped(self.face)
         size = np.zeros(len(self.original.faces) + 1, dtype=np.int64)
         size[self.face[order[first]] + 1] = count
@@ -207,7 +207,7 @@ class MappedMesh:
 
 
 def _faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
-    """The faces that each point lies in, its own first."""
+    """The faces that contain each point, its own face first."""
     around = mesh.vertex_faces
     found = []
     checkpoint()
