@@ -1,4 +1,4 @@
-"""Arguments that need no mesh stage to be checked: the table of options, and a start's bounds."""
+"""Checks of arguments: the options in the table, weights and bounds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        By name, with weights as (V,) float arrays. Points are left to `path.via_points`.
+        By name, with weights as (V,) float arrays. `path.via_points` checks points.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def check_torch() -> None:
 
 
 def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -> FloatArray:
-    """One number a vertex, (V,), or an ArgumentError that names them; they may be infinite."""
+    """One number for each vertex, (V,), possibly infinite; raises ArgumentError otherwise."""
     try:
         checked = real_array(values)
     except (TypeError, ValueError) as error:
@@ -104,7 +104,7 @@ def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -
 
 
 def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
-    """Weights in [0, 1] at the vertices, (V,), or an ArgumentError that names them."""
+    """Weights in [0, 1] at the vertices, (V,); raises ArgumentError otherwise."""
     if weights is None:
         return None
     checked = checked_vertex_values(name, weights, mesh, "weight")

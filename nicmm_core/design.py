@@ -1,14 +1,14 @@
-"""The front door: a mesh and control points go in, a curve comes out. Read this file first.
+"""The entry point: from a mesh and control points to a curve. Read this file first.
 
-A request is checked, faces inside obstacles are taken away (`repair.free_surface`), what is left is
-made a manifold if it is not one (`repaired_surface`), and the request is answered there
+A request is checked, faces inside obstacles are removed (`repair.free_surface`), the remaining
+surface is made a manifold if it is not one (`repaired_surface`), and the curve is designed there
 (`surface_designer`):
 
-control points → initial loop → signed distance → features (`problem`) → network, pretrained
+control points → initial loop → signed distance → features (`problem`) → pretrained network
 → its level set → one loop through the points → contour → relaxation of the curve.
 
-On all but small meshes all but the last is done on a coarse mesh of the same surface, and the
-curve is mapped from there to the fine mesh (`coarsening`).
+Except on small meshes, all steps but the last are done on a coarse mesh of the same surface, and
+the curve is mapped from there to the fine mesh (`coarsening`).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ PARTS = (
 
 @dataclass(frozen=True)
 class _Free:
-    """What obstacles leave of the surface."""
+    """The part of the surface outside obstacles."""
 
     obstacles: FloatArray
     clearance: float
@@ -54,11 +54,11 @@ class _Free:
 
 
 class Designer:
-    """A surface that will be asked for many curves.
+    """Designs many curves on one surface.
 
-    What depends on the mesh alone is found once. Answers are not remembered: equal arguments give
-    equal curves, whatever was asked before, and those of `design_curve`. Threads may share a
-    Designer: it designs one curve after the other.
+    Everything that depends only on the mesh is computed once. Results are not cached: equal
+    arguments give equal curves, the same as `design_curve`, whatever was designed before. Threads
+    may share a Designer: it designs one curve after the other.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Designer:
         self.mesh = mesh
         self._whole = RepairedSurface(mesh, np.arange(len(mesh.faces)))
         self._free: _Free | None = None  # of the last request with obstacles
-        # A progress function may ask the same Designer for another curve.
+        # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
 
     def design(
@@ -92,26 +92,27 @@ class Designer:
         max_iterations: int | None = None,
         progress: Progress | None = None,
     ) -> Design:
-        """Design a curve; arguments, result and errors are those of `design_curve`, and more.
+        """Design a curve; arguments, result and errors as in `design_curve`, and those below.
 
         Parameters
         ----------
         start : Design or SurfaceCurve, optional
-            A curve on this mesh to go on from; only with the method "nicmm". Its course and the
-            order of its points are kept, so the result may differ from that without a start, and
-            `via_points` have no effect. Obstacles, maps and smoothness may be others. Control
-            points may have moved by a tenth of the curve's length, come or gone. The cost follows
-            the curve and not the mesh: that is what dragging a point needs.
+            A curve on this mesh from which the design starts; only with the method "nicmm". Its
+            course and the order of its points are kept, so the result may differ from that without
+            a start, and `via_points` have no effect. Obstacles, maps and smoothness may differ.
+            Control points may have been moved by up to a tenth of the curve's length, added or
+            removed. The cost depends on the curve and not on the mesh, as needed when a point is
+            dragged.
         max_iterations : int, optional
-            Of the relaxation; only with the method "nicmm". The status is `ITERATION_LIMIT` until
-            the curve has converged: for live drawing, pass the last design as the next start until
-            it has.
+            Limit on the iterations of the relaxation; only with the method "nicmm". The status is
+            `ITERATION_LIMIT` until the curve has converged; for interactive drawing, pass each
+            design as the next start until then.
 
         Raises
         ------
         CurveError
             If the start lies on another mesh, enters an obstacle, is too far from the control
-            points, or would cross itself on its way there.
+            points, or would cross itself when moved to them.
         """
         started = time.perf_counter()
         given = {
@@ -149,7 +150,7 @@ class Designer:
 
     @contextlib.contextmanager
     def _its_turn(self) -> Iterator[None]:
-        """Wait until no other thread uses this Designer, or the caller has enough of waiting."""
+        """Wait until no other thread uses this Designer, or the caller cancels."""
         while not self._lock.acquire(timeout=INTERVAL):
             checkpoint()
         try:
@@ -169,7 +170,7 @@ class Designer:
         raise UnreachableError(PARTS)
 
     def _surface_off_obstacles(self, request: Request) -> RepairedSurface:
-        """What obstacles leave of the surface, kept for the next request with the same ones."""
+        """The surface outside obstacles, kept for the next request with the same ones."""
         obstacles, clearance = request.obstacles, request.clearance
         if obstacles is None:
             return self._whole
@@ -184,7 +185,7 @@ class Designer:
 
 
 def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
-    """Whether a design is already the answer to a request, on a mapped mesh."""
+    """Whether a design already meets a request, on a mapped mesh."""
     resumable = design.resumable
     return (
         resumable is not None
@@ -195,7 +196,7 @@ def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
 
 
 def _check_start(start: object, method: str, max_iterations: int | None) -> None:
-    """Raise ArgumentError unless a start and a bound can be used with the method."""
+    """Raise ArgumentError unless a start and a limit can be used with the method."""
     check_iterations(max_iterations)
     if start is not None and not isinstance(start, Design | SurfaceCurve):
         raise ArgumentError(
@@ -229,29 +230,28 @@ def design_curve(
         Vertex indices, points on the surface, or faces with barycentric coordinates; at least
         three, or two of an open curve.
     closed : bool, default True
-        A closed curve, or an open one from the first point visited to the last.
+        Whether the curve is closed, or open from the first point visited to the last.
     order : {"given", "shortest"}
-        Visit the points in this order, or in the shortest one: cyclic where the curve is closed.
+        Visit the points in the given order, or in the shortest one, cyclic for a closed curve.
     via_points : mapping, optional
-        Which way the curve goes from one control point to the next, where there are several: from
-        the index of a control point to points, in any form that control points may have, that the
-        initial path passes on its way from there, such as ``{1: [57]}``. The curve does not pass
-        them exactly. Only for the order "given".
+        Selects one of several courses between two control points. It maps the index of a control
+        point to points, in any form that control points may have, which the initial path to the
+        next control point passes, such as ``{1: [57]}``. The curve does not pass them exactly. Only
+        for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
-        The pretrained network's level set, relaxed on the surface (the default); the paper's own
-        method, which trains the network on for every curve; or the same energy minimised without
-        a network.
+        The level set of the pretrained network, relaxed on the surface (the default); the method of
+        the paper, which trains the network further for every curve; or the same energy minimised
+        without a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
-        What the curve shall avoid and what it shall follow. No curve enters a face whose three
-        corners are obstacles of weight 1; lower weights cost in proportion.
+        Weights that the curve avoids and weights that it follows. No curve enters a face whose
+        three corners are obstacles of weight 1; lower weights cost in proportion.
     clearance : float, default 0
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
-        Larger gives a fairer curve that follows the shortest way less closely.
+        Larger values give a fairer curve that follows the shortest path less closely.
     progress : callable, optional
-        Called a few times a second with the fraction done and the points of the curve so far, of
-        which there are none at first. The design stops when it returns False, with the last curve
-        that it had or with none.
+        Called a few times a second with the fraction done and the points of the present curve, at
+        first none. If it returns False, the design stops with the last curve, or with none.
 
     Returns
     -------
@@ -262,8 +262,8 @@ def design_curve(
     ControlPointError
         If there are too few points, or one is repeated, out of range or off the surface.
     UnreachableError
-        If no such curve exists on the surface, or only one that winds round itself too often; also
-        where obstacles of weight 1 leave no way.
+        If no such curve exists on the surface, or only one that winds round itself too often, or if
+        obstacles of weight 1 separate the points.
     ArgumentError
         If another argument cannot be used.
     MissingPackageError

@@ -1,7 +1,7 @@
-"""The manifolds of a surface, who designs on each of them, and requests and designs there.
+"""The manifolds of a surface with their designers, and the map of requests and designs to them.
 
-A mesh without defects is its own manifold. Otherwise `repair.nonmanifold` has several ways to make
-one, and the first is taken on which the points of a request are connected.
+A mesh without defects is its own manifold. Otherwise `repair.nonmanifold` has several methods to
+make one, and the first is used on which the points of a request are connected.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from .geometry.surface_points import SurfacePoints, in_faces
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import REPAIRS, repaired
 from .request import Request
-from .start import ANEW, Resumable
+from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
 
 
 class RepairedSurface:
-    """Some faces of a mesh as manifolds, each made when it is first needed and kept.
+    """Manifolds of some faces of a mesh, each made when it is first needed, and then kept.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ class RepairedSurface:
 
     @property
     def first(self) -> MappedMesh:
-        """The manifold on which the surface goes straight on wherever it branches."""
+        """The manifold in which the straightest pairs of faces are joined at non-manifold edges."""
         first = self._repair(0)
-        assert first is not None  # the others are None where they join no more than it does
+        assert first is not None  # only the others may be None
         return first[0]
 
     @property
@@ -53,9 +53,9 @@ class RepairedSurface:
         return [one[0] for one in made if one is not None][-1]
 
     def find(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request] | None:
-        """A manifold on which the points are connected, who designs there, and the request there.
+        """A manifold on which the points are connected, its designer, and the request there.
 
-        None where they are connected on none.
+        None if they are connected on no manifold.
         """
         for number in range(REPAIRS):
             found = self._repair(number)
@@ -72,7 +72,7 @@ class RepairedSurface:
 
 
 def request_on(mapped: MappedMesh, request: Request) -> Request | None:
-    """A request on a mapped mesh; None where its points are not connected there."""
+    """Map a request to a mapped mesh; None if its points are not connected there."""
     if not mapped.differs:
         components = mapped.mesh.face_component[request.points.faces]
         return request if (components == components[0]).all() else None
@@ -92,7 +92,7 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
 
 
 def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | SurfaceCurve:
-    """What a design on a mapped mesh goes on from.
+    """Map a start to a mapped mesh.
 
     Returns
     -------
@@ -102,8 +102,8 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     Raises
     ------
     CurveError
-        If the start is not one curve through its control points on the original, or not on what
-        obstacles leave of it.
+        If the start is not one curve through its control points on the original, or enters
+        obstacles.
     """
     if isinstance(start, Design):
         resumable = start.resumable
@@ -141,7 +141,7 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     if carried is None:
         raise CurveError(
             "start enters faces that obstacles of weight 1 or the clearance from them close to "
-            f"curves, or passes a non-manifold edge on its way{ANEW}"
+            f"curves, or passes a non-manifold edge{WITHOUT_START}"
         )
     return carried
 
@@ -154,7 +154,7 @@ def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
 
 
 def design_on_original(mapped: MappedMesh, design: Design) -> Design:
-    """A design on a mapped mesh as one on the original."""
+    """Map a design on a mapped mesh to the original."""
     if not mapped.differs:
         return design
     return replace(

@@ -1,7 +1,7 @@
-"""Generated shapes: what pretraining, tests and examples run on without any file.
+"""Generated shapes for pretraining, tests and examples, without any files.
 
-`creature` makes random bodies with limbs, coarse as scanned collections are, so that a network
-trained on them has seen thin parts, saddles and tips.
+`creature` makes random bodies with limbs, as coarse as scanned collections, so that the training
+data contain thin parts, saddles and tips.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .geometry.mesh import Mesh
 
 
 def sphere(subdivisions: int = 4) -> Mesh:
-    """Unit sphere from an icosahedron, each level with four times the faces."""
+    """Unit sphere from a subdivided icosahedron; each subdivision multiplies the faces by four."""
     golden = 0.5 * (1.0 + 5.0**0.5)
     corners = [(0, 1, golden), (0, -1, golden), (0, 1, -golden), (0, -1, -golden)]
     vertices = np.array([np.roll(corner, shift) for shift in range(3) for corner in corners])
@@ -44,7 +44,7 @@ def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int 
 
 
 def cube(pieces: int = 8) -> Mesh:
-    """Cube with corners at ±1, each of its edges in equal pieces."""
+    """Cube with corners at ±1 and each edge divided into equal pieces."""
     grid = np.linspace(-1.0, 1.0, pieces + 1)
     u, v = (axis.ravel() for axis in np.meshgrid(grid, grid, indexing="ij"))
     index = np.arange(u.size).reshape(pieces + 1, pieces + 1)
@@ -75,14 +75,14 @@ def disc(rings: int = 24) -> Mesh:
 
 
 def annulus(rings: int = 16, hole: float = 0.3) -> Mesh:
-    """The unit disc without its middle, out to the rings that lie beyond the hole's radius."""
+    """The unit disc without the vertices within the hole's radius."""
     whole = disc(rings)
     outside = np.linalg.norm(whole.vertices, axis=1) > hole
     return _used_part(whole.vertices, whole.faces[outside[whole.faces].all(axis=1)])
 
 
 def moebius_strip(around: int = 48, across: int = 8) -> Mesh:
-    """A strip of width 0.8 about the unit circle, turned over once."""
+    """A strip of width 0.8 about the unit circle with a half twist."""
     u, v = np.meshgrid(
         np.arange(around) * 2 * np.pi / around, np.linspace(-0.4, 0.4, across + 1), indexing="ij"
     )
@@ -103,7 +103,7 @@ def double_torus(faces: int = 700, subdivisions: int = 1) -> Mesh:
     faces : int
         Faces after decimation, before subdivision.
     subdivisions : int
-        Loop steps, each with four times the faces.
+        Loop subdivisions, each of which multiplies the faces by four.
     """
     x, y, z = (np.linspace(-a, a, n) for a, n in ((1.7, 46), (1.0, 28), (0.5, 16)))
     grid = np.stack([g.ravel() for g in np.meshgrid(z, y, x, indexing="ij")][::-1], axis=1)
@@ -126,7 +126,7 @@ def creature(seed: int, resolution: int = 48, faces: int = 500, subdivisions: in
     faces : int
         Faces after decimation, before subdivision.
     subdivisions : int
-        Loop steps, each with four times the faces.
+        Loop subdivisions, each of which multiplies the faces by four.
     """
     generator = np.random.default_rng(seed)
     starts, ends, radii = [], [], []
@@ -159,7 +159,7 @@ def _capsules(
     cell = (high - low).max() / resolution
     counts = np.ceil((high - low) / cell).astype(int) + 1
     axes = [low[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
-    # libigl runs through a grid with x fastest.
+    # libigl orders grid points with x varying fastest.
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     grid = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     blend = 12.0 / radii.mean()
@@ -182,13 +182,13 @@ def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArra
 
 
 def _used_part(vertices: FloatArray, faces: IntArray) -> Mesh:
-    """Faces with the vertices that they use and no others."""
+    """Faces with only the vertices that they use."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], renumbered.reshape(-1, 3).astype(np.int64))
 
 
 def _hull_faces(vertices: FloatArray) -> IntArray:
-    """Triangles of a convex polyhedron about the origin, seen anticlockwise from outside."""
+    """Triangles of a convex polyhedron about the origin, anticlockwise seen from outside."""
     faces = ConvexHull(vertices).simplices.astype(np.int64)
     corner = vertices[faces]
     inward = np.linalg.det(corner) < 0.0

@@ -1,8 +1,8 @@
-"""What a design goes on from: an earlier curve, led through control points that may differ.
+"""The start of a design: an earlier curve, moved to control points that may differ.
 
-The course of the start is kept. Control points may have moved, come or gone: `moved_start` finds
-which point of the start each of them is, and moves the curve there. A start that cannot be used is
-a `CurveError`; nothing falls back on another course.
+The course of the start is kept. Control points may have been moved, added or removed: `moved_start`
+matches them with the points of the start and moves the curve to them. A start that cannot be used
+raises `CurveError`; there is no fallback to another course.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, moved_along
 from .request import Request
 
-ANEW = "; ask again without start"
+WITHOUT_START = "; design it without start"
 
 STEPS = 4
-"""By which a curve is moved that would cross itself if it was moved at once."""
+"""Steps in which a curve is moved if it would cross itself in one step."""
 
 ITERATIONS_OF_A_STEP = 3
-"""Of the relaxation after each of them."""
+"""Iterations of the relaxation after each step."""
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,15 @@ class Resumable:
     Attributes
     ----------
     mesh : Mesh
-        The manifold that it lies on.
+        The manifold on which it lies.
     request : Request
-        That it answers, on this mesh.
+        The request that it meets, on this mesh.
     curve : NodedCurve
     visited : (k,) int array
-        Which of the request's points its control nodes are.
+        The index in the request of each control node.
     collisions : int
-        Next designs in which strands are assumed to collide, so that every iteration is traced.
+        Number of next designs in which strands are assumed to collide, so that every iteration is
+        traced.
     """
 
     mesh: Mesh
@@ -62,32 +63,32 @@ class Resumable:
 def moved_start(
     surface: CurveSurface, start: Resumable | SurfaceCurve, request: Request
 ) -> tuple[NodedCurve, IntArray]:
-    """The curve of a start through the control points of a request.
+    """The curve of a start, moved to the control points of a request.
 
     Parameters
     ----------
     surface : CurveSurface
-        Of the mesh that the start lies on.
+        The surface of the start.
     start : Resumable or SurfaceCurve
         Each point of a SurfaceCurve in the face of the segment after it.
     request : Request
-        With as many control points as the start, its point of the same index is where each one has
-        moved to. Otherwise points are recognised by their places, and new ones are taken to the
-        nearest place on the curve between their neighbours.
+        If it has as many control points as the start, each point moves to the one with the same
+        index. Otherwise points are matched by position, and a new point is inserted at the nearest
+        position on the curve between its neighbours.
 
     Returns
     -------
     NodedCurve
         Simple.
     (k,) int array
-        Which of the request's points its control nodes are.
+        The index in the request of each control node.
 
     Raises
     ------
     CurveError
-        If the start is of the other kind, open or closed, or not simple, if it visits the points in
-        another order, if one of them is farther away than `LONGEST_MOVE` times its length, or if it
-        would cross itself there.
+        If the start is open instead of closed or closed instead of open, is not simple, or visits
+        the points in another order, if a point is farther away than `LONGEST_MOVE` times the
+        curve's length, or if the moved curve would cross itself.
     """
     if isinstance(start, Resumable):
         curve, visited = start.curve, start.visited
@@ -97,7 +98,9 @@ def moved_start(
             raise CurveError("start crosses or touches itself; pass a simple curve")
     if curve.closed != request.closed:
         kinds = ("an open", "a closed") if request.closed else ("a closed", "an open")
-        raise CurveError(f"start is {kinds[0]} curve and {kinds[1]} one is asked for{ANEW}")
+        raise CurveError(
+            f"start is {kinds[0]} curve and {kinds[1]} one is requested{WITHOUT_START}"
+        )
     if len(request.points) == len(curve.control_nodes):
         visited = _nearest_numbering(surface.mesh, curve, visited, request)
     else:
@@ -110,16 +113,19 @@ def moved_start(
     if moved is None:
         moved = _moved_in_steps(surface, curve, points, request.smoothness)
     if moved is None:
-        raise CurveError(f"start would cross itself on its way to the control_points{ANEW}")
+        raise CurveError(
+            f"start would cross itself when moved to the control_points{WITHOUT_START}"
+        )
     return moved, visited
 
 
 def _moved_in_steps(
     surface: CurveSurface, curve: NodedCurve, points: SurfacePoints, smoothness: float
 ) -> NodedCurve | None:
-    """A curve moved to control points by steps, relaxed a little in between.
+    """Move a curve to control points in steps, with a few iterations of relaxation in between.
 
-    None where there is no straight trace to one of the points, or where it still crosses itself.
+    Returns None if there is no straight trace to one of the points, or if the curve still crosses
+    itself.
     """
     routes = _routes(surface, curve, points)
     if routes is None:
@@ -137,7 +143,7 @@ def _moved_in_steps(
 def _routes(
     surface: CurveSurface, curve: NodedCurve, points: SurfacePoints
 ) -> list[SurfacePoints] | None:
-    """Points on the way from each control node to where it goes, both ends included."""
+    """Points on the trace from each control node to its new position, including both ends."""
     mesh, at_controls = surface.mesh, curve.control_nodes
     here = curve.nodes.places[at_controls]
     inside = SurfacePoints(here.faces, strictly_inside(here.barycentric))
@@ -154,7 +160,7 @@ def _routes(
 
 
 def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: SurfacePoints) -> None:
-    """Raise CurveError where a control point is too far away from its node."""
+    """Raise CurveError if a control point is too far away from its node."""
     away = points[visited].positions(mesh) - curve.nodes.positions[curve.control_nodes]
     distance = np.linalg.norm(away, axis=1)
     longest = LONGEST_MOVE * curve.length
@@ -162,7 +168,7 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
         worst = PointName("control_points", int(visited[distance.argmax()]))
         raise CurveError(
             f"{worst} is {distance.max():g} from where start passes it, more than {longest:g}, "
-            f"which is {LONGEST_MOVE:g} of the curve's length{ANEW}",
+            f"which is {LONGEST_MOVE:g} of the curve's length{WITHOUT_START}",
             worst,
         )
 
@@ -170,7 +176,7 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
 def _nearest_numbering(
     mesh: Mesh, curve: NodedCurve, visited: IntArray | None, request: Request
 ) -> IntArray:
-    """Which of as many points each control node is: by index, in the order asked for."""
+    """The index of the point for each control node, for equal numbers of both."""
     count = len(request.points)
     numberings = [np.arange(count)]
     if visited is not None and (request.order == "shortest" or _ascending(visited, curve.closed)):
@@ -185,7 +191,7 @@ def _nearest_numbering(
 
 
 def _ascending(numbers: IntArray, closed: bool) -> bool:
-    """Whether numbers ascend, on a closed curve from some place on it."""
+    """Whether numbers ascend; on a closed curve, from any starting point."""
     first = int(numbers.argmin()) if closed else 0
     return bool((np.diff(np.roll(numbers, -first)) > 0).all())
 
@@ -203,13 +209,13 @@ def _begun_at_first(
 def _with_other_points(
     surface: CurveSurface, curve: NodedCurve, request: Request
 ) -> tuple[NodedCurve, IntArray]:
-    """The same curve with other control points: nodes of it at, or nearest to, those asked for.
+    """The same curve with control nodes at, or nearest to, the points of a request.
 
     Returns
     -------
     NodedCurve
     (k,) int array
-        Which of the request's points its control nodes are.
+        The index in the request of each control node.
     """
     mesh = surface.mesh
     line = _Line(mesh, curve)
@@ -221,8 +227,8 @@ def _with_other_points(
     same = distance.min(axis=1) <= tolerances.AT_ONE_PLACE * mesh.diagonal
     if not same.any():
         raise CurveError(
-            f"start passes {len(curve.control_nodes)} control points, {len(there)} are asked for, "
-            f"and none of them is where it was{ANEW}"
+            f"start passes {len(curve.control_nodes)} control points, {len(there)} are requested, "
+            f"and none of them is where it was{WITHOUT_START}"
         )
     arcs[same] = at_controls[nearest[same]]
     if request.order == "shortest":
@@ -232,7 +238,7 @@ def _with_other_points(
     else:
         visited = np.arange(len(there))
         if curve.closed:
-            # The polyline begins at the first of the points that are still there.
+            # Begin the polyline at the first unchanged point.
             first = int(same.argmax())
             line = line.begun_at(arcs[first])
             visited = np.roll(visited, -first)
@@ -245,12 +251,12 @@ def _with_other_points(
                 arcs[number] = line.nearest(there[number], before, end) if end > before else before
             before = arcs[number]
     if (np.diff(arcs[visited]) <= 0.0).any():
-        raise CurveError(f"start visits the control_points in another order{ANEW}")
+        raise CurveError(f"start visits the control_points in another order{WITHOUT_START}")
     return noded_curve(surface, line.with_points(arcs[visited]), WARM.levels[-1]), visited
 
 
 class _Line:
-    """A polyline on a mesh by arc length, from its first point on."""
+    """A polyline on a mesh, parametrised by arc length from its first point."""
 
     def __init__(self, mesh: Mesh, curve: NodedCurve, shift: int = 0) -> None:
         n = len(curve.polyline)
@@ -261,11 +267,11 @@ class _Line:
         self.length = float(self.arc[-1])
 
     def begun_at(self, arc: float) -> _Line:
-        """The same closed polyline from one of its points on."""
+        """The same closed polyline, beginning at another of its points."""
         return _Line(self.mesh, self.curve, int(np.abs(self.arc - arc).argmin()))
 
     def nearest(self, position: FloatArray, low: float, high: float) -> float:
-        """How far along, between two arc lengths, the polyline is nearest to a position, (3,)."""
+        """The arc length, between two bounds, of the nearest point to a position, (3,)."""
         start = self.positions
         step = np.roll(start, -1, axis=0) - start
         start, step = start[: len(self.arc) - 1], step[: len(self.arc) - 1]
@@ -281,7 +287,7 @@ class _Line:
         return float(self.arc[segment] + share[segment] * lengths[segment])
 
     def with_points(self, arcs: FloatArray) -> SurfaceCurve:
-        """The curve with control points at ascending arc lengths; an open one ends at them."""
+        """The curve with control points at ascending arc lengths; an open one is cut off there."""
         n = len(self.polyline)
         apart = np.abs(self.arc[:n, None] - arcs)
         at_point = apart <= tolerances.AT_ONE_PLACE * self.mesh.diagonal

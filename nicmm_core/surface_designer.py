@@ -1,6 +1,6 @@
-"""Curves on a manifold: from an earlier curve, a coarse mesh or the network, then relaxed.
+"""Designs curves on a manifold: starts from an earlier curve, a coarse mesh or the network.
 
-The main path for one checked request; `design` is the front of it.
+This is the main course of a checked request; `design` is its entry point.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from .start import Resumable, moved_start
 from .status import Status
 
 STARTED = 0.6
-"""About how much of the time is over when relaxation begins."""
+"""Approximate fraction of the time before relaxation begins."""
 
 SOON_DONE = 10
-"""The cap of a relaxation, in numbers of iterations that most need."""
+"""The limit on iterations of a relaxation, relative to the number that most curves need."""
 
 COLLISIONS = 3
-"""Designs for which strands that collided are assumed to collide still."""
+"""Designs for which strands are assumed to collide after a collision."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class _Start:
     """A simple curve on the mesh from which relaxation begins."""
 
     curve: SurfaceCurve | NodedCurve
-    visited: IntArray  # (k,) which control points it passes, in order
+    visited: IntArray  # (k,) control points in the order visited
     surface: CurveSurface
     unit: float  # square root of the surface's area
     breaking: int = 0
@@ -60,12 +60,12 @@ class _Start:
 
 
 class SurfaceDesigner:
-    """Designs on one mesh; what depends on the mesh alone is found once.
+    """Designs curves on one mesh; computes once what depends only on the mesh.
 
     Parameters
     ----------
     mesh : Mesh
-        Every face has an area, and no edge has more than two.
+        Every face has an area, and no edge has more than two faces.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -84,11 +84,11 @@ class SurfaceDesigner:
         ----------
         request : Request
         started : float
-            When the design began, by `time.perf_counter`.
+            Time at which the design began, by `time.perf_counter`.
         start : Resumable or SurfaceCurve, optional
-            A curve on this mesh that the method "nicmm" goes on from.
+            A curve on this mesh from which the method "nicmm" starts.
         max_iterations : int, optional
-            Of the relaxation, in all.
+            Limit on the iterations of the relaxation in total.
 
         Raises
         ------
@@ -122,17 +122,17 @@ class SurfaceDesigner:
         max_iterations: int | None,
         started: float,
     ) -> Design:
-        """A start that is moved to the control points and relaxed from there."""
+        """Move a start to the control points and relax it."""
         surface = self._curve_surface(request)
         curve, visited = moved_start(surface, start, request)
         collisions = start.collisions if isinstance(start, Resumable) else 0
-        # Without tracing every iteration the first attempt would be in vain.
+        # If strands collide, an attempt without tracing every iteration would fail.
         config = replace(WARM, defer_tracing=not collisions)
         begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
         return self._relaxed(request, begin, config, max_iterations, started)
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
-        """A relaxed curve that starts from a coarse mesh or the network."""
+        """Relax the curve of a coarse mesh or of the network."""
         with subrange(0.0, STARTED):
             start = self._start_from_coarse(request)
             if start is None:
@@ -146,7 +146,7 @@ class SurfaceDesigner:
         there = self._copy
         found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
-        # A level set may touch itself where the mesh is too coarse; the path does not.
+        # A zero set may touch itself where the mesh is too coarse; the path does not.
         one = zeros.is_simple_curve(there.mesh, request.closed)
         curve = zeros.curves[0] if one else path_curve(there.mesh, problem.working, problem.loop)
         return _Start(
@@ -158,7 +158,7 @@ class SurfaceDesigner:
         )
 
     def _start_from_coarse(self, request: Request) -> _Start | None:
-        """The curve of a coarse mesh; None where the mesh is small, or where none is found."""
+        """The curve of a coarse mesh; None if the mesh is small or no curve is found."""
         found = self._coarse_starts.find(request)
         if found is None:
             return None
@@ -178,7 +178,7 @@ class SurfaceDesigner:
         max_iterations: int | None,
         started: float,
     ) -> Design:
-        """The design that relaxation makes of a curve."""
+        """Relax a curve to a design."""
         if max_iterations is not None:
             config = replace(config, most_iterations=max_iterations)
 
@@ -206,7 +206,7 @@ class SurfaceDesigner:
     def _level_set_design(
         self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
     ) -> Design:
-        """The design that a level set is."""
+        """The design of a level set."""
         one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
         return Design(
             status=solution.status if one else Status.NOT_ONE_CURVE,
@@ -219,19 +219,19 @@ class SurfaceDesigner:
         )
 
     def _solution(self, problem: Problem, request: Request, watch: _FieldWatch) -> Solution:
-        """The level set that a method other than "nicmm" finds."""
+        """The level set of a method other than "nicmm"."""
         weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if request.method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
         pretrained = shipped_weights(problem.features.shape[1])
-        # These import PyTorch, which nothing else needs.
+        # These modules import PyTorch, which only this method needs.
         from .network.finetuning import FinetuningConfig, finetune
         from .network.trainable_network import build_network
 
         return finetune(build_network(pretrained), problem, weights, FinetuningConfig(), watch)
 
     def _curve_surface(self, request: Request) -> CurveSurface:
-        """The surface that curves move on."""
+        """The surface for relaxation, with the maps of a request."""
         if not request.has_maps:
             return self._surface
         unit = self._unit(request)
@@ -256,7 +256,7 @@ class SurfaceDesigner:
 
 
 class _FieldWatch:
-    """Shows the zero set of a level set that is being solved for, and keeps the last one shown."""
+    """Reports the zero set during the solution for a level set, and keeps the last one."""
 
     def __init__(self, mesh: Mesh, problem: Problem) -> None:
         self._mesh, self._problem = mesh, problem
@@ -271,8 +271,8 @@ class _FieldWatch:
 
     @property
     def solution(self) -> Solution:
-        """The level set that was shown last, of a solver that has been cancelled."""
-        assert self.shown is not None  # as the caller has asked
+        """The level set shown last, after a solver was cancelled."""
+        assert self.shown is not None  # checked by the caller
         field = self.shown.field
         terms = loss_terms(energy_surface(self._problem), field)
         terms = {name: float(value) for name, value in terms.items()}

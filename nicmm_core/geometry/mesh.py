@@ -15,7 +15,7 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
 
 LARGEST, SMALLEST = 1e50, 1e-50
-"""Bounds on coordinates and on the mesh's diagonal; powers of other lengths overflow or underflow."""
+"""Bounds on coordinates and the mesh's diagonal, so that powers of lengths stay representable."""
 
 FACES_OF_A_TREE = 100_000
 """At most. A tree of this size takes a tenth of a second, in which a design cannot be cancelled."""

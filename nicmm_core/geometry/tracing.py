@@ -109,7 +109,7 @@ def trace_between(
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
-    """Crossings with only the last one of each trace that passes a vertex several times in a row."""
+    """Crossings with only the last of consecutive ones of a trace at the same vertex."""
     here = crossings.barycentric > 0.0
     vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
     vertex[here.sum(axis=1) > 1] = -1
@@ -259,11 +259,11 @@ class _Fronts:
         return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
 
     def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Entry points of the faces: face, low and high end of the edge, fraction from high to low."""
+        """Entry points: face, low and high end of the edge, and fraction from high to low."""
         return self.faces, self._low, self._high, self._fraction
 
     def enter_next_faces(self, continues: BoolArray) -> None:
-        """Move traces across their edges; drop those that shall not or cannot continue.
+        """Move traces across their edges; drop those that must not or cannot continue.
 
         Traces that return to their first face are dropped too, as their section is closed.
         """

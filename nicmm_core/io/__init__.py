@@ -1,4 +1,4 @@
-"""Readers of mesh files: bytes in, arrays out, and a `FormatError` for anything else.
+"""Readers of mesh files: they convert bytes to arrays and raise `FormatError` for invalid files.
 
-Nothing here trusts a count that a file states: memory and time follow the size of the file.
+Counts in a file are checked, so that memory and time are bounded by the size of the file.
 """

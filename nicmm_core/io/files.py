@@ -30,29 +30,29 @@ CURVE_FORMATS = (".obj", ".json", ".csv")
 def read_mesh(path: str | Path) -> Mesh:
     """Read a triangle mesh from OBJ, OFF, PLY or STL.
 
-    Larger faces are cut into triangles, and faces that name a vertex twice are left out, so faces
-    may have other numbers than in the file; vertices have not. The corners of an STL file, which
-    stores every triangle for itself, are joined where their positions are equal.
+    Larger faces are triangulated, and faces that have a vertex twice are left out, so face indices
+    may differ from those in the file; vertex indices do not. In an STL file, which stores every
+    triangle separately, corners with equal positions are joined.
 
     Raises
     ------
     MeshError
-        If the file is missing, has another ending or holds no mesh.
+        If the file is missing, its extension is not supported, or it contains no mesh.
     """
     try:
         path = Path(path)
     except TypeError as error:
-        raise MeshError(f"{path!r} is no path of a mesh file; pass a str or a Path") from error
+        raise MeshError(f"{path!r} is not a path of a mesh file; pass a str or a Path") from error
     if path.suffix.lower() not in MESH_FORMATS:
-        raise MeshError(f"{path} is no mesh file known here; use {', '.join(MESH_FORMATS)}")
+        raise MeshError(f"{path} is not a supported mesh file; use {', '.join(MESH_FORMATS)}")
     try:
         if not path.is_file():
-            raise MeshError(f"{path} does not exist or is no file; check the path of the mesh")
+            raise MeshError(f"{path} does not exist or is not a file; check the path of the mesh")
         data = path.read_bytes()
     except OSError as error:
-        raise MeshError(f"{path} cannot be opened ({error}); check who may read it") from error
+        raise MeshError(f"{path} cannot be opened ({error}); check its permissions") from error
     try:
-        # Positions that are no numbers are refused below, without a warning before.
+        # Positions that are not finite are refused below, without a warning here.
         with np.errstate(invalid="ignore", over="ignore"):
             polygons = _READERS[path.suffix.lower()](data)
             triangles = polygons.triangles()
@@ -63,31 +63,31 @@ def read_mesh(path: str | Path) -> Mesh:
     try:
         return Mesh(polygons.vertices, triangles)
     except MeshError as error:
-        raise MeshError(f"{path} holds no mesh to draw on: {error}") from error
+        raise MeshError(f"{path} contains no usable mesh: {error}") from error
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
-    """Write a mesh as OBJ, OFF, PLY or STL by the path's ending.
+    """Write a mesh as OBJ, OFF, PLY or STL, by the extension of the path.
 
     Raises
     ------
     ArgumentError
-        If the ending is another one, or the file cannot be written.
+        If the extension is not supported, or the file cannot be written.
     """
     path = _checked_output(path, MESH_FORMATS)
     _write(path, _WRITERS[path.suffix.lower()](mesh.vertices, mesh.faces))
 
 
 def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
-    """Write a curve by the path's ending.
+    """Write a curve as OBJ, JSON or CSV, by the extension of the path.
 
-    OBJ gets a polyline, JSON faces, barycentrics, points and control indices, CSV one row a point
-    (face, three barycentrics, three coordinates).
+    OBJ contains a polyline; JSON faces, barycentrics, points and control indices; CSV one row for
+    each point (face, three barycentrics, three coordinates).
 
     Raises
     ------
     ArgumentError
-        If the ending is another one, or the file cannot be written.
+        If the extension is not supported, or the file cannot be written.
     """
     path = check_curve_path(path)
     texts = {".obj": _obj_text, ".json": _json_text, ".csv": _csv_text}
@@ -95,7 +95,7 @@ def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
 
 
 def check_curve_path(path: str | Path) -> Path:
-    """Refuse an output path before any work is done for it."""
+    """Raise ArgumentError for an unusable output path, before any work is done."""
     return _checked_output(path, CURVE_FORMATS)
 
 
@@ -103,15 +103,17 @@ def _checked_output(path: str | Path, formats: tuple[str, ...]) -> Path:
     try:
         path = Path(path)
     except TypeError as error:
-        raise ArgumentError(f"{path!r} is no path to write to; pass a str or a Path") from error
+        raise ArgumentError(f"{path!r} is not a path to write to; pass a str or a Path") from error
     if path.suffix.lower() not in formats:
-        raise ArgumentError(f"{path} has no known ending; write to {', '.join(formats)}")
+        raise ArgumentError(f"{path} has no supported extension; write to {', '.join(formats)}")
     try:
         has_folder = path.absolute().parent.is_dir()
     except OSError as error:  # a name that is too long
-        raise ArgumentError(f"{path} is no path to write to ({error}); choose another") from error
+        raise ArgumentError(
+            f"{path} is not a path to write to ({error}); choose another"
+        ) from error
     if not has_folder:
-        raise ArgumentError(f"the folder of {path} does not exist; make it first")
+        raise ArgumentError(f"the folder of {path} does not exist; create it first")
     return path
 
 

@@ -1,4 +1,4 @@
-"""Numbers in text."""
+"""Parses numbers in text."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from .polygons import FormatError
 
 LARGEST = 2**31
-"""Counts and indices from here on are refused: no file that fits into memory has as many."""
+"""Larger counts and indices are refused, since such a file would not fit into memory."""
 
 
 def floats(tokens: Sequence[bytes]) -> FloatArray:
@@ -19,7 +19,7 @@ def floats(tokens: Sequence[bytes]) -> FloatArray:
     Raises
     ------
     FormatError
-        If one is no number.
+        If one is not a number.
     """
     try:
         return np.array([float(token) for token in tokens], dtype=np.float64)
@@ -28,21 +28,21 @@ def floats(tokens: Sequence[bytes]) -> FloatArray:
 
 
 def whole(token: bytes) -> int:
-    """A token as a whole number below `LARGEST` in size."""
+    """A token as an integer with absolute value below `LARGEST`."""
     try:
         value = int(token)
     except ValueError as error:
-        raise FormatError(f"{shown(token)} is no whole number") from error
+        raise FormatError(f"{shown(token)} is not a whole number") from error
     if not -LARGEST < value < LARGEST:
-        raise FormatError(f"{shown(token)} is beyond every count and index")
+        raise FormatError(f"{shown(token)} is too large for a count or an index")
     return value
 
 
 def wholes(tokens: Sequence[bytes]) -> IntArray:
-    """Tokens as whole numbers, see `whole`."""
+    """Tokens as integers, see `whole`."""
     return np.array([whole(token) for token in tokens], dtype=np.int64)
 
 
 def shown(token: bytes) -> str:
-    """A token as a message shows it: short and printable."""
+    """A token shortened and escaped for a message."""
     return ascii(token[:24].decode("latin-1"))

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions and faces; all else is passed over."""
+"""Wavefront OBJ: positions and faces; everything else is ignored."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def read_obj(data: bytes) -> Polygons:
     Raises
     ------
     FormatError
-        If one of them cannot be understood.
+        If one of them cannot be parsed.
     """
     positions: list[bytes] = []
     corners: list[int] = []

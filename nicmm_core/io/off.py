@@ -1,4 +1,4 @@
-"""Object File Format, as text; colours, normals and texture coordinates are passed over."""
+"""Object File Format, as text; colours, normals and texture coordinates are ignored."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ _HEADER = re.compile(rb"(ST)?C?N?OFF")
 
 
 def read_off(data: bytes) -> Polygons:
-    """Read one vertex or face a line.
+    """Read one vertex or face from each line.
 
     Raises
     ------
     FormatError
-        If the header is another one, or lines are missing or cannot be understood.
+        If the header is not supported, or lines are missing or cannot be parsed.
     """
     rows = (line.partition(b"#")[0].split() for line in data.splitlines())
     lines = [words for words in rows if words]
     if not lines or not _HEADER.fullmatch(lines[0][0]):
-        raise FormatError("it does not begin with OFF (binary and 4D OFF are not read)")
+        raise FormatError("it does not begin with OFF (binary and 4D OFF are not supported)")
     head, rest = lines[0][1:], lines[1:]
     if not head:
         head, rest = (rest[0], rest[1:]) if rest else ([], [])
     if len(head) < 2:
-        raise FormatError("it does not say how many vertices and faces it has")
+        raise FormatError("it lacks the numbers of vertices and faces")
     n_vertices, n_faces = whole(head[0]), whole(head[1])
     if not 0 <= n_vertices + n_faces <= len(rest) or min(n_vertices, n_faces) < 0:
         raise FormatError(
-            f"it announces {n_vertices} vertices and {n_faces} faces and has {len(rest)} lines "
-            "for them; it may be cut off"
+            f"its header gives {n_vertices} vertices and {n_faces} faces, but it has {len(rest)} "
+            "lines for them; it may be truncated"
         )
     positions: list[bytes] = []
     for place, words in enumerate(rest[:n_vertices]):
@@ -46,7 +46,7 @@ def read_off(data: bytes) -> Polygons:
         size = whole(words[0])
         if not 0 <= size < len(words):
             raise FormatError(
-                f"face {place} announces {shown(words[0])} corners and has {len(words) - 1}"
+                f"face {place} should have {shown(words[0])} corners and has {len(words) - 1}"
             )
         corners += words[1 : size + 1]
         sizes[place] = size

@@ -44,16 +44,16 @@ class _Element:
 
 
 Columns = dict[str, tuple[FloatArray, IntArray]]
-"""Of each property all values, one row after the other, and how many each row has."""
+"""For each property, all values, row by row, and the number of values in each row."""
 
 
 def read_ply(data: bytes) -> Polygons:
-    """Read the elements "vertex" and "face" or "tristrips"; others are passed over.
+    """Read the elements "vertex" and "face" or "tristrips"; others are ignored.
 
     Raises
     ------
     FormatError
-        If the header cannot be understood, or the body is shorter than it says.
+        If the header cannot be parsed, or the body is too short for it.
     """
     byte_order, elements, start = _header(data)
     read = _text_reader(data[start:]) if byte_order == "" else _binary_reader(data, start)
@@ -73,7 +73,7 @@ def read_ply(data: bytes) -> Polygons:
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], int]:
-    """Byte order ("" for text), elements, and where the body begins."""
+    """Byte order ("" for text), elements, and offset of the body."""
     end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if not data.startswith(b"ply") or end < 0 or newline < 0:
@@ -98,18 +98,18 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
                 case _:
                     raise KeyError(line)
         except (KeyError, IndexError) as error:
-            raise FormatError(f"its header has a line {shown(line)}") from error
+            raise FormatError(f"its header has an invalid line {shown(line)}") from error
     if byte_order is None:
-        raise FormatError("its header does not say which format it has")
+        raise FormatError("its header does not give the format")
     for element in elements:
         names = [column.name for column in element.properties]
         if not names or len(set(names)) < len(names) or element.count < 0:
-            raise FormatError(f"its header describes the element {element.name!r} wrongly")
+            raise FormatError(f"its header has an invalid element {element.name!r}")
     return byte_order, elements, newline + 1
 
 
 def _binary_reader(data: bytes, start: int) -> Callable[[_Element, str], Columns]:
-    """A function that reads one element after the other."""
+    """A function that reads the next element at each call."""
     position = start
 
     def read(element: _Element, byte_order: str) -> Columns:
@@ -129,7 +129,7 @@ def _binary_reader(data: bytes, start: int) -> Callable[[_Element, str], Columns
 
 
 def _row_sizes(data: bytes, position: int, element: _Element, byte_order: str) -> dict[str, int]:
-    """How many values each list of the first row has; 0 where there is no such row."""
+    """Length of each list in the first row; 0 if there is no row."""
     sizes: dict[str, int] = {}
     for column in element.properties:
         if column.count_type is not None:
@@ -144,7 +144,7 @@ def _row_sizes(data: bytes, position: int, element: _Element, byte_order: str) -
 def _count_at(
     data: bytes, position: int, column: _Property, byte_order: str
 ) -> tuple[int, int] | None:
-    """Length of the list at a position, and where its values begin; None where it does not fit."""
+    """Length of the list at a position, and offset of its values; None if it does not fit."""
     count_type = np.dtype(byte_order + str(column.count_type))
     begin = position + count_type.itemsize
     if begin > len(data):
@@ -156,7 +156,7 @@ def _count_at(
 
 
 def _row_type(element: _Element, byte_order: str, sizes: dict[str, int]) -> np.dtype:
-    """A row whose lists have these lengths."""
+    """The type of a row whose lists have the given lengths."""
     fields: list[tuple] = []
     for place, column in enumerate(element.properties):
         if column.count_type is not None:
@@ -168,7 +168,7 @@ def _row_type(element: _Element, byte_order: str, sizes: dict[str, int]) -> np.d
 
 
 def _are_alike(rows: np.ndarray, sizes: dict[str, int]) -> bool:
-    """Whether the lists of all rows have the lengths that they have in the first one."""
+    """Whether the lists have the same lengths in all rows as in the first one."""
     counts = [rows[name] for name in rows.dtype.names or () if name.startswith("count")]
     return all(bool((c == s).all()) for c, s in zip(counts, sizes.values(), strict=True))
 
@@ -184,7 +184,7 @@ def _columns(element: _Element, rows: np.ndarray, sizes: dict[str, int]) -> Colu
 
 
 def _uneven(data: bytes, position: int, element: _Element, byte_order: str) -> tuple[Columns, int]:
-    """Rows whose lists differ in length, one by one."""
+    """Read rows with lists of different lengths one by one."""
     values: dict[str, list[np.ndarray]] = {column.name: [] for column in element.properties}
     sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
     for row in range(element.count):
@@ -197,7 +197,7 @@ def _uneven(data: bytes, position: int, element: _Element, byte_order: str) -> t
             if count < 0 or position > len(data):
                 raise FormatError(
                     f"{element.name} {row} of {element.count} is beyond the end of the file, "
-                    "which may be cut off"
+                    "which may be truncated"
                 )
             values[column.name].append(np.frombuffer(data, kind, count, begin))
             sizes[column.name].append(count)
@@ -211,14 +211,14 @@ def _uneven(data: bytes, position: int, element: _Element, byte_order: str) -> t
 
 
 def _text_reader(body: bytes) -> Callable[[_Element, str], Columns]:
-    """A function that reads one element after the other."""
+    """A function that reads the next element at each call."""
     tokens = body.split()
     position = 0
 
     def taken(count: int, element: _Element) -> list[bytes]:
         nonlocal position
         if not 0 <= count <= len(tokens) - position:
-            raise FormatError(f"the element {element.name!r} ends early; the file may be cut off")
+            raise FormatError(f"the element {element.name!r} ends early; the file may be truncated")
         position += count
         return tokens[position - count : position]
 
@@ -255,14 +255,14 @@ def _coordinate(columns: Columns, axis: str) -> FloatArray:
 
 
 def _corners(columns: Columns) -> tuple[IntArray, IntArray]:
-    """Vertex indices of all faces and how many each has."""
+    """Vertex indices of all faces, and the number of corners of each."""
     name = next((name for name in _CORNERS if name in columns), None)
     if name is None:
         raise FormatError("its faces have no list of vertex_indices")
     values, sizes = columns[name]
-    # NaN compares false; larger numbers are no indices and would not fit.
+    # NaN compares false; larger numbers are not indices and would not fit.
     if not (np.abs(values) < 2.0**53).all():
-        raise FormatError("its faces have corners that are no indices")
+        raise FormatError("its faces have corners that are not indices")
     if (values != np.round(values)).any():
         raise FormatError("its faces have corners that are not whole numbers")
     return values.astype(np.int64), sizes
@@ -277,7 +277,7 @@ def _unrolled(corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
     strip = np.cumsum(begins)
     first = np.maximum.accumulate(np.where(begins, np.arange(n_corners), 0))
     three = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    # Every second triangle of a strip runs the other way round.
+    # Every second triangle of a strip has the opposite orientation.
     odd = (np.arange(len(three)) - first[: len(three)]) % 2 == 1
     three[odd] = three[odd][:, [1, 0, 2]]
     triangles = three[(three != -1).all(axis=1) & (strip[: len(three)] == strip[2:])]

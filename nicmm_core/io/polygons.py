@@ -1,4 +1,4 @@
-"""What every reader gives: positions, and faces of any number of corners; and their triangles."""
+"""The result of every reader: positions and faces with any number of corners; triangulation."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 
 MOST_STARTS = 64
-"""Corners of a polygon that are tried as the one its triangles share; a bound on the time."""
+"""Limit on the corners of a polygon that are tried as the common corner of its triangles."""
 
 
 class FormatError(ValueError):
-    """A file is not what its format says; the message says what was found and where."""
+    """A file does not conform to its format; the message says what was found and where."""
 
 
 @dataclass(frozen=True)
 class Polygons:
-    """A mesh as a file has it.
+    """A mesh as stored in a file.
 
     Attributes
     ----------
     vertices : (V, 3) float array
         Not checked: positions may be NaN or infinite.
     corners : (c,) int array
-        Vertex indices of all faces, one face after the other; not checked either.
+        Vertex indices of all faces, one face after the other; not checked.
     sizes : (F,) int array
         Number of corners of each face; they sum to c.
     """
@@ -35,17 +35,17 @@ class Polygons:
     sizes: IntArray
 
     def triangles(self) -> IntArray:
-        """Faces cut into triangles that share one corner, shape (T, 3), in the order of the faces.
+        """Triangulate each face as a fan from one corner; returns (T, 3) in the order of the faces.
 
-        Corners that repeat the one before are no corners, and faces with fewer than three, or
-        triangles that name a vertex twice, are left out: they have no area and join nothing that
-        other faces do not join. The shared corner is the first one, unless that turns a triangle
-        over, as where a quad has a notch; then it is the corner that does so least.
+        Repeated consecutive corners are dropped. Faces with fewer than three corners, and triangles
+        that have a vertex twice, are left out: they have no area and do not connect other faces.
+        The common corner is the first one, unless that inverts a triangle, as in a non-convex quad;
+        then it is the corner with the least inversion.
 
         Raises
         ------
         FormatError
-            If a corner is no vertex.
+            If a corner is not a vertex index.
         """
         outside = (self.corners < 0) | (self.corners >= len(self.vertices))
         if outside.any():
@@ -88,10 +88,10 @@ class Polygons:
 
 
 def _from_best_corner(vertices: FloatArray, polygons: IntArray) -> IntArray:
-    """Polygons of one size, turned so that a fan from the first corner folds over least."""
+    """Polygons of one size, with corners shifted so that a fan from the first one inverts least."""
     position = vertices[polygons]
     size = polygons.shape[1]
-    # Vector area; a corner's triangle is turned over where it points the other way.
+    # The vector area; a triangle of the fan is inverted if its vector area points against it.
     onward = np.roll(position, -1, axis=1)
     with np.errstate(all="ignore"):  # positions that are not finite are refused later
         whole = np.cross(position, onward).sum(axis=1)

@@ -1,4 +1,4 @@
-"""STL, binary and text. Every triangle has three corners of its own; equal ones are joined."""
+"""STL, binary and text. Triangles do not share vertices, so equal positions are joined."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .numbers import floats
 from .polygons import FormatError, Polygons
 
 HEADER_BYTES = 84
-"""80 of any content, then the number of triangles."""
+"""80 bytes of any content, then the number of triangles."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -20,7 +20,7 @@ _FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> Polygons:
-    """Read either form, whichever the file is: binary ones, too, may begin with "solid".
+    """Read a binary or text file; a binary one may also begin with "solid".
 
     Raises
     ------
@@ -34,7 +34,7 @@ def read_stl(data: bytes) -> Polygons:
         vertices = _text_corners(data)
     elif len(data) < HEADER_BYTES or count > room:
         raise FormatError(
-            f"it announces {count} triangles and has room for {room}; it may be cut off"
+            f"its header gives {count} triangles and it has room for {room}; it may be truncated"
         )
     else:
         triangles = np.frombuffer(data, TRIANGLE, count=count, offset=HEADER_BYTES)
@@ -44,7 +44,7 @@ def read_stl(data: bytes) -> Polygons:
 
 
 def joined_positions(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Different positions, sorted, and which of them each vertex has."""
+    """Distinct positions, sorted, and the index of the position of each vertex."""
     vertices = vertices + 0.0  # -0.0 and 0.0 are one position
     order = np.lexsort(vertices.T[::-1])
     new = np.ones(len(vertices), dtype=bool)
@@ -59,7 +59,7 @@ def _text_corners(data: bytes) -> FloatArray:
     facets = len(_FACET.findall(data))
     if len(tokens) != 9 * facets:
         raise FormatError(
-            f"it has {facets} whole facets and {len(tokens) // 3} corners, which are not three "
-            "each; it may be cut off"
+            f"it has {facets} complete facets and {len(tokens) // 3} corners, which are not three "
+            "for each facet; it may be truncated"
         )
     return floats(tokens).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Mesh files as bytes, with every digit; STL has single precision."""
+"""Mesh files as bytes, with all digits; STL has single precision."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def ply_bytes(vertices: FloatArray, faces: IntArray) -> bytes:
 
 
 def stl_bytes(vertices: FloatArray, faces: IntArray) -> bytes:
-    """Binary STL, whose normals readers compute themselves."""
+    """Binary STL, without normals, which readers compute."""
     rows = np.zeros(len(faces), dtype=TRIANGLE)
     rows["corners"] = vertices[faces]
     return len(faces).to_bytes(4, "little").rjust(HEADER_BYTES, b" ") + rows.tobytes()

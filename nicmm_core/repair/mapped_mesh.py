@@ -160,7 +160,7 @@ class MappedMesh:
         return curve_on_mesh(self.mesh, curve.closed, faces, barycentric, curve.control_index)
 
     def _parts_of_segments(self, curve: SurfaceCurve) -> tuple[IntArray, FloatArray]:
-        """The part that contains each point and the next one, or -1, and the point's coordinates."""
+        """The part that contains each point and the next, or -1, and the point's coordinates."""
         n = len(curve.faces)
         faces, barycentric = np.full(n, -1), np.zeros((n, 3))
         points = SurfacePoints(curve.faces, curve.barycentric)

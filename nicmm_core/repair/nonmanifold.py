@@ -1,15 +1,15 @@
-"""The manifold that curves are computed on where a mesh is not one; the mesh is not changed.
+"""Manifolds made from non-manifold meshes, for computing curves; the mesh itself is not changed.
 
-- Of faces with the same three corners only the first is there.
-- Where more than two faces share an edge they are joined two by two, and what is left over is cut
-  off. Where parts of the surface have no more than a vertex in common they are apart. Vertices
-  there are doubled.
-- Where that leaves points apart, such an edge is cut into pieces, on which different pairs of its
-  faces are joined: every face is connected with every other then.
-- Where that leaves points apart too, open edges whose ends are at the same places are one edge:
-  the triangles of a soup, or the two sides of a seam. Their vertices are one.
-- Vertices of faces with no area, or hardly any, are moved by a thousandth of their shortest edge
-  that has a length, each its own way, so that every face has an area.
+- Of faces with the same three corners only the first is used.
+- At an edge of more than two faces, the faces are joined in pairs, and a remaining face is
+  detached. Parts of the surface that have only a vertex in common are separated. The vertices
+  there are duplicated.
+- If that separates points, such an edge is divided into pieces, on which different pairs of its
+  faces are joined, so that all of its faces are connected.
+- If points are still separated, open edges with the same end positions are joined to one edge:
+  the triangles of a soup, or the two sides of a seam. Their vertices are welded.
+- Vertices of faces with no area, or almost none, are moved by a thousandth of their shortest edge
+  with a length, each in a random direction, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ from .edge_subdivision import SubdividedFaces, subdivided
 from .mapped_mesh import MappedMesh
 
 REPAIRS = 4
-"""Ways in which faces are joined, one after the other."""
+"""Number of methods of joining faces, which are tried in turn."""
 
 SEGMENTS = 2
-"""Of a piece of an edge. The point between them belongs to one pair of faces only, so that no edge
-of the result has the same ends as another."""
+"""Segments of each piece of an edge. The point between them belongs to one pair of faces only, so
+no two edges of the result have the same ends."""
 
 MOST_COMPARED = 32
-"""Faces at an edge up to which the straightest pair is looked for among all pairs."""
+"""Faces at an edge up to which all pairs are compared to find the straightest one."""
 
 
 def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
-    """A manifold of faces of a mesh, for points that the ones before separate.
+    """A manifold made from faces of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
     number : int
-        Below `REPAIRS`. 0: where more than two faces share an edge the surface goes straight on.
-        1: all faces that share an edge are connected. 2 and 3: the same, and open edges at the
-        same place are one edge.
+        Method, below `REPAIRS`; later ones connect more of the surface. 0: at an edge of more than
+        two faces, the straightest pairs are joined. 1: all faces at an edge are connected. 2 and 3:
+        the same as 0 and 1, and open edges with the same end positions are joined.
     usable : (u,) int array
         Faces that may be used, ascending.
 
     Returns
     -------
     MappedMesh or None
-        None where it joins no more than those before.
+        None if the method joins no more than the previous ones.
     """
     connected = number % 2 == 1
     welded = np.arange(len(mesh.vertices))
@@ -89,10 +89,10 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
 
 
 def welded_vertices(mesh: Mesh) -> IntArray:
-    """For vertices of open edges the first one at the same place, others as they are, shape (V,).
+    """The first vertex at the position of each vertex of an open edge, shape (V,).
 
-    Only places whose coordinates are the same to the last digit are one. Edges that two faces have
-    are closed already, so closed surfaces that touch each other stay apart.
+    Other vertices keep their indices. Only exactly equal positions are welded. Edges with two faces
+    are not open, so closed surfaces that touch each other stay separate.
     """
     edges, count = mesh.unpaired_edges
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
@@ -105,27 +105,27 @@ def welded_vertices(mesh: Mesh) -> IntArray:
 
 
 def _has_lone_twins(mesh: Mesh) -> bool:
-    """Whether two faces have the same three corners, and their edges no other faces."""
+    """Whether two faces have the same three corners and their edges have no other faces."""
     across = mesh.face_neighbours
     return bool(((across == np.roll(across, 1, axis=1)) & (across >= 0)).any())
 
 
 def _without_twins(faces: IntArray) -> IntArray:
-    """Indices of the faces without those whose corners an earlier one has, ascending."""
+    """Indices of the faces without duplicates of earlier faces, ascending."""
     return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
 
 
 def _split(parts: SubdividedFaces) -> IntArray:
-    """The children of faces that are not whole, ascending."""
+    """The children of divided faces, ascending."""
     return np.flatnonzero((parts.corners[:, 2] < 1.0).all(axis=1))
 
 
 Joins = list[IntArray]
-"""For each piece of an edge the pairs of its sides that are joined there, (p, 2) each."""
+"""For each piece of an edge, the pairs of its sides that are joined there, (p, 2)."""
 
 
 def _piece_pairs(branching: list[IntArray], joins: list[Joins], parts: SubdividedFaces) -> IntArray:
-    """Pairs of sides of the subdivided faces that are joined where more than two meet, (p, 2)."""
+    """Pairs of joined sides of the subdivided faces at edges of more than two faces, (p, 2)."""
     pairs = []
     for at_edge, pieces in zip(branching, joins, strict=True):
         checkpoint()
@@ -137,7 +137,7 @@ def _piece_pairs(branching: list[IntArray], joins: list[Joins], parts: Subdivide
 
 
 class _Sides:
-    """The sides of faces, three each, and which of them are one edge.
+    """The sides of faces, three for each face, grouped by edges.
 
     Side 3 f + j lies opposite corner j of face f.
 
@@ -145,14 +145,14 @@ class _Sides:
     ----------
     faces : (f, 3) int array
     welded : (V,) int array
-        Which vertex each counts as where faces are joined.
+        The vertex that represents each vertex when faces are joined.
     """
 
     def __init__(self, faces: IntArray, welded: IntArray) -> None:
         self._faces = faces
         checkpoint()
-        # Corners at the ends of each side, that with the smaller vertex first. Where both ends are
-        # welded to one, the vertices themselves decide.
+        # Corners at the ends of each side, the one with the smaller welded vertex first. If both
+        # ends are welded to one vertex, the original vertices are compared.
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
@@ -165,20 +165,20 @@ class _Sides:
         checkpoint()
         size = int(vertices.max()) + 1
         keys = np.minimum(one, other) * size + np.maximum(one, other)
-        nowhere = np.flatnonzero(one == other)  # such a side joins nothing
-        keys[nowhere] = size * size + nowhere
+        collapsed = np.flatnonzero(one == other)  # such a side joins nothing
+        keys[collapsed] = size * size + collapsed
         del one, other, swapped, first, second
         self._order, self._first, self._count = grouped(keys)
 
     @cached_property
     def plain_pairs(self) -> IntArray:
-        """Sides of edges that two faces have, shape (p, 2)."""
+        """Sides of edges with two faces, shape (p, 2)."""
         first = self._first[self._count == 2]
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
     def branching(self) -> list[IntArray]:
-        """Sides of each edge that more faces have."""
+        """Sides of each edge with more than two faces."""
         several = self._count > 2
         return [
             self._order[first : first + count]
@@ -186,11 +186,11 @@ class _Sides:
         ]
 
     def joins(self, at_edge: IntArray, vertices: FloatArray, connected: bool) -> Joins:
-        """How the sides of one edge are joined, by their places among them.
+        """How the sides of one edge are joined, as positions in `at_edge`.
 
-        On the first piece of the edge those are joined that go on most straightly. If all are to
-        be connected, the groups that this leaves are joined on further pieces, like the corners of
-        a cube along its axes: q faces need about log₂ q pieces.
+        On the first piece of the edge the straightest pairs are joined. If all sides are to be
+        connected, the resulting groups are joined on further pieces, like the corners of a
+        hypercube along its axes: q faces need about log₂ q pieces.
         """
         checkpoint()
         straight = self._straightest(at_edge, vertices)
@@ -211,7 +211,7 @@ class _Sides:
         return pieces
 
     def subdivided(self, segments: list[int], n_vertices: int) -> SubdividedFaces:
-        """The faces with the edges that more than two of them share cut into segments."""
+        """The faces with edges of more than two faces divided into segments."""
         edge_of_side = np.full(self._faces.size, -1)
         for number, at_edge in enumerate(self.branching):
             edge_of_side[at_edge] = number
@@ -219,7 +219,7 @@ class _Sides:
         return subdivided(self._faces, self._low, self._high, edge_of_side, counts, n_vertices)
 
     def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
-        """Pairs of the sides of one edge, by place, the straightest first; at most one is left."""
+        """Pairs of the sides of one edge, the straightest first; at most one side is left over."""
         corner = self._faces.ravel()
         start, end = vertices[corner[self._low[sides]]], vertices[corner[self._high[sides]]]
         edge = end - start
@@ -240,14 +240,14 @@ class _Sides:
         return np.array(pairs)
 
     def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
-        """Faces whose corners are one vertex only where pairs of sides join them.
+        """Faces that share vertices only where pairs of sides join them.
 
         Returns
         -------
         (f, 3) int array
             Corners.
         (v,) int array
-            The vertex that each vertex was.
+            The original vertex of each vertex.
         """
         corner = self._faces.ravel()
         one, other = pairs.T
@@ -270,7 +270,7 @@ class _Sides:
 
 
 def _opposite(outward: FloatArray) -> IntArray:
-    """Pairs of directions about a line, (q, 3): opposite ones in the order of their angles."""
+    """Pairs of opposite directions about a line, (q, 3), by the order of their angles."""
     axes = np.linalg.svd(outward, full_matrices=False)[2][:2]
     order = np.argsort(np.arctan2(outward @ axes[1], outward @ axes[0]), kind="stable")
     half = len(order) // 2
@@ -286,11 +286,11 @@ def _with_areas(
     corners: FloatArray | None,
     place: IntArray,
 ) -> MappedMesh:
-    """The map to a mesh with these faces, in which every face has an area where that is possible.
+    """The map to a mesh with these faces, in which every face has an area where possible.
 
-    Vertices that stand for one vertex of the mesh are moved apart.
+    Copies of a vertex of the original are moved apart.
     """
-    # A side whose ends have been welded to one has no length, and its face no area.
+    # A side with both ends welded to one vertex has no length, so its face is left out.
     whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     if not whole.all():
         faces, face = faces[whole], face[whole]
@@ -301,13 +301,13 @@ def _with_areas(
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
     origin = np.zeros(3)
-    # Straight ways from one copy of a vertex would pass exactly through the others.
+    # Straight traces from one copy of a vertex would pass exactly through the others.
     doubled = np.ones(len(vertices), dtype=bool)
     order, first, _ = grouped(place)
     doubled[order[first]] = False
     checkpoint()
     if flat.any() or doubled.any():
-        # Far from the origin a small move would be lost to rounding.
+        # Far from the origin, rounding would remove small moves.
         origin = vertices[faces[0, 0]]
         vertices = with_areas(vertices - origin, faces, short, flat, doubled)
     return MappedMesh(mesh, Mesh(vertices, faces), face, corners, place, original_place, origin)

@@ -1,9 +1,9 @@
-"""Strands of a curve that touch only on the original of a mapped mesh, moved apart.
+"""Separates strands of a curve that touch on the original mesh but not on the mapped one.
 
-A curve that is simple on the mapped mesh passes each of its vertices once. Two of them may be one
-vertex of the original. One strand then goes round its copy, across the edges that meet there.
-Likewise for copies of an edge: where strands cross them at the same point, one of the points is
-moved along the edge, and where a strand runs along one, it bends into the face beside.
+A curve that is simple on the mapped mesh passes each of its vertices once, but two of them may be
+one vertex of the original. One strand is then routed round its copy, across the edges that meet
+there. The same applies to copies of an edge: if strands cross them at the same point, one point is
+moved along the edge, and a strand that runs along one is bent into the adjacent face.
 """
 
 from __future__ import annotations
@@ -18,24 +18,25 @@ from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, weights_at
 
 REACH = 0.05
-"""Greatest distance from a vertex at which a strand passes beside it, in lengths of edges."""
+"""Greatest distance at which a strand passes a vertex, in lengths of the edges there."""
 
 SHARE = 0.5
-"""The same relative to the distance of the nearest other point of the curve."""
+"""Greatest distance relative to that of the nearest other point of the curve."""
 
 SMALLER = 0.1
-"""Of that distance from one attempt to the next, as long as the strand touches another."""
+"""Factor on the distance for the next attempt, if the moved strand touches another one."""
 
 ATTEMPTS = 8
 
 ROUNDS = 4
-"""Of moving points: two that go round copies of one vertex may meet on copies of an edge."""
+"""Rounds of moves: strands round copies of one vertex may meet on copies of an edge."""
 
 SAME_POINT = 1e-9
-"""Difference of weights up to which points of copies of one edge are one point."""
+"""Difference of weights up to which points on copies of one edge coincide."""
 
 Moved = Callable[[float], tuple[SurfacePoints, IntArray]]
-"""A polyline with one strand moved by a share of the room, and the number of each old point."""
+"""A function that moves one strand by a fraction of the greatest distance, and returns the polyline
+and the new index of each old point."""
 
 
 def separated(
@@ -48,7 +49,7 @@ def separated(
     mesh : Mesh
         The mapped mesh.
     place : (v,) int array
-        The same number for vertices that are one point of the original.
+        Equal for vertices that are one point of the original.
     polyline : SurfacePoints
         Simple on the mesh; each point in the face of the segment after it.
     closed : bool
@@ -59,14 +60,14 @@ def separated(
     -------
     SurfacePoints
     (n,) int array
-        Where each old point is now; -1 for those that are replaced.
+        The new index of each old point; -1 for those that are replaced.
     """
     number = np.arange(len(polyline))
     for _ in range(ROUNDS):
         touching = _touching(mesh, place, polyline, number[fixed])
         if not touching:
             break
-        # From the last one on, so that those before keep their numbers.
+        # Backward, so that points not yet processed keep their indices.
         for point in touching[::-1]:
             corners = int((polyline.barycentric[point] > 0.0).sum())
             move = _round_vertex if corners == 1 else _along_edge
@@ -81,7 +82,7 @@ def separated(
 def _passed_segments(
     mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool
 ) -> list[int]:
-    """Segments along an edge that have points of other strands on copies of it, ascending."""
+    """Segments along an edge, copies of which contain points of other strands, ascending."""
     n = len(polyline)
     here = polyline.barycentric > 0.0
     corners = mesh.faces[polyline.faces]
@@ -104,7 +105,7 @@ def _passed_segments(
 
 
 def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntArray) -> list[int]:
-    """Points, none of them fixed, without which no two of the polyline are one; ascending."""
+    """Points, none of them fixed, that coincide with another point on the original, ascending."""
     stays = np.zeros(len(polyline), dtype=bool)
     stays[fixed] = True
     here = polyline.barycentric > 0.0
@@ -116,7 +117,7 @@ def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntAr
     on_mesh = here.sum(axis=1) < 3
     first: dict[tuple[int, ...], list[int]] = {}
     found = []
-    # Points that stay come first, so that others give way to them.
+    # Fixed points first, so that the others are moved.
     for point in np.lexsort((np.arange(len(stays)), ~stays)).tolist():
         if not on_mesh[point]:
             continue
@@ -137,7 +138,7 @@ def _moved(
     closed: bool,
     move: Callable[[Mesh, SurfacePoints, int, float], tuple[SurfacePoints, IntArray]],
 ) -> tuple[SurfacePoints, IntArray]:
-    """The polyline with one point moved, as far as leaves it simple; as it was if nothing does."""
+    """Move one point as far as the polyline stays simple; if none works, return it unchanged."""
     share = 1.0
     for _ in range(ATTEMPTS):
         changed, number = move(mesh, polyline, point, share)
@@ -150,7 +151,7 @@ def _moved(
 def _round_vertex(
     mesh: Mesh, polyline: SurfacePoints, point: int, share: float
 ) -> tuple[SurfacePoints, IntArray]:
-    """Replace a point at a vertex by points on the edges round it, from one side to the other."""
+    """Replace a point at a vertex by points on the edges round it."""
     n = len(polyline)
     faces = polyline.faces
     vertex = int(mesh.faces[faces[point]][polyline.barycentric[point].argmax()])
@@ -198,7 +199,7 @@ def _along_edge(
 def _into_face(
     mesh: Mesh, polyline: SurfacePoints, point: int, share: float
 ) -> tuple[SurfacePoints, IntArray]:
-    """Give a segment along an edge a point between its ends, inside the face that carries it."""
+    """Insert a point into a segment along an edge, inside the face of the segment."""
     n, face = len(polyline), int(polyline.faces[point])
     following = (point + 1) % n
     corners = mesh.faces[polyline.faces[following]]
@@ -213,14 +214,14 @@ def _into_face(
 
 
 def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
-    """The shortest chain of faces about a vertex from one to another, each beside the next."""
+    """The shortest chain of adjacent faces about a vertex from one face to another."""
     previous = {start: start}
     queue = [start]
     for face in queue:
         if face == end:
             break
         for corner, beyond in zip(mesh.faces[face], mesh.face_neighbours[face], strict=True):
-            # The side opposite the vertex leads away from it.
+            # Do not cross the side opposite the vertex.
             if corner != vertex and beyond >= 0 and int(beyond) not in previous:
                 previous[int(beyond)] = face
                 queue.append(int(beyond))
