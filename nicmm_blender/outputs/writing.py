@@ -195,8 +195,8 @@ def _take_inside(edited, other_data) -> None:
     try:
         for part, kept in ((edited, 0), (other, 1)):
             layer = part.faces.layers.int[INSIDE]
-            gone = [face for face in part.faces if face[layer] != kept]
-            bmesh.ops.delete(part, geom=gone, context="FACES")
+            removed = [face for face in part.faces if face[layer] != kept]
+            bmesh.ops.delete(part, geom=removed, context="FACES")
             part.faces.layers.int.remove(layer)
         loose = [vertex for vertex in other.verts if not vertex.link_faces]
         bmesh.ops.delete(other, geom=loose, context="VERTS")

@@ -40,7 +40,7 @@ class DesignRequest:
         return None
 
     def check_unchanged(self) -> None:
-        """Refuse to go on where the mesh is no longer the one that was read."""
+        """Raise an error if the mesh has changed since it was read."""
         found = self.mesh_object()
         now = None if found is None else mesh_data.triangles(found)
         if now is None or not (

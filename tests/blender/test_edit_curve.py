@@ -136,7 +136,7 @@ def test_errors_say_what_to_do(empty_scene, sphere, places):
     assert "There are no control points" in refusal()
     assert "off the surface" in refusal(points=as_points([[0, 0, 3], *places]))
     assert 'no designed curve "Icosphere"' in refusal(curve="Icosphere")
-    assert "two points at least" in refusal(points=as_points(places[:1]))
+    assert "at least two points" in refusal(points=as_points(places[:1]))
     assert "point 1 and point 2 are the same point" in refusal(
         points=as_points([places[0], places[0], places[1]])
     ).replace("Point", "point")
@@ -240,7 +240,7 @@ def test_points_follow_a_sculpted_mesh(sphere, places):
 
 
 @pytest.mark.parametrize("change", ["subdivide", "delete"])
-def test_on_a_changed_mesh_points_go_to_the_nearest_place(sphere, places, change, capfd):
+def test_on_a_changed_mesh_points_move_to_the_nearest_position(sphere, places, change, capfd):
     curve = edit(points=as_points(places))
     bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = sphere
@@ -261,7 +261,7 @@ def test_on_a_changed_mesh_points_go_to_the_nearest_place(sphere, places, change
     bpy.ops.nicmm.convert_curve(output="CURVE")
 
 
-def test_a_group_that_is_gone_is_left_out(sphere, places, capfd):
+def test_a_deleted_group_is_left_out(sphere, places, capfd):
     group = sphere.vertex_groups.new(name="Wall")
     group.add([0], 0.5, "REPLACE")
     curve = edit(points=as_points(places), obstacle_group="Wall")
@@ -277,7 +277,7 @@ def test_modifiers_are_mentioned(sphere, places, capfd):
     assert "without its modifiers" in capfd.readouterr().out
 
 
-def test_a_mesh_that_is_gone_is_named(sphere, places):
+def test_a_deleted_mesh_is_named(sphere, places):
     curve = edit(points=as_points(places))
     bpy.data.objects.remove(sphere)
     bpy.ops.mesh.primitive_cube_add()

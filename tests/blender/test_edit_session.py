@@ -345,7 +345,7 @@ def test_lengths_are_those_of_the_scaled_object(parts):
     assert session.curve.length == pytest.approx(expected.length, rel=5e-3)
 
 
-# The view: pixels to places and back.
+# The view: from pixels to points of the mesh and back.
 
 
 def looking(parts, session, eye, perspective):

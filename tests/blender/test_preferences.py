@@ -82,4 +82,4 @@ def test_torch_is_reported_and_not_loaded(preferences, monkeypatch):
     )
     (_, igl, torch, _) = preferences.library_report()
     assert igl.startswith("libigl is missing: install the zip")
-    assert torch.startswith("PyTorch was not found. It would add")
+    assert torch.startswith("PyTorch was not found. Only the method")

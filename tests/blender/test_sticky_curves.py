@@ -239,25 +239,25 @@ def convert(**settings):
     return bpy.ops.nicmm.convert_curve(output="STICKY", **settings)
 
 
-WAYS = pytest.mark.parametrize("way", [design, convert])
+OPERATORS = pytest.mark.parametrize("operator", [design, convert])
 
 
-@WAYS
-def test_window_begins_with_a_tube_where_few_points_are_drawn(monkey, window, all_points, way):
-    assert way() == {"FINISHED"}
+@OPERATORS
+def test_window_begins_with_a_tube_where_few_points_are_drawn(monkey, window, all_points, operator):
+    assert operator() == {"FINISHED"}
     assert (shown_mesh(bpy.context.active_object) is None) == all_points
 
 
-@WAYS
-def test_scripts_get_strands(monkey, all_points, way):
-    assert way() == {"FINISHED"}
+@OPERATORS
+def test_scripts_get_strands(monkey, all_points, operator):
+    assert operator() == {"FINISHED"}
     assert shown_mesh(bpy.context.active_object) is None
 
 
-@WAYS
+@OPERATORS
 @pytest.mark.parametrize("tube", [True, False])
-def test_what_the_caller_asks_for_counts(monkey, window, all_points, way, tube):
-    assert way(tube=tube) == {"FINISHED"}
+def test_what_the_caller_asks_for_counts(monkey, window, all_points, operator, tube):
+    assert operator(tube=tube) == {"FINISHED"}
     assert (shown_mesh(bpy.context.active_object) is not None) == tube
 
 

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drives the editing tool in a real Blender window, with mouse and keys, and photographs each step.
+"""Drives the editing tool in a Blender window by mouse and keys; takes a picture of each step.
 
     python3 build.py package
     python3 tests/window/drive.py dist/ZIP --shots FOLDER [--blender COMMAND] [--size 1280x800]
 
-Needs Blender, Xvfb, xdotool and ImageMagick's `import` and `convert`, and nothing of this project
-but the zip: it runs with any Python 3. Each step checks what Blender then knows; a step that fails
-ends the drive with an error. It is not part of the test suite, which has no window.
+Needs Blender, Xvfb, xdotool and ImageMagick's `import` and `convert`. Of this project it needs only
+the zip, so it runs with any Python 3. Each step checks the state of Blender; a failed step ends the
+drive with an error. It is not part of the test suite, which has no window.
 """
 
 import argparse
@@ -33,7 +33,7 @@ HOLD = 1.5
 """Seconds that a key is held about a click."""
 
 CROP = "1048x800+0+0"
-"""What of the screen is kept: the 3D viewport."""
+"""The part of the screen in pictures: the 3D viewport."""
 
 FRAME = 50.0
 """Milliseconds that the tool may take for an event while a point is dragged."""
@@ -47,7 +47,7 @@ OUTPUTS = (
 
 
 class Blender:
-    """A Blender on a screen of its own."""
+    """A Blender on a virtual screen."""
 
     def __init__(self, command: str, size: str, folder: Path, shots: Path) -> None:
         self.folder, self.shots, self.sent = folder, shots, 0
@@ -77,7 +77,7 @@ class Blender:
             process.wait(30)
 
     def do(self, source: str):
-        """Run Python in Blender and return what it calls `value`."""
+        """Run Python in Blender and return its variable `value`."""
         self.sent += 1
         name = f"{self.sent:04d}"
         partial = self.folder / f"{name}.partial"
@@ -122,7 +122,7 @@ class Blender:
         self.mouse("mousedown", 1)
         time.sleep(0.1)
         self.mouse("mouseup", 1)
-        # Blender asks for the keys that are down when it comes to the event, not when it happened.
+        # Blender reads the modifier keys when it handles the event, not when the event occurs.
         time.sleep(HOLD * bool(keys))
         for key in keys:
             self.mouse("keyup", key)
@@ -131,7 +131,7 @@ class Blender:
         self.mouse("key", *names)
 
     def shot(self, name: str) -> None:
-        """A picture of the screen once Blender has drawn."""
+        """Take a picture of the screen after Blender has drawn it."""
         self.do("helper.area().tag_redraw()")
         time.sleep(1.5)
         self.do("pass")
@@ -262,7 +262,7 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.click(added, "ctrl")
     count_points(blender, 5)
 
-    step("A point on an eye, which is another part of the mesh: the status bar says why not")
+    step("A point on an eye, which is another part of the mesh: the status bar gives the reason")
     (eye,) = blender.do("value = helper.pixels(helper.in_front([(0.35, 0.24)]))")
     good = blender.do("value = helper.session().polyline().tolist()")
     blender.click(eye)
@@ -331,7 +331,7 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.shot("9-edited-again")
     blender.key("Escape")
     blender.wait("not helper.running", "cancel")
-    check(blender.do(f"value = {written}") == kept, "Esc leaves the curve as it was")
+    check(blender.do(f"value = {written}") == kept, "Esc leaves the curve unchanged")
 
     step("Sticky curves by the menu")
     open_again(blender, path)
@@ -376,7 +376,7 @@ def convert_to_sticky_curves(blender: Blender) -> None:
     """Object > Convert > Convert Designed Curve > Sticky Curves, by the keys."""
     blender.move(blender.do("value = helper.pixels([0, -0.8, 0])")[0])
     blender.do('with helper.in_view():\n    bpy.ops.wm.call_menu(name="VIEW3D_MT_object_convert")')
-    # Our entries are the last two; the second entry of the submenu is meant.
+    # The entries of the extension are the last two; choose the second entry of the submenu.
     for key in ("Up", "Up", "Right", "Down", "Return"):
         time.sleep(1.0)
         blender.key(key)

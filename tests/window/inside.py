@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs inside the Blender that `drive.py` drives: does what it is told and says how things stand.
+"""Runs inside the Blender that `drive.py` drives: executes commands and reports the state.
 
-Commands are Python files in a folder, done one after another from a timer, as Blender's own thread
-needs it; after each the answer, or the error, lies beside it as JSON. Mouse and keys come from
-outside, as from a user.
+Commands are Python files in a folder, executed one after another by a timer in Blender's main
+thread. The result or the error of each is written beside it as JSON. Mouse and keys are sent from
+outside, as by a user.
 """
 
 import json
@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.nicmm_curves.nicmm_blender"
 
 
 class Helper:
-    """What commands may use."""
+    """Functions for commands."""
 
     frames: list = []
 
@@ -64,7 +64,7 @@ class Helper:
 
     @classmethod
     def pixels(cls, places):
-        """Pixels of the screen, from its top left, of places in the monkey's own space."""
+        """Pixels of the screen, from its top left, of positions in the monkey's local space."""
         from bpy_extras.view3d_utils import location_3d_to_region_2d
 
         region = cls.region()
@@ -99,7 +99,7 @@ def _vector(place):
 
 
 def watch_tool():
-    """Measure every event of the tool, and know which one runs."""
+    """Measure every event of the tool, and store the running operator."""
     operator = import_module(f"{MODULE}.tool.edit_operator").NICMM_OT_edit_curve
     modal, invoke = operator.modal, operator.invoke
 
@@ -123,7 +123,7 @@ def watch_tool():
 
 
 def answer():
-    """Do the next command, if there is one."""
+    """Execute the next command, if there is one."""
     for command in sorted(FOLDER.glob("*.command")):
         scope = {"bpy": bpy, "np": np, "helper": Helper, "watch_tool": watch_tool}
         try:
