@@ -83,7 +83,7 @@ def test_a_point_inside_is_named():
     chosen = nearest_vertices(ball, [[0, 1, -0.5], [1, 0, -0.5], [0, 0, 1]])
     with pytest.raises(nicmm.UnreachableError, match=r"control_points\[2\] lies inside"):
         nicmm.design_curve(ball, chosen, obstacles=weights)
-    with pytest.raises(nicmm.UnreachableError, match="nothing of the surface"):
+    with pytest.raises(nicmm.UnreachableError, match="cover the whole surface"):
         nicmm.design_curve(ball, chosen, obstacles=np.ones(len(ball.vertices)))
 
 
