@@ -227,9 +227,9 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     def _modal(self, context, event):
         session = self._opened.session
         if event.type == "TIMER":
-            idle = time.monotonic() - self._last_move > PAUSE
+            still = time.monotonic() - self._last_move > PAUSE
             # A design from scratch takes longer than a frame, so it waits until the mouse stops.
-            if not session.idle and (idle or not (session.waiting and self._grabbed is not None)):
+            if not session.idle and (still or not (session.waiting and self._grabbed is not None)):
                 session.step()
                 self._show(context)
             return {"RUNNING_MODAL"}
