@@ -130,7 +130,8 @@ def _sides(cut: CutMesh) -> IntArray:
     beside = _faces_beside(cut)
     with_curve = np.isin(part, part[beside])
     if (side == 0)[with_curve].any():
-        reason = "It runs round a handle or a tube" if cut.closed else "It is open"
+        closed = "It is closed, but runs round a handle, a tube or a Möbius strip"
+        reason = closed if cut.closed else "It is open"
         raise CurveError(
             f"curve bounds no region: its two sides are connected on the surface. {reason}; cut "
             "the mesh along it instead, or design a closed curve that encloses a part of the "
