@@ -30,7 +30,7 @@ from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
 from .path.via_points import ViaPoints, located_via_points
-from .progress import INTERVAL, CancelledError, Progress, checkpoint, displaced, watched
+from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.free_surface import check_reachable, free_faces
 from .repair.mapped_mesh import MappedMesh
 from .repaired_surface import RepairedSurface, design_on_original, start_on
@@ -142,7 +142,7 @@ class Designer:
                 if isinstance(start, Design) and _answers(start, mapped, there):
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(mapped, start)
-                with displaced(mapped.origin):
+                with placed(lambda points: points + mapped.origin):
                     found = designer.design(there, started, begin, max_iterations)
                     return design_on_original(mapped, found)
         except CancelledError:

@@ -22,6 +22,9 @@ from .geometry.array_types import FloatArray
 Progress = Callable[[float, FloatArray], object]
 """Called with the fraction done and the points of the current curve, (n, 3); False cancels."""
 
+Placement = Callable[[FloatArray], FloatArray]
+"""From positions on a copy of a mesh to those on the mesh that the caller gave, (n, 3)."""
+
 INTERVAL = 0.1
 """Least time between two calls of a progress function, in seconds.
 
@@ -47,9 +50,9 @@ class _Watch:
         self._shown = self._stopped = False
         self._next_call = time.perf_counter() + INTERVAL
         self._next_points = 0.0
-        # The current subrange of the whole, and the offset of its points in space.
+        # The current subrange of the whole, and where its points are shown.
         self.low, self.high = 0.0, 1.0
-        self.offset = np.zeros(3)
+        self.place: Placement = lambda points: points
 
     def ask(self, done: float | None, points: Callable[[], FloatArray] | None) -> None:
         """Call the function if it is due; raise CancelledError if it has returned False."""
@@ -58,7 +61,8 @@ class _Watch:
         if done is not None:
             self._fraction = max(self._fraction, self.low + done * (self.high - self.low))
         if points is not None:
-            self._pending = points
+            place = self.place
+            self._pending = lambda: place(points())
         now = time.perf_counter()
         new = self._pending is not None and now >= self._next_points
         # The first curve is shown at once.
@@ -67,7 +71,7 @@ class _Watch:
         self._next_call = now + INTERVAL
         if self._pending is not None and new:
             find, self._pending = self._pending, None
-            self._points, self._shown = find() + self.offset, True
+            self._points, self._shown = find(), True
             after = time.perf_counter()
             self._next_points = after + SHOWING * (after - now)
         # A copy, which the caller may modify.
@@ -128,15 +132,15 @@ def subrange(start: float, end: float) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def displaced(offset: FloatArray) -> Iterator[None]:
-    """Show the points of this block displaced by an offset, (3,)."""
+def placed(place: Placement) -> Iterator[None]:
+    """Show the points of this block, (n, 3), at the positions that a function gives them."""
     watch = _watch.get()
     if watch is None:
         yield
         return
-    before = watch.offset
-    watch.offset = before + offset
+    before = watch.place
+    watch.place = lambda points: before(place(points))
     try:
         yield
     finally:
-        watch.offset = before
+        watch.place = before

@@ -26,7 +26,7 @@ from .maps.guidance import component_unit, feature_map
 from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
-from .progress import CancelledError, checkpoint, subrange
+from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface
 from .relaxation.elastic_energy import FEATURE_TENSION
@@ -144,7 +144,8 @@ class SurfaceDesigner:
     def _start_from_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
         there = self._copy
-        found = infer(there.mesh, renumbered_request(there, request))
+        with placed(there.in_original):
+            found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
         # A zero set may touch itself where the mesh is too coarse; the path does not.
         one = zeros.is_simple_curve(there.mesh, request.closed)

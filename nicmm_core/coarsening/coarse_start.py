@@ -13,7 +13,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import infer
-from ..progress import subrange
+from ..progress import placed, subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request, renumbered_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
@@ -106,7 +106,7 @@ class CoarseStarts:
     def _start_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        with subrange(COARSE_SHARE, 0.9):
+        with subrange(COARSE_SHARE, 0.9), placed(level.copy.in_original):
             zeros = infer(level.copy.mesh, renumbered_request(level.copy, on_coarse)).zeros
         if not zeros.is_simple_curve(level.copy.mesh, request.closed):
             return None

@@ -44,6 +44,9 @@ class Renumbered:
         The original face of each face of the copy.
     corner : (F, 3) int array
         Which corner of that face each corner is.
+    centre : (3,) float array
+    axes : (3, 3) float array
+        Of the frame; the copy's coordinates are along the columns, from the centre.
     """
 
     original: Mesh
@@ -51,6 +54,12 @@ class Renumbered:
     number: IntArray
     face: IntArray
     corner: IntArray
+    centre: FloatArray
+    axes: FloatArray
+
+    def in_original(self, positions: FloatArray) -> FloatArray:
+        """Positions on the copy as positions on the original, (n, 3)."""
+        return positions @ self.axes.T + self.centre
 
     def points(self, points: SurfacePoints) -> SurfacePoints:
         """Points of the original on the copy."""
@@ -94,7 +103,8 @@ def renumbered(mesh: Mesh) -> Renumbered:
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
         places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
     places = places[order].clip(-LARGEST, LARGEST)
-    return Renumbered(mesh, Mesh(places, faces[face]), number, face, corner[face])
+    copy = Mesh(places, faces[face])
+    return Renumbered(mesh, copy, number, face, corner[face], frame.centre, axes)
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:

@@ -8,7 +8,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.progress import CancelledError, checkpoint, displaced, subrange, watched
+from nicmm_core.progress import CancelledError, checkpoint, placed, subrange, watched
 from tests.oracles.checker import judge_curve
 from tests.oracles.defects import defective_meshes
 
@@ -129,9 +129,25 @@ def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
     assert (seen <= mesh.vertices.max(axis=0) + 0.1).all()
 
 
+@pytest.mark.slow
+def test_points_of_every_stage_lie_near_the_mesh(at_every_checkpoint):
+    """Paths are found on copies of the mesh in other coordinates."""
+    for mesh, chosen in ((shapes.creature(2, faces=400), [3, 70, 150]), (LARGE, [7, 2000, 9000])):
+        placed = nicmm.Mesh(mesh.vertices * 3.0 + [50.0, -20.0, 10.0], mesh.faces)
+        seen = []
+        nicmm.design_curve(
+            placed, chosen, order="shortest", progress=lambda _, curve: seen.append(curve)
+        )
+        shown = np.concatenate(seen)
+        assert len(shown)
+        margin = 0.05 * placed.diagonal
+        assert (shown >= placed.vertices.min(axis=0) - margin).all()
+        assert (shown <= placed.vertices.max(axis=0) + margin).all()
+
+
 class TestWatched:
     def test_nobody_watches(self):
-        with watched(None), subrange(0.2, 0.4), displaced(np.ones(3)):
+        with watched(None), subrange(0.2, 0.4), placed(lambda points: points + 1.0):
             checkpoint(0.5, lambda: 1 / 0)
 
     def test_parts_of_parts(self, at_every_checkpoint):

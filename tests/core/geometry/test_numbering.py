@@ -60,6 +60,8 @@ def test_points_values_and_curves_are_mapped(surface):
     points = random_surface_points(surface, 7, 0)
     mapped = there.points(points).positions(there.mesh)
     np.testing.assert_allclose(mapped, in_frame(points.positions(surface)), atol=1e-14)
+    back = there.in_original(mapped)
+    np.testing.assert_allclose(back, points.positions(surface), atol=1e-14)
     values = there.values(in_frame(surface.vertices)[:, 0].copy())
     np.testing.assert_allclose(values, there.mesh.vertices[:, 0], atol=1e-14)
     assert there.values(None) is None
