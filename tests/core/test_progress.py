@@ -136,7 +136,7 @@ def test_points_of_every_stage_lie_near_the_mesh(at_every_checkpoint):
         placed = nicmm.Mesh(mesh.vertices * 3.0 + [50.0, -20.0, 10.0], mesh.faces)
         seen = []
         nicmm.design_curve(
-            placed, chosen, order="shortest", progress=lambda _, curve: seen.append(curve)
+            placed, chosen, order="shortest", progress=lambda _, curve, s=seen: s.append(curve)
         )
         shown = np.concatenate(seen)
         assert len(shown)
