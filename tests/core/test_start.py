@@ -94,6 +94,7 @@ def test_nothing_is_done_where_nothing_differs(ball):
     assert again.curves[0] is design.curves[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_dragged_points_on_every_surface(surface, closed, from_nothing):
     designer = nicmm.Designer(surface)
@@ -113,6 +114,7 @@ def test_dragged_points_on_every_surface(surface, closed, from_nothing):
     assert len(from_nothing) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_every_frame_is_a_curve_by_bounded_work(ball, closed):
     designer = nicmm.Designer(ball)
@@ -175,6 +177,7 @@ def test_smoothness_and_maps_may_differ(ball, from_nothing):
     assert len(from_nothing) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("as_curve", [False, True])
 @pytest.mark.parametrize("closed", [True, False])
 def test_control_points_go(ball, closed, as_curve):
@@ -190,6 +193,7 @@ def test_control_points_go(ball, closed, as_curve):
             assert now.curves[0].length < 0.9 * design.curves[0].length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["given", "shortest"])
 @pytest.mark.parametrize("closed", [True, False])
 def test_control_points_come(ball, closed, order):
@@ -314,6 +318,7 @@ def test_beside_obstacles(ball):
     assert designer.design(points, obstacles=island).curves[0].length > 1.01 * now.curves[0].length
 
 
+@pytest.mark.slow
 def test_moves_by_less_than_a_tenth_are_followed_on_limbs():
     """Whatever the surface is like there, all but a few of them."""
     asked = refused = 0

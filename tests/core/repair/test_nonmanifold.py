@@ -322,6 +322,7 @@ class TestEdgesOfManyFaces:
             assert not judge(mesh, design, points, order="shortest").faults
 
 
+@pytest.mark.slow
 def test_two_faces_with_the_same_corners_are_one(small_ball):
     """Also where their edges have no other faces, so that they form a closed surface."""
     for second in ([0, 1, 2], [1, 0, 2]):
