@@ -143,9 +143,13 @@ def build_coarse_mesh(
     np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
     distance = PACKING * np.sqrt(areas.sum() / count)
     # The place of a vertex decides what chance would, and not its number.
-    chance = uniform_hash(frame_coordinates(mesh))
+    places = frame_coordinates(mesh)
+    checkpoint()
+    chance = uniform_hash(places)
+    checkpoint()
     seed = _seeds(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
     graph = _edge_graph(mesh, chance)
+    checkpoint()
     cell = _nearest_seeds(mesh.vertices, graph, seed, MARGIN * distance)
     if (cell[faces] < 0).any():
         cell = _nearest_seeds(mesh.vertices, graph, seed, np.inf)
@@ -176,6 +180,7 @@ def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
     They are changed by a little, so that no two paths on a grid are equally long.
     """
     length = edge_lengths(mesh.vertices, mesh.edges)
+    checkpoint()
     length *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
     size = len(mesh.vertices)
     return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
