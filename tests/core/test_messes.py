@@ -21,7 +21,7 @@ def test_a_seeded_part_of_the_messes(part):
         assert answer.faults == [], (number, answer.kind)
 
 
-@pytest.mark.parametrize("number", [163, 172, 330, 5313])
+@pytest.mark.parametrize("number", [163, 172, 330, 5313, 8312])
 def test_what_a_whole_run_has_found(number):
     """Two curves; obstacles that seemed to separate; strands on copies of one edge; twins alone."""
     with warnings.catch_warnings(record=True) as printed:
