@@ -1,4 +1,4 @@
-"""The mesh refuses what is none and never changes what it was given."""
+"""The mesh refuses arrays that are not a mesh, and never changes what it was given."""
 
 import warnings
 
