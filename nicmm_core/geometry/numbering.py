@@ -88,9 +88,8 @@ class Renumbered:
 
 def renumbered(mesh: Mesh) -> Renumbered:
     """The copy of a mesh that its surface decides."""
-    frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
-    axes = frame.signed_axes()
-    order = np.lexsort(frame_coordinates(mesh).T[::-1])
+    centre, axes, places = _in_frame(mesh)
+    order = np.lexsort(_rounded(mesh, places).T[::-1])
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
     corner = np.tile(np.arange(3), (len(mesh.faces), 1))
@@ -100,20 +99,29 @@ def renumbered(mesh: Mesh) -> Renumbered:
     corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
     faces = np.take_along_axis(number[mesh.faces], corner, axis=1)
     face = np.lexsort(np.sort(faces, axis=1).T[::-1])
-    with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
-        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
-    places = places[order].clip(-LARGEST, LARGEST)
-    copy = Mesh(places, faces[face])
-    return Renumbered(mesh, copy, number, face, corner[face], frame.centre, axes)
+    copy = Mesh(places[order].clip(-LARGEST, LARGEST), faces[face])
+    return Renumbered(mesh, copy, number, face, corner[face], centre, axes)
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
     """Coordinates of the vertices in the principal frame, in units of `RESOLUTION`, (V, 3)."""
+    return _rounded(mesh, _in_frame(mesh)[2])
+
+
+def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The centre, (3,), the signed axes, (3, 3), and the vertices in that frame, (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
-    unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
+    axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
-        places = np.nan_to_num((mesh.vertices - frame.centre) @ frame.signed_axes() / unit)
-    return np.round(places.clip(-FARTHEST, FARTHEST)).astype(np.int64)
+        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
+    return frame.centre, axes, places
+
+
+def _rounded(mesh: Mesh, places: FloatArray) -> IntArray:
+    """Coordinates in units of `RESOLUTION`."""
+    unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
+    with np.errstate(over="ignore"):
+        return np.round((places / unit).clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 @dataclass(frozen=True)
