@@ -18,6 +18,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.courses import course_surface
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import BASE_CHANNELS
@@ -210,6 +211,7 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
     with (
         mock.patch.object(single_pass, "infer_level_set", solution),
         mock.patch.object(single_pass, "zero_set", collected),
+        mock.patch.object(course_surface, "find_courses", lambda *arguments: None),
     ):
         yield level_sets
 

@@ -5,32 +5,34 @@ This is the main course of a checked request; `design` is its entry point.
 
 from __future__ import annotations
 
+import itertools
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from .coarsening.coarse_start import CoarseStarts
+from .coarsening.coarse_start import COURSES, CoarseStarts
+from .courses.course_surface import CourseSurface
 from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .geometry.numbering import Renumbered, renumbered
+from .geometry.surface_points import SurfacePoints
+from .geometry.tracing import strictly_inside
 from .level_set import variational
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
 from .level_set.zero_set import ZeroSet, zero_set
-from .maps.guidance import component_unit, feature_map
+from .maps.guidance import component_unit
 from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
 from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
-from .relaxation.curve_nodes import CurveSurface, curve_surface
-from .relaxation.elastic_energy import FEATURE_TENSION
-from .relaxation.noded_curve import NodedCurve
+from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
+from .relaxation.noded_curve import NodedCurve, is_simple, noded, traced_through
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import WARM
 from .request import Request, renumbered_request
@@ -136,14 +138,34 @@ class SurfaceDesigner:
         with subrange(0.0, STARTED):
             start = self._start_from_coarse(request)
             if start is None:
+                start = self._start_from_course(request)
+            if start is None:
                 start = self._start_from_network(request)
         with subrange(STARTED, 1.0):
             config = RelaxationConfig() if request.alignment is None else GUIDED
             return self._relaxed(request, start, config, max_iterations, started)
 
+    def _start_from_course(self, request: Request) -> _Start | None:
+        """The best course that is simple on the mesh; None if none is found."""
+        surface = self._surface
+        for course in itertools.islice(self._courses.courses(request), COURSES):
+            checkpoint()
+            controls = request.points[course.visited]
+            faces, barycentric = course.places.faces.copy(), course.places.barycentric.copy()
+            faces[course.control_nodes] = controls.faces
+            barycentric[course.control_nodes] = controls.barycentric
+            places = SurfacePoints(faces, strictly_inside(barycentric))
+            places.barycentric[course.control_nodes] = controls.barycentric
+            nodes = noded(surface, places, course.control_nodes, request.closed)
+            curve = traced_through(surface, nodes, nodes.nodes)
+            if curve is not None and is_simple(surface, curve):
+                there, unit = self._curve_surface(request), self._unit(request)
+                return _Start(curve, course.visited, there, unit)
+        return None
+
     def _start_from_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
-        there = self._copy
+        there = self._courses.copy
         with placed(there.in_original):
             found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
@@ -233,12 +255,8 @@ class SurfaceDesigner:
 
     def _curve_surface(self, request: Request) -> CurveSurface:
         """The surface for relaxation, with the maps of a request."""
-        if not request.has_maps:
-            return self._surface
-        unit = self._unit(request)
-        phi_fea = feature_map(self.mesh, request.obstacles, request.alignment, unit)
-        weight = FEATURE_TENSION / unit**2
-        return replace(self._surface, feature_map=phi_fea, feature_weight=weight)
+        obstacles, alignment = request.obstacles, request.alignment
+        return with_maps(self._surface, obstacles, alignment, self._unit(request))
 
     def _unit(self, request: Request) -> float:
         return component_unit(self.mesh, int(request.points.faces[0]))
@@ -248,8 +266,8 @@ class SurfaceDesigner:
         return curve_surface(self.mesh)
 
     @cached_property
-    def _copy(self) -> Renumbered:
-        return renumbered(self.mesh)
+    def _courses(self) -> CourseSurface:
+        return CourseSurface(self.mesh)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:

@@ -15,29 +15,16 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
-from scipy.spatial import cKDTree
 
 from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
 from ..geometry.numbering import frame_coordinates, uniform_hash
+from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..repair.degenerate_faces import flat_faces, with_areas
-
-CANDIDATES = 8
-"""Candidate vertices per seed."""
-
-PACKING = 0.84
-"""Least distance between two seeds, relative to the square root of the area per seed."""
-
-NORMAL_WEIGHT = 0.6
-"""Weight of the difference of two unit normals in the distance, in least distances of seeds.
-
-Opposite normals differ by 2, which counts as more than the least distance; so the two sides of a
-plate or of a thin limb get separate seeds.
-"""
 
 TIE_BREAK = 1e-6
 """Greatest change of an edge's length, relative to it, for each of its ends."""
@@ -147,7 +134,7 @@ def build_coarse_mesh(
     checkpoint()
     chance = uniform_hash(places)
     checkpoint()
-    seed = _seeds(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
+    seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
     graph = _edge_graph(mesh, chance)
     checkpoint()
     cell = _nearest_seeds(mesh.vertices, graph, seed, MARGIN * distance)
@@ -218,34 +205,3 @@ def _nearest_seeds(
         own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
         nearest[near[own]] = number[near[found[own]]]
     return nearest
-
-
-def _seeds(
-    mesh: Mesh,
-    normals: FloatArray,
-    areas: FloatArray,
-    chance: FloatArray,
-    n_candidates: int,
-    distance: float,
-) -> IntArray:
-    """Vertices at least a distance apart, ascending; ``chance`` is a number in (0, 1) for each."""
-    there = np.flatnonzero(areas > 0.0)
-    # The smallest exponential times: a sample weighted by area, without replacement.
-    times = -np.log(chance[there]) / areas[there]
-    checkpoint()
-    candidates = there[np.argsort(times)[:n_candidates]]
-    scaled = np.concatenate(
-        [mesh.vertices[candidates] / distance, NORMAL_WEIGHT * normals[candidates]], axis=1
-    )
-    checkpoint()
-    near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")
-    size = len(candidates)
-    graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))
-    graph = sparse.csr_array(graph + graph.T)
-    free = np.ones(size, dtype=bool)
-    chosen = []
-    for place in range(size):
-        if free[place]:
-            chosen.append(place)
-            free[graph.indices[graph.indptr[place] : graph.indptr[place + 1]]] = False
-    return np.sort(candidates[chosen])

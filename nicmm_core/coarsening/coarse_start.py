@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..courses.course_surface import CourseSurface
 from ..errors import NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
-from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import infer
-from ..progress import placed, subrange
+from ..progress import checkpoint, placed, subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
+from ..relaxation.noded_curve import NodedCurve, noded
 from ..request import Request, renumbered_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
-from .fine_curve import curve_on_fine_mesh
+from .fine_curve import curve_on_fine_mesh, nodes_on_fine_mesh
 
 CELLS = 4_000
 """Cells of the first coarse mesh: about the number of vertices of the training meshes."""
@@ -32,6 +35,9 @@ GROWTH = 4
 """Factor of the number of cells after a coarse mesh on which no curve was found."""
 
 
+COURSES = 16
+"""Most tries to map a course to the mesh itself, two for each course."""
+
 COARSE_SHARE = 0.3
 """Approximate share of the time to a first start that building the coarse mesh takes."""
 
@@ -42,24 +48,24 @@ class CoarseStart:
 
     Attributes
     ----------
-    curve : SurfaceCurve
+    curve : NodedCurve or SurfaceCurve
         Simple.
     visited : (k,) int array
         Indices of the control points in the order of the curve.
     breaking_vertices : int
-        Of the level set on the coarse mesh.
+        Of the level set on the coarse mesh, if there was one.
     """
 
-    curve: SurfaceCurve
+    curve: NodedCurve | SurfaceCurve
     visited: IntArray
-    breaking_vertices: int
+    breaking_vertices: int = 0
 
 
 @dataclass(frozen=True)
 class _CoarseSurface:
     coarse: CoarseMesh
     surface: CurveSurface
-    copy: Renumbered
+    courses: CourseSurface
 
 
 class CoarseStarts:
@@ -104,25 +110,43 @@ class CoarseStarts:
         return self._sizes[component]
 
     def _start_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
-        coarse = level.coarse
+        coarse, copy = level.coarse, level.courses.copy
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        with subrange(COARSE_SHARE, 0.9), placed(level.copy.in_original):
-            zeros = infer(level.copy.mesh, renumbered_request(level.copy, on_coarse)).zeros
-        if not zeros.is_simple_curve(level.copy.mesh, request.closed):
+        with subrange(COARSE_SHARE, 0.6):
+            for start in self._courses(level, on_coarse, request):
+                return start
+        with subrange(0.6, 0.9), placed(copy.in_original):
+            zeros = infer(copy.mesh, renumbered_request(copy, on_coarse)).zeros
+        if not zeros.is_simple_curve(copy.mesh, request.closed):
             return None
-        curve = level.copy.curve(zeros.curves[0])
+        curve = copy.curve(zeros.curves[0])
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
         result = curve_on_fine_mesh(
             self._fine, coarse, level.surface, curve, request.points[visited]
         )
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
+    def _courses(
+        self, level: _CoarseSurface, on_coarse: Request, request: Request
+    ) -> Iterator[CoarseStart]:
+        """The courses on a coarse mesh that are simple on the fine one, the best first."""
+        for course in itertools.islice(level.courses.courses(on_coarse), COURSES):
+            checkpoint()
+            curve = nodes_on_fine_mesh(
+                self._fine,
+                level.coarse,
+                noded(level.surface, course.places, course.control_nodes, request.closed),
+                request.points[course.visited],
+            )
+            if curve is not None:
+                yield CoarseStart(curve, course.visited)
+
     def _surface(self, component: int, count: int) -> _CoarseSurface:
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
             self._made[key] = _CoarseSurface(
-                coarse, curve_surface(coarse.mesh), renumbered(coarse.mesh)
+                coarse, curve_surface(coarse.mesh), CourseSurface(coarse.mesh)
             )
         return self._made[key]
 

@@ -31,6 +31,9 @@ Finer detail of the coarse curve comes from the coarse mesh and not from the sur
 are close together, traces between other nodes may avoid a crossing.
 """
 
+WIDENED = 3
+"""Rings of cells around two nodes in which a path between them is sought."""
+
 
 def curve_on_fine_mesh(
     surface: CurveSurface,
@@ -59,10 +62,21 @@ def curve_on_fine_mesh(
     for count in NODES:
         checkpoint()
         exact = noded_curve(coarse_surface, curve, count)
-        result = _through_nodes(surface, coarse, exact, controls)
-        if result is not None and is_simple(surface, result):
+        result = nodes_on_fine_mesh(surface, coarse, exact, controls)
+        if result is not None:
             return result.surface_curve(surface.mesh)
     return None
+
+
+def nodes_on_fine_mesh(
+    surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
+) -> NodedCurve | None:
+    """The curve on the fine mesh through the nodes of a coarse one; None if it is not simple.
+
+    Of the coarse curve only the nodes are used. Parameters are those of `curve_on_fine_mesh`.
+    """
+    result = _through_nodes(surface, coarse, exact, controls)
+    return result if result is not None and is_simple(surface, result) else None
 
 
 def _through_nodes(
@@ -82,10 +96,13 @@ def _through_nodes(
     for node in np.flatnonzero(lost).tolist():
         checkpoint()
         following = (node + 1) % len(cell)
-        around = coarse.cells_around(np.unique(cell[[node, following]]))
-        bridge = _path_along_edges(
-            fine, coarse.faces_of_cells(fine, around), nodes, node, following
-        )
+        around, bridge = np.unique(cell[[node, following]]), None
+        for _ in range(WIDENED):
+            around = coarse.cells_around(around)
+            inside = coarse.faces_of_cells(fine, around)
+            bridge = _path_along_edges(fine, inside, nodes, node, following)
+            if bridge is not None:
+                break
         if bridge is None:
             return None
         bridges[node] = bridge

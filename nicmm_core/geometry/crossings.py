@@ -36,8 +36,29 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     theirs = all_faces[polyline.faces[following]]
     end = weights_at(theirs, polyline.barycentric[following], all_faces[faces][:, :2])
 
-    order = np.argsort(faces, kind="stable")
-    count = np.unique(faces, return_counts=True)[1]
+    first, second = overlapping_segments(faces, start, end)
+    apart = np.abs(first - second)
+    neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
+    first, second = first[~neighbours], second[~neighbours]
+    meets = segments_meet(start, end, first, second)
+    inside = np.stack([first[meets], second[meets]], axis=1)
+    return np.concatenate([inside, _vertices_passed_twice(all_faces, polyline, n_segments)])
+
+
+def overlapping_segments(
+    group: IntArray, start: FloatArray, end: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Pairs of segments of the same group whose bounding boxes overlap.
+
+    Parameters
+    ----------
+    group : (s,) int array
+        The face of each segment.
+    start, end : (s, 2) float array
+        Barycentric coordinates in this face.
+    """
+    order = np.argsort(group, kind="stable")
+    count = np.unique(group, return_counts=True)[1]
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
     # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if
@@ -47,13 +68,15 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
         overlap = low[first, axis] <= high[second, axis]
         overlap &= low[second, axis] <= high[first, axis]
         first, second = first[overlap], second[overlap]
-    apart = np.abs(first - second)
-    neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
-    first, second = first[~neighbours], second[~neighbours]
+    return first, second
+
+
+def segments_meet(
+    start: FloatArray, end: FloatArray, first: IntArray, second: IntArray
+) -> BoolArray:
+    """Whether pairs of overlapping segments, (p,) each, have a common point."""
     a, b, c, d = start[first], end[first], start[second], end[second]
-    meets = _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
-    inside = np.stack([first[meets], second[meets]], axis=1)
-    return np.concatenate([inside, _vertices_passed_twice(all_faces, polyline, n_segments)])
+    return _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
 
 
 def _vertices_passed_twice(

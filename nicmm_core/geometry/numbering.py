@@ -78,12 +78,18 @@ class Renumbered:
         result[self.number] = values
         return result
 
+    def original_points(self, points: SurfacePoints) -> SurfacePoints:
+        """Points of the copy on the original."""
+        barycentric = np.empty_like(points.barycentric)
+        np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
+        return SurfacePoints(self.face[points.faces], barycentric)
+
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         """A curve on the copy as one on the original."""
-        barycentric = np.empty_like(curve.barycentric)
-        np.put_along_axis(barycentric, self.corner[curve.faces], curve.barycentric, axis=1)
-        faces = self.face[curve.faces]
-        return curve_on_mesh(self.original, curve.closed, faces, barycentric, curve.control_index)
+        there = self.original_points(SurfacePoints(curve.faces, curve.barycentric))
+        return curve_on_mesh(
+            self.original, curve.closed, there.faces, there.barycentric, curve.control_index
+        )
 
 
 def renumbered(mesh: Mesh) -> Renumbered:

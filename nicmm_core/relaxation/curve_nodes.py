@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, unoriented_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..level_set.features import vertex_normals
+from ..maps.guidance import feature_map
 from ..progress import checkpoint
+
+FEATURE_TENSION = 600.0
+"""τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
+
+It sets the smallest radius with which the curve bends to follow a map: about 1/√600, 4 % of that
+length. With the level set's ratio, 30, the curve would be too stiff for typical painted maps.
+"""
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,19 @@ def curve_surface(mesh: Mesh) -> CurveSurface:
     """The surface of a mesh, without a feature map."""
     normals = unsigned_normals(mesh)
     return CurveSurface(mesh, normals, folded=_folded_faces(mesh, normals))
+
+
+def with_maps(
+    surface: CurveSurface, obstacles: FloatArray | None, alignment: FloatArray | None, unit: float
+) -> CurveSurface:
+    """The surface with φ_fea of obstacles and alignment, (V,) each.
+
+    The unit is the square root of the area of the surface.
+    """
+    if obstacles is None and alignment is None:
+        return surface
+    phi_fea = feature_map(surface.mesh, obstacles, alignment, unit)
+    return replace(surface, feature_map=phi_fea, feature_weight=FEATURE_TENSION / unit**2)
 
 
 def unsigned_normals(mesh: Mesh) -> FloatArray:
@@ -109,19 +132,21 @@ def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray,
 
 @dataclass(frozen=True)
 class Nodes:
-    """Nodes of a curve on a surface.
+    """Nodes of a curve on a surface, or of several curves, which cost hardly more than one.
 
     Attributes
     ----------
     places : SurfacePoints
         n points.
     closed : bool
-        Whether the last node joins the first.
+        Whether the last node of a curve joins the first.
     positions : (n, 3) float array
     normals : (n, 3) float array
         Unit vectors.
     phi_fea : (n,) float array
         φ_fea.
+    curves : int
+        Number c of curves, each with n / c nodes in a row.
     """
 
     places: SurfacePoints
@@ -129,24 +154,64 @@ class Nodes:
     positions: FloatArray
     normals: FloatArray
     phi_fea: FloatArray
+    curves: int = 1
 
     @cached_property
     def steps(self) -> FloatArray:
         """Vectors from each node to the next, zero at the last of an open curve, (n, 3)."""
-        return _steps(self.positions, self.closed)
+        steps = self.after_each(self.positions.T).T - self.positions
+        if not self.closed:
+            steps[self.last] = 0.0
+        return steps
+
+    @cached_property
+    def step_lengths(self) -> FloatArray:
+        """Distance from each node to the next, zero at the last of an open curve, (n,)."""
+        steps = self.steps.T
+        return np.sqrt(dot(steps, steps))
 
     @cached_property
     def lengths(self) -> FloatArray:
-        """Lengths of the steps; (n,), or (n - 1,) of an open curve."""
-        steps = self.steps.T
-        lengths = np.sqrt(dot(steps, steps))
-        return lengths if self.closed else lengths[:-1]
+        """Lengths of the steps of one curve; (n,), or (n - 1,) of an open curve."""
+        return self.step_lengths if self.closed else self.step_lengths[:-1]
+
+    def by_curve(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values at nodes, (n,), by curve, (c, n / c)."""
+        return values.reshape(self.curves, -1)
+
+    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of the curves, (c,), at their nodes, (n,)."""
+        return np.repeat(values, len(self.positions) // self.curves)
+
+    @property
+    def first(self) -> IntArray:
+        """The first node of each curve, (c,)."""
+        return np.arange(0, len(self.positions), len(self.positions) // self.curves)
+
+    @property
+    def last(self) -> IntArray:
+        """The last node of each curve, (c,)."""
+        return self.first + len(self.positions) // self.curves - 1
+
+    def after_each(self, values: FloatArray) -> FloatArray:
+        """Values at the next node of the curve, (…, n)."""
+        result = np.empty_like(values)
+        result[..., :-1] = values[..., 1:]
+        result[..., self.last] = values[..., self.first]
+        return result
+
+    def before_each(self, values: FloatArray) -> FloatArray:
+        """Values at the previous node of the curve, (…, n)."""
+        result = np.empty_like(values)
+        result[..., 1:] = values[..., :-1]
+        result[..., self.first] = values[..., self.last]
+        return result
 
     @cached_property
     def conormals(self) -> FloatArray:
         """Unit vectors normal to the curve in the tangent planes, shape (n, 3)."""
         unit = _unit(self.steps)
-        return _unit(cross(self.normals.T, unit.T + before_each(unit.T)).T)
+        return _unit(cross(self.normals.T, unit.T + self.before_each(unit.T)).T)
 
     def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
         """Derivatives of normals, (n, 3), and φ_fea, (n,), by moves along conormals."""
@@ -172,7 +237,7 @@ class Nodes:
         return turn, drift
 
 
-def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool) -> Nodes:
+def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
     """Nodes with the normals and φ_fea that the energy needs."""
     weight = places.barycentric
     normals = _unit(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
@@ -180,7 +245,7 @@ def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool) -> Node
     if surface.feature_map is not None:
         corners = surface.mesh.faces[places.faces]
         phi_fea = (weight * surface.feature_map[corners]).sum(axis=1)
-    return Nodes(places, closed, places.positions(surface.mesh), normals, phi_fea)
+    return Nodes(places, closed, places.positions(surface.mesh), normals, phi_fea, curves)
 
 
 def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
@@ -190,26 +255,9 @@ def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
     return normals * np.where(against, -1.0, 1.0)[..., None]
 
 
-def _steps(positions: FloatArray, closed: bool) -> FloatArray:
-    steps = after_each(positions.T).T - positions
-    if not closed:
-        steps[-1] = 0.0
-    return steps
-
-
 def _unit(vectors: FloatArray) -> FloatArray:
     lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
     return vectors / np.maximum(lengths, tolerances.TINY)[:, None]
-
-
-def after_each(values: FloatArray) -> FloatArray:
-    """Values of the next node of the ring; nodes are the last axis."""
-    return np.concatenate([values[..., 1:], values[..., :1]], axis=-1)
-
-
-def before_each(values: FloatArray) -> FloatArray:
-    """Values of the previous node of the ring; nodes are the last axis."""
-    return np.concatenate([values[..., -1:], values[..., :-1]], axis=-1)
 
 
 def dot(one: FloatArray, other: FloatArray) -> FloatArray:

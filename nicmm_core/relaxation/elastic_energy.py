@@ -26,15 +26,8 @@ from scipy.sparse.linalg import splu
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from .curve_nodes import CurveSurface, Nodes, after_each, before_each, cross, dot
-from .strand_contact import contacts_between
-
-FEATURE_TENSION = 600.0
-"""τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
-
-It sets the smallest radius with which the curve bends to follow a map: about 1/√600, 4 % of that
-length. With the level set's ratio, 30, the curve would be too stiff for typical painted maps.
-"""
+from .curve_nodes import CurveSurface, Nodes, cross, dot
+from .strand_contact import Contacts, contacts_between
 
 OVER_TENSION = 4.0
 """Multiple of τ added to τ_fea, so that short curves follow a map too.
@@ -52,21 +45,23 @@ CONTACT = 10.0
 class Balance:
     """Weights of the terms, which change from step to step but not within one.
 
+    One number, or one at each node, (n,), of several curves.
+
     Attributes
     ----------
-    tension : float
+    tension : float or (n,) float array
         τ, in 1/length².
-    contact : float
+    contact : float or (n,) float array
         Weight of a node's contact, in 1/length; 0 where strands may cross.
-    feature : float
+    feature : float or (n,) float array
         τ_fea, in 1/length²; 0 without a map.
     held : (n,) float array or None
         ds at each node, constant in the terms of lanes; None without a map.
     """
 
-    tension: float
-    contact: float
-    feature: float = 0.0
+    tension: float | FloatArray
+    contact: float | FloatArray
+    feature: float | FloatArray = 0.0
     held: FloatArray | None = None
 
 
@@ -86,42 +81,87 @@ def balance(
     taut : float
         Factor of the tension alone.
     """
-    tension = float((2.0 * np.pi / nodes.lengths.sum()) ** 2) / smoothness
+    lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
+    tension = _weight(nodes, (2.0 * np.pi / lengths) ** 2 / smoothness)
     weights = Balance(taut * tension, 0.0)
     if surface.feature_map is not None:
         feature = surface.feature_weight / smoothness + OVER_TENSION * tension
         weights = replace(weights, feature=feature, held=_ds(nodes))
     if not apart:
         return weights
-    return replace(weights, contact=CONTACT * elastic_energy(nodes, weights) / len(nodes.positions))
+    size = len(nodes.positions) // nodes.curves
+    contact = _weight(nodes, CONTACT * curve_energies(nodes, weights) / size)
+    return replace(weights, contact=contact)
+
+
+def _weight(nodes: Nodes, values: FloatArray) -> float | FloatArray:
+    """Values of the curves, (c,), as a weight."""
+    return float(values[0]) if nodes.curves == 1 else nodes.spread(values)
 
 
 def bending_energy(nodes: Nodes) -> float:
-    """∮ κ_g² ds, in 1/length."""
-    return float(_bending(nodes).sum())
+    """∮ κ_g² ds of one curve, in 1/length."""
+    return float(curve_bending(nodes)[0])
+
+
+def curve_bending(nodes: Nodes) -> FloatArray:
+    """∮ κ_g² ds of each curve, (c,), in 1/length."""
+    return nodes.by_curve(_bending(nodes)).sum(axis=1)
 
 
 def feature_energy(nodes: Nodes) -> float:
-    """∮ φ_fea² ds, in units of length."""
+    """∮ φ_fea² ds of one curve, in units of length."""
     return float((nodes.phi_fea**2 * _ds(nodes)).sum())
 
 
 def elastic_energy(nodes: Nodes, weights: Balance) -> float:
-    """E, with the contact term if it has a weight."""
-    energy = float(_bending(nodes).sum() + (_tension(nodes, weights) * _ds(nodes)).sum())
-    if weights.held is not None:
-        lane = np.minimum(nodes.phi_fea, 1.0)
-        energy += weights.feature * float(lane**2 @ weights.held)
-    if weights.contact:
-        energy += 2.0 * weights.contact * float((contacts_between(nodes).overlap ** 2).sum())
+    """E of one curve, with the contact term if it has a weight."""
+    return float(curve_energies(nodes, weights)[0])
+
+
+def comparable_energies(
+    surface: CurveSurface, nodes: Nodes, smoothness: float, scale: float
+) -> FloatArray:
+    """E with one length scale L₀ for all curves, (c,), so that different courses can be compared.
+
+        E = L₀ ∮ κ_g² ds + 4π² L / (s L₀) + L₀ τ_fea (∮ max(φ_fea² - 1, 0) ds + L₀ a),
+
+    with the smoothness s and the mean a of min(φ_fea² - 1, 0) along the curve. For a circle in the
+    plane of length L₀ both first terms are 4π². With a length scale of its own for each curve, a
+    long way round would cost nothing; with the length of the curve before a, turning back and forth
+    in a lane would pay.
+    """
+    length = nodes.by_curve(nodes.step_lengths).sum(axis=1)
+    tension = (2.0 * np.pi / scale) ** 2 / smoothness
+    energy = scale * (curve_bending(nodes) + tension * length)
+    if surface.feature_map is not None:
+        weight = surface.feature_weight / smoothness + OVER_TENSION * tension
+        excess, ds = nodes.phi_fea**2 - 1.0, _ds(nodes)
+        outside = nodes.by_curve(np.maximum(excess, 0.0) * ds).sum(axis=1)
+        inside = nodes.by_curve(np.minimum(excess, 0.0) * ds).sum(axis=1) / length
+        energy += scale * weight * (outside + scale * inside)
     return energy
+
+
+def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> FloatArray:
+    """E of each curve, (c,), with the contact term if it has a weight.
+
+    Contacts may be given where they are known.
+    """
+    at_nodes = _bending(nodes) + _tension(nodes, weights) * _ds(nodes)
+    if weights.held is not None:
+        at_nodes += weights.feature * np.minimum(nodes.phi_fea, 1.0) ** 2 * weights.held
+    if np.any(weights.contact):
+        contacts = contacts or contacts_between(nodes)
+        overlap = np.bincount(contacts.pairs[:, 0], contacts.overlap**2, len(at_nodes))
+        at_nodes += 2.0 * weights.contact * overlap
+    return nodes.by_curve(at_nodes).sum(axis=1)
 
 
 def _ds(nodes: Nodes) -> FloatArray:
     """ds: half the length of both steps at each node, (n,)."""
-    after = nodes.steps.T
-    lengths = np.sqrt(dot(after, after))
-    return np.maximum(0.5 * (lengths + before_each(lengths)), tolerances.TINY)
+    lengths = nodes.step_lengths
+    return np.maximum(0.5 * (lengths + nodes.before_each(lengths)), tolerances.TINY)
 
 
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
@@ -132,14 +172,14 @@ def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
 def _bending(nodes: Nodes) -> FloatArray:
     """κ_g² ds at each node, (n,); an open curve does not bend at its ends."""
     after = nodes.steps.T
-    before = before_each(after)
+    before = nodes.before_each(after)
     normals = nodes.normals.T
     out_before, out_after = dot(before, normals), dot(after, normals)
     turning = np.arctan2(
         dot(cross(before, after), normals), dot(before, after) - out_before * out_after
     )
     if not nodes.closed:
-        turning[[0, -1]] = 0.0
+        turning[nodes.first] = turning[nodes.last] = 0.0
     return turning**2 / _ds(nodes)
 
 
@@ -168,12 +208,15 @@ class ElasticSystem:
         Nodes in contact.
     pair_entries : (3, p) float array
         What contact adds to entries (i, i), (i, j) and (j, j) of the matrix.
+    curves : int
+        Number c of curves; the cyclic indices are modulo n / c within each.
     """
 
     bands: FloatArray
     slope: FloatArray
     pairs: IntArray = field(default_factory=_no_pairs)
     pair_entries: FloatArray = field(default_factory=_no_entries)
+    curves: int = 1
 
     @property
     def diagonal(self) -> FloatArray:
@@ -182,37 +225,49 @@ class ElasticSystem:
         return self.bands[0] + np.bincount(self.pairs.T.ravel(), added, len(self.slope))
 
 
-def elastic_system(surface: CurveSurface, nodes: Nodes, weights: Balance) -> ElasticSystem:
-    """The Gauss–Newton system of the square roots of the integrands and of contact."""
+def elastic_system(
+    surface: CurveSurface, nodes: Nodes, weights: Balance, contacts: Contacts | None = None
+) -> ElasticSystem:
+    """The Gauss–Newton system of the square roots of the integrands and of contact.
+
+    Contacts may be given where they are known.
+    """
     n = len(nodes.positions)
     tension = _tension(nodes, weights)
     bending, stretch, bending_by, stretch_by, drift = _linearised(surface, nodes, weights, tension)
-    bands = _squared(bending_by) + _squared(stretch_by)
-    slope = _transposed(bending_by, bending) + _transposed(stretch_by, stretch)
+    bands = _squared(nodes, bending_by) + _squared(nodes, stretch_by)
+    slope = _transposed(nodes, bending_by, bending) + _transposed(nodes, stretch_by, stretch)
     if weights.held is not None:
         pull = np.where(nodes.phi_fea < 1.0, weights.feature * weights.held * drift, 0.0)
         bands[0] += pull * drift
         slope += pull * nodes.phi_fea
     # The residuals lack part of the second derivative of the length: the stiffness of a string.
-    stiffness = np.zeros(n)
-    count = len(nodes.lengths)
-    stiffness[:count] = tension[:count] / np.maximum(nodes.lengths, tolerances.TINY)
-    bands[0] += stiffness + before_each(stiffness)
+    lengths = np.maximum(nodes.step_lengths, tolerances.TINY)
+    if not nodes.closed:
+        lengths[nodes.last] = np.inf
+    stiffness = tension / lengths
+    bands[0] += stiffness + nodes.before_each(stiffness)
     # On an unoriented surface, moves of neighbours to one side may have opposite signs.
-    opposite = dot(nodes.normals.T, after_each(nodes.normals.T)) < 0.0
+    opposite = dot(nodes.normals.T, nodes.after_each(nodes.normals.T)) < 0.0
     bands[1] -= np.where(opposite, -stiffness, stiffness)
-    if not weights.contact:
-        return ElasticSystem(bands, slope)
-    contact = contacts_between(nodes)
-    weight = 2.0 * weights.contact  # a pair counts for both of its nodes
-    pull = weight * contact.overlap[:, None] * contact.derivatives
+    if not np.any(weights.contact):
+        return ElasticSystem(bands, slope, curves=nodes.curves)
+    contact = contacts or contacts_between(nodes)
+    # A pair counts for both of its nodes.
+    weight = np.broadcast_to(2.0 * np.asarray(weights.contact), n)[contact.pairs[:, 0]]
+    pull = (weight * contact.overlap)[:, None] * contact.derivatives
     slope += np.bincount(contact.pairs.ravel(), pull.ravel(), n)
     one, other = contact.derivatives.T
+    if nodes.curves > 1:
+        # Bands are far faster, and 2 (a² + b²) is never less than (a + b)².
+        own = 2.0 * weight[:, None] * contact.derivatives**2
+        bands[0] += np.bincount(contact.pairs.ravel(), own.ravel(), n)
+        return ElasticSystem(bands, slope, curves=nodes.curves)
     entries = weight * np.stack([one * one, one * other, other * other])
-    return ElasticSystem(bands, slope, contact.pairs, entries)
+    return ElasticSystem(bands, slope, contact.pairs, entries, nodes.curves)
 
 
-def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> FloatArray:
+def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatArray) -> FloatArray:
     """Moves of the free nodes along conormals that lower the linearised energy, shape (n,).
 
     Parameters
@@ -220,19 +275,20 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> Float
     system : ElasticSystem
     free : (n,) bool array
         At least one node.
-    damping : float
-        Added to the diagonal, relative to the greatest entry of a free node.
+    damping : float or (c,) float array
+        Of each curve. Added to its diagonal, relative to the greatest entry of a free node.
     """
-    bands = np.where(
-        np.stack([free, free & np.roll(free, -1), free & np.roll(free, -2)]), system.bands, 0.0
-    )
-    bands[0] += np.where(free, damping * system.diagonal[free].max(), 1.0)
+    may = free.reshape(system.curves, -1)
+    both = [may & np.roll(may, -offset, axis=1) for offset in range(3)]
+    bands = np.where(np.reshape(both, system.bands.shape), system.bands, 0.0)
+    greatest = np.where(free, system.diagonal, 0.0).reshape(may.shape).max(axis=1)
+    bands[0] += np.where(may, (damping * greatest)[:, None], 1.0).ravel()
     right = np.where(free, -system.slope, 0.0)
     if not len(system.pairs):
-        return _solved(bands, right)
+        return _solved(bands, right, system.curves)
     one, other = system.pairs.T
-    both = np.stack([free[one], free[one] & free[other], free[other]])
-    return _solved_with_pairs(bands, system.pairs, np.where(both, system.pair_entries, 0.0), right)
+    ends = np.stack([free[one], free[one] & free[other], free[other]])
+    return _solved_with_pairs(bands, system.pairs, np.where(ends, system.pair_entries, 0.0), right)
 
 
 def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
@@ -260,12 +316,13 @@ def _linearised(
     normal_turn, drift = nodes.conormal_derivatives(surface)
     turn, normal = normal_turn.T, nodes.normals.T
     after = nodes.steps.T
-    before = before_each(after)
+    before = nodes.before_each(after)
     # Derivatives of the steps before and after by the moves of their two ends.
-    before_by, after_by = np.stack([-before_each(here), here]), np.stack([-here, after_each(here)])
+    before_by = np.stack([-nodes.before_each(here), here])
+    after_by = np.stack([-here, nodes.after_each(here)])
     if not nodes.closed:
-        before_by[:, :, 0] = 0.0
-        after_by[:, :, -1] = 0.0
+        before_by[:, :, nodes.first] = 0.0
+        after_by[:, :, nodes.last] = 0.0
     out_before, out_after = dot(before, normal), dot(after, normal)
     flat_before, flat_after = before - out_before * normal, after - out_after * normal
     squared_before = np.maximum(dot(flat_before, flat_before), tolerances.TINY)
@@ -286,8 +343,8 @@ def _linearised(
         ]
     )
     if not nodes.closed:
-        turning[[0, -1]] = 0.0
-        turning_by[:, [0, -1]] = 0.0
+        turning[nodes.first] = turning[nodes.last] = 0.0
+        turning_by[:, nodes.first] = turning_by[:, nodes.last] = 0.0
     length_before, length_after = np.sqrt(dot(before, before)), np.sqrt(dot(after, after))
     along_before = before / np.maximum(length_before, tolerances.TINY)
     along_after = after / np.maximum(length_after, tolerances.TINY)
@@ -308,20 +365,23 @@ def _linearised(
     return bending, pulled * root, bending_by, stretch_by, drift
 
 
-def _solved(bands: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve a positive definite cyclic banded system."""
-    n = len(right)
+def _solved(bands: FloatArray, right: FloatArray, curves: int) -> FloatArray:
+    """Solve a positive definite cyclic banded system of each of some curves."""
+    n = len(right) // curves
     # In the order 0, n-1, 1, n-2, …, entries coupled by the bands are at most four places apart.
     place = np.empty(n, dtype=np.int64)
     place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
     place[(n + 1) // 2 :] = 2 * np.arange(n // 2)[::-1] + 1
-    folded = np.zeros((5, n))
+    folded = np.zeros((5, n, curves))
     for offset in range(3):
         here, there = place, np.roll(place, -offset)
-        np.add.at(folded, (np.abs(here - there), np.minimum(here, there)), bands[offset])
-    in_order = np.empty(n)
-    in_order[place] = right
-    return linalg.solveh_banded(folded, in_order, lower=True, check_finite=False)[place]
+        entries = bands[offset].reshape(curves, n).T
+        np.add.at(folded, (np.abs(here - there), np.minimum(here, there)), entries)
+    in_order = np.empty((curves, n))
+    in_order[:, place] = right.reshape(curves, n)
+    matrix = folded.transpose(0, 2, 1).reshape(5, -1)
+    solved = linalg.solveh_banded(matrix, in_order.ravel(), lower=True, check_finite=False)
+    return solved.reshape(curves, n)[:, place].ravel()
 
 
 def _solved_with_pairs(
@@ -341,22 +401,22 @@ def _solved_with_pairs(
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", options=symmetric).solve(right)
 
 
-def _squared(jacobian: FloatArray) -> FloatArray:
+def _squared(nodes: Nodes, jacobian: FloatArray) -> FloatArray:
     """Bands of JᵀJ, shape (3, n)."""
     left, middle, right = jacobian
     return np.stack(
         [
-            before_each(right**2) + middle**2 + after_each(left**2),
-            middle * right + after_each(left * middle),
-            after_each(left * right),
+            nodes.before_each(right**2) + middle**2 + nodes.after_each(left**2),
+            middle * right + nodes.after_each(left * middle),
+            nodes.after_each(left * right),
         ]
     )
 
 
-def _transposed(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
+def _transposed(nodes: Nodes, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
     """Jᵀ r, shape (n,)."""
     left, middle, right = jacobian * residual
-    return after_each(left) + middle + before_each(right)
+    return nodes.after_each(left) + middle + nodes.before_each(right)
 
 
 def _product(system: ElasticSystem, move: FloatArray) -> FloatArray:

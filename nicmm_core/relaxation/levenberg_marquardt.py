@@ -16,12 +16,14 @@ from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
     Balance,
     ElasticSystem,
+    curve_energies,
     damped_step,
     elastic_energy,
     elastic_system,
     predicted_fall,
 )
 from .noded_curve import moved_along_conormals
+from .strand_contact import contacts_between
 
 DAMPING_NODES = 128
 """Number of nodes for which the damping is given."""
@@ -123,8 +125,9 @@ class Moved:
 
 def linearised(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Linearised:
     """The energy of nodes, and its linearisation about them."""
-    energy = elastic_energy(nodes, weights)
-    return Linearised(nodes, energy, elastic_system(surface, nodes, weights))
+    contacts = contacts_between(nodes) if weights.contact else None
+    energy = float(curve_energies(nodes, weights, contacts)[0])
+    return Linearised(nodes, energy, elastic_system(surface, nodes, weights, contacts))
 
 
 def take_steps(

@@ -113,6 +113,14 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
     return _with_nodes(surface, polyline, control_place, count, curve.closed)
 
 
+def noded(
+    surface: CurveSurface, places: SurfacePoints, control_nodes: IntArray, closed: bool
+) -> NodedCurve:
+    """A curve of nodes alone, before any trace between them."""
+    nodes = nodes_at(surface, places, closed)
+    return NodedCurve(nodes, control_nodes, places, np.arange(len(places)))
+
+
 def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
     """A new number of equally spaced nodes on the same polyline."""
     at_controls = curve.node_place[curve.control_nodes]
@@ -200,7 +208,8 @@ def shifted(
     faces[going], barycentric[going] = targets.faces, targets.barycentric
     blocked = np.zeros(len(length), dtype=bool)
     blocked[going] = stuck
-    return nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed), blocked, passed
+    moved = nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed, nodes.curves)
+    return moved, blocked, passed
 
 
 def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:

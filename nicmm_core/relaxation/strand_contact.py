@@ -41,19 +41,29 @@ class Contacts:
 
 
 def contacts_between(nodes: Nodes) -> Contacts:
-    """Pairs of nodes of different strands that are closer than the clearance."""
-    clearance = CLEARANCE * float(nodes.lengths.mean())
-    pairs = cKDTree(nodes.positions).query_pairs(clearance, output_type="ndarray")
-    arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])
+    """Pairs of nodes of different strands of a curve that are closer than the clearance."""
+    lengths = nodes.by_curve(nodes.step_lengths)
+    total = lengths.sum(axis=1)
+    steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
+    clearance = nodes.spread(CLEARANCE * np.maximum(total / steps, tolerances.TINY))
+    places = nodes.positions / clearance[:, None]
+    if nodes.curves > 1:
+        # Another dimension keeps curves apart.
+        curve = nodes.spread(2.0 * np.arange(nodes.curves))
+        places = np.concatenate([places, curve[:, None]], axis=1)
+    pairs = cKDTree(places).query_pairs(1.0, output_type="ndarray")
+    arc = (np.cumsum(lengths, axis=1) - lengths).ravel()
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
-        along = np.minimum(along, arc[-1] - along)
-    pairs = pairs[along > ALONG * clearance]
+        along = np.minimum(along, nodes.spread(total)[pairs[:, 0]] - along)
+    pairs = pairs[along > ALONG * clearance[pairs[:, 0]]]
+    clearance = clearance[pairs[:, 0]]
     normals, positions = nodes.normals[pairs], nodes.positions[pairs]
     offset = positions[:, 0] - positions[:, 1]
     distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
     direction = offset / distance[:, None]
     kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
     pairs, distance, direction = pairs[kept], distance[kept], direction[kept]
+    clearance = clearance[kept]
     approach = np.einsum("pd,pkd->pk", direction, nodes.conormals[pairs]) * [-1.0, 1.0]
-    return Contacts(pairs, 1.0 - distance / clearance, approach / clearance)
+    return Contacts(pairs, 1.0 - distance / clearance, approach / clearance[:, None])

@@ -5,6 +5,7 @@ from hypothesis import HealthCheck, settings
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.courses import course_surface
 
 pytest.register_assert_rewrite("tests.core.checks")
 
@@ -53,3 +54,9 @@ def body():
 def surface(request) -> nicmm.Mesh:
     """Each of the surfaces above in turn."""
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def without_courses(monkeypatch):
+    """Curves start from the network's level set, as where no course is found."""
+    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: None)

@@ -20,15 +20,21 @@ STAGES = {
         LARGE,
         [7, 2000, 5000, 9000],
         {"closed": False},
-        "mesh nonmanifold coarse_mesh coarse_start leg_search leg_graph virtual_splits "
-        "band_refinement sign_bundle sparse_solver smoothing topology forward_pass contour "
-        "fine_curve relaxing tracing noded_curve",
+        "mesh nonmanifold coarse_mesh coarse_start hop_graph leg_combinations course_search "
+        "relaxing_together fine_curve relaxing tracing noded_curve",
     ),
     "fins and an obstacle": (
         MESHES["fins"],
         [3, 100, 400, 500],
         {"order": "shortest", "clearance": 0.05},
         "nonmanifold mapped_mesh redistancing visiting_order",
+    ),
+    "paper": (
+        shapes.sphere(2),
+        [3, 50, 90, 140],
+        {"closed": False, "method": "nicmm-paper"},
+        "leg_search leg_graph virtual_splits band_refinement sign_bundle sparse_solver smoothing "
+        "finetuning",
     ),
     "variational": (
         shapes.sphere(3),

@@ -39,14 +39,16 @@ def chosen_on(mesh, count, seed=0):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
-def test_curve_is_valid_and_factorises_only_the_coarse_mesh(large, unknowns, closed):
+def test_curve_is_valid_and_factorises_only_the_coarse_mesh(
+    large, unknowns, without_courses, closed
+):
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
     assert max(unknowns) < 1.5 * coarse_start.CELLS
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns):
+def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns, without_courses):
     square = grid(63)
     inner = np.flatnonzero((np.abs(square.vertices[:, :2] - 0.5) < 0.3).all(axis=1))
     points = np.random.default_rng(seed).choice(inner, size=4, replace=False)

@@ -12,13 +12,13 @@ from nicmm_core.geometry.crossings import crossing_segments
 from nicmm_core.geometry.curve import geodesic_curvature, resample
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation import levenberg_marquardt
-from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
-from nicmm_core.relaxation.elastic_energy import (
+from nicmm_core.relaxation.curve_nodes import (
     FEATURE_TENSION,
-    OVER_TENSION,
-    bending_energy,
-    feature_energy,
+    CurveSurface,
+    nodes_at,
+    unsigned_normals,
 )
+from nicmm_core.relaxation.elastic_energy import OVER_TENSION, bending_energy, feature_energy
 from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from nicmm_core.status import Status
 from tests.core.checks import (

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import shapes
 from nicmm_core.level_set.redistancing import build_distance_surface, spread
+from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import assert_valid_design
 from tests.oracles.named_curves import nearest_vertices
 
@@ -110,26 +111,26 @@ def test_clearance_keeps_the_curve_away():
 
 @pytest.mark.slow
 def test_dragging_beside_an_obstacle_goes_on_from_the_last_curve(monkeypatch):
-    inferences = []
-    infer = surface_designer.infer
+    from_nothing = []
+    designed = SurfaceDesigner._designed
     monkeypatch.setattr(
-        surface_designer, "infer", lambda *given: inferences.append(1) or infer(*given)
+        SurfaceDesigner, "_designed", lambda *given: from_nothing.append(1) or designed(*given)
     )
     ball = shapes.sphere(4)
     chosen = nearest_vertices(ball, [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     weights = disc_on(ball, nicmm.design_curve(ball, chosen).curves[0], 0.2)
-    inferences.clear()
+    from_nothing.clear()
     designer = nicmm.Designer(ball)
     first = designer.design(chosen, obstacles=weights)
     again = designer.design(chosen, obstacles=weights)
     assert np.array_equal(first.curves[0].points, again.curves[0].points)
     around = ball.faces[ball.faces_at(chosen[:1])].ravel()
     chosen[0] = next(vertex for vertex in around if vertex not in chosen)
-    inferences.clear()
+    from_nothing.clear()
     moved = designer.design(chosen, obstacles=weights, start=first)
     assert_valid_design(ball, moved)
     assert length_inside(ball, moved.curves[0], weights) == 0.0
-    assert not inferences
+    assert not from_nothing
 
 
 def test_distances_are_along_what_is_left():

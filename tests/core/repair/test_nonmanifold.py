@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import shapes
 from nicmm_core.geometry import tolerances
 from nicmm_core.geometry.mesh import unique_edges
 from nicmm_core.geometry.surface_points import locate_points
 from nicmm_core.path.leg_graph import nonmanifold_vertices
 from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
+from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import grid, joined
 from tests.oracles import corpus
 from tests.oracles.checker import judge
@@ -132,10 +133,10 @@ def triangle_heights(corners):
 
 def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     mesh = MESHES["caps"]
-    inferences = []
-    infer = surface_designer.infer
+    from_nothing = []
+    designed = SurfaceDesigner._designed
     monkeypatch.setattr(
-        surface_designer, "infer", lambda *given: inferences.append(1) or infer(*given)
+        SurfaceDesigner, "_designed", lambda *given: from_nothing.append(1) or designed(*given)
     )
     before = mesh.vertices.copy(), mesh.faces.copy()
     designer = nicmm.Designer(mesh)
@@ -147,7 +148,7 @@ def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
         assert design.field.shape == (len(mesh.vertices),)
         assert np.isfinite(design.field).all()
         np.testing.assert_allclose(design.field[points], 0.0, atol=1e-2 * mesh.mean_edge_length)
-    assert len(inferences) == 1
+    assert len(from_nothing) == 1
     np.testing.assert_array_equal(mesh.vertices, before[0])
     np.testing.assert_array_equal(mesh.faces, before[1])
 

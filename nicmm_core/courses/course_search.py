@@ -1,0 +1,150 @@
+"""The search for the course of a curve: candidates from the hop graph, relaxed together, compared.
+
+Courses are compared by the energy that relaxation minimises, with one length scale for all of them
+(`elastic_energy.comparable_energies`): the least length among them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
+from ..path.leg_search import length_factor
+from ..progress import checkpoint, subrange
+from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
+from ..relaxation.elastic_energy import comparable_energies
+from ..relaxation.node_traces import simple_curves, with_midpoints
+from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
+from .hop_graph import HopGraph, with_control_points
+from .leg_combinations import combined, course_nodes, crossing_routes, different, laid_routes
+from .leg_routes import routes_of_legs
+
+TENSION = 4.0
+"""τ of the graph relative to (2π / L)², where L is the length of the shortest path. Hops overrate
+bending, since they turn at cells only."""
+
+CANDIDATES, FINALISTS = 16, 5
+"""Courses relaxed with few nodes, and those of them relaxed with twice as many."""
+
+CROSSING = 10.0
+"""Factor of the energy of a course that crosses itself, which may yet be simple on the mesh."""
+
+APART = 0.02
+"""Greatest distance of two courses that count as the same, relative to the diagonal."""
+
+MOST_LEGS = 60
+"""Number of legs above which no courses are sought: hardly any combination is simple then."""
+
+FIRST = TogetherConfig(iterations=12)
+SECOND = TogetherConfig(iterations=8)
+
+
+@dataclass(frozen=True)
+class Courses:
+    """Relaxed courses, the best first.
+
+    Attributes
+    ----------
+    nodes : Nodes
+        On c curves.
+    control : (n,) bool array
+        Which nodes are control points.
+    energy : (c,) float array
+        `comparable_energies`; courses that cross themselves come later.
+    """
+
+    nodes: Nodes
+    control: BoolArray
+    energy: FloatArray
+
+    def course(self, number: int) -> tuple[Nodes, BoolArray]:
+        """Nodes of one course, and which of them are control points."""
+        which = np.array([number])
+        return curves_of(self.nodes, which), self.nodes.by_curve(self.control)[number]
+
+
+def find_courses(
+    graph: HopGraph,
+    surface: CurveSurface,
+    points: SurfacePoints,
+    fixed: BoolArray,
+    closed: bool,
+    smoothness: float,
+) -> Courses | None:
+    """Simple courses through points in their order; None if there are no candidates.
+
+    Parameters
+    ----------
+    graph : HopGraph
+        Of the surface without maps.
+    surface : CurveSurface
+        With the maps of the request.
+    points : SurfacePoints
+        k points in the order visited.
+    fixed : (k,) bool array
+        The control points among them; curves pass the others only at the start.
+    closed : bool
+    smoothness : float
+    """
+    count = len(points) if closed else len(points) - 1
+    if count > MOST_LEGS:
+        return None
+    ends = np.arange(count)
+    legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
+    factor = None if surface.feature_map is None else length_factor(surface.feature_map)
+    tension = TENSION * 4.0 * np.pi**2 / smoothness
+    courses = with_control_points(graph, points, legs, factor, tension)
+    checkpoint()
+    routes = routes_of_legs(courses, legs, closed)
+    if not routes or not all(len(leg.cells) for leg in routes):
+        return None
+    with subrange(0.2, 0.3):
+        on_routes = laid_routes(courses, routes, smoothness)
+    crosses = crossing_routes(courses, routes, on_routes)
+    combinations = combined(courses, routes, crosses, closed)
+    choice = different(routes, combinations, CANDIDATES)
+    if not len(choice):
+        return None
+    nodes, at_points = course_nodes(courses, routes, on_routes, choice, closed)
+    control = at_points.copy()
+    control[at_points] = np.tile(fixed, len(choice))
+    nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
+    with subrange(0.4, 0.7):
+        nodes = relax_together(surface, nodes, control, smoothness, FIRST)
+    best = _best(surface, nodes, smoothness)[:FINALISTS]
+    nodes, control = curves_of(nodes, best), nodes.by_curve(control)[best].ravel()
+    nodes, control = with_midpoints(surface, nodes, control)
+    with subrange(0.7, 1.0):
+        nodes = relax_together(surface, nodes, control, smoothness, SECOND)
+    best = _best(surface, nodes, smoothness)
+    energy = _energies(surface, nodes, smoothness)[best]
+    return Courses(curves_of(nodes, best), nodes.by_curve(control)[best].ravel(), energy)
+
+
+def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:
+    """E of each course, (c,), with the least length among them as the scale."""
+    shortest = float(nodes.by_curve(nodes.step_lengths).sum(axis=1).min())
+    return comparable_energies(surface, nodes, smoothness, shortest)
+
+
+def _best(surface: CurveSurface, nodes: Nodes, smoothness: float) -> IntArray:
+    """Courses that differ, simple ones first, then by energy."""
+    energy = _energies(surface, nodes, smoothness)
+    simple = simple_curves(surface, nodes)
+    order = np.argsort(np.where(simple, energy, CROSSING * energy), kind="stable")
+    positions = nodes.positions.reshape(nodes.curves, -1, 3)
+    chosen: list[int] = []
+    for number in order.tolist():
+        away = [_farthest(positions[number], positions[other]) for other in chosen]
+        if min(away, default=np.inf) > APART * surface.mesh.diagonal:
+            chosen.append(number)
+    return np.array(chosen)
+
+
+def _farthest(one: FloatArray, other: FloatArray) -> float:
+    """Greatest distance of a point of either set to the other set."""
+    return float(max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()))

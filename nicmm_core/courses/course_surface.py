@@ -1,0 +1,137 @@
+"""The surface on which courses are sought: a copy of a mesh, refined where vertices are few.
+
+The copy follows from the surface alone (`geometry.numbering`), so its courses do too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..geometry import tolerances
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.numbering import Renumbered, renumbered
+from ..geometry.refinement import Refined, refined
+from ..geometry.surface_points import SurfacePoints
+from ..maps.guidance import component_unit
+from ..path.initial_loop import visiting_order
+from ..path.via_points import with_via_points
+from ..relaxation.curve_nodes import CurveSurface, curve_surface, unsigned_normals, with_maps
+from ..relaxation.node_traces import with_midpoints
+from ..request import Request, renumbered_request
+from .course_search import find_courses
+from .hop_graph import HopGraph, build_hop_graph
+
+FEWEST_VERTICES = 1_000
+"""Number of vertices below which the mesh is refined."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """A relaxed course on the mesh, by its nodes.
+
+    Attributes
+    ----------
+    places : SurfacePoints
+        n nodes.
+    control_nodes : (k,) int array
+        Indices of the control points among them.
+    visited : (k,) int array
+        Indices of the control points in the request.
+    """
+
+    places: SurfacePoints
+    control_nodes: IntArray
+    visited: IntArray
+
+
+class CourseSurface:
+    """Seeks courses on one mesh; what depends on the mesh alone is computed once.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._graphs: dict[int, HopGraph] = {}
+
+    @cached_property
+    def copy(self) -> Renumbered:
+        """The copy that its surface decides."""
+        return renumbered(self._mesh)
+
+    @cached_property
+    def _refined(self) -> Refined:
+        times, count = 0, np.count_nonzero(np.bincount(self.copy.mesh.faces.ravel()))
+        while count * 4**times < FEWEST_VERTICES:
+            times += 1
+        return refined(self.copy.mesh, times)
+
+    @cached_property
+    def _surface(self) -> CurveSurface:
+        mesh = self._refined.mesh
+        if len(mesh.faces) == len(self.copy.mesh.faces):
+            return curve_surface(self.copy.mesh)
+        normals = self._refined.interpolation @ unsigned_normals(self.copy.mesh)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        own = curve_surface(mesh)
+        # Normals with opposite signs may cancel.
+        sound = length > tolerances.ROUNDED
+        normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
+        return replace(own, vertex_normals=normals)
+
+    def courses(self, request: Request) -> Iterator[Course]:
+        """Courses for a request, the best first, each a second time with twice as many nodes.
+
+        Where strands are close together, traces between more nodes may avoid a crossing.
+
+        Raises
+        ------
+        ControlPointError, UnreachableError
+            If via points coincide with control points, or lie on another component.
+        """
+        there = renumbered_request(self.copy, request)
+        mesh = self.copy.mesh
+        visited = visiting_order(mesh, there.points, there.order, there.closed)
+        points, fixed = there.points[visited], np.ones(len(visited), dtype=bool)
+        if there.via_points:
+            waypoints = with_via_points(
+                mesh, there.points, there.via_points, there.order, there.closed
+            )
+            points, fixed = waypoints.points, waypoints.is_control
+        on_refined = self._refined.in_parts(points)
+        component = int(self._refined.mesh.face_component[on_refined.faces[0]])
+        surface = self._with_maps(there, int(on_refined.faces[0]))
+        found = find_courses(
+            self._graph(component), surface, on_refined, fixed, there.closed, there.smoothness
+        )
+        if found is None:
+            return
+        for number in range(found.nodes.curves):
+            nodes, control = found.course(number)
+            for _ in range(2):
+                on_copy = self._refined.in_parents(nodes.places)
+                places = self.copy.original_points(on_copy)
+                yield Course(places, np.flatnonzero(control), visited)
+                nodes, control = with_midpoints(surface, nodes, control)
+
+    def _graph(self, component: int) -> HopGraph:
+        if component not in self._graphs:
+            self._graphs[component] = build_hop_graph(self._surface, component)
+        return self._graphs[component]
+
+    def _with_maps(self, request: Request, face: int) -> CurveSurface:
+        """The surface with the maps of a request on the copy, for the component of a face."""
+
+        def at_vertices(values: FloatArray | None) -> FloatArray | None:
+            return None if values is None else self._refined.interpolation @ values
+
+        obstacles, alignment = at_vertices(request.obstacles), at_vertices(request.alignment)
+        unit = component_unit(self._refined.mesh, face)
+        return with_maps(self._surface, obstacles, alignment, unit)

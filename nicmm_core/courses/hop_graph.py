@@ -1,0 +1,408 @@
+"""A graph of hops between cells of a surface, in which turning costs.
+
+Cells are vertices of the surface, about evenly spread. A hop joins two cells that are close to each
+other along the surface. A state is a directed hop; from hop (p, q) to hop (q, r) the cost is
+
+    θ² / h + τ |qr|,
+
+with the turn θ between them in the tangent plane at q and h their mean length: the energy of
+`relaxation.elastic_energy` for a polyline. So a shortest path in the graph is a discrete elastica
+(after Ulén, Strandmark and Kahl, "Shortest paths with higher-order regularization", PAMI 2015).
+A course may turn by any angle, so paths round the tips of limbs are found too.
+
+Control points are more cells, from which paths start with any direction. A path and its reverse
+have the same cost; so paths from both ends of a leg meet in every hop, and give the best course of
+the leg by that hop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import edge_lengths
+from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
+from ..geometry.surface_points import SurfacePoints
+from ..progress import checkpoint
+from ..relaxation.curve_nodes import CurveSurface, nodes_at
+
+CELLS = 700
+"""Cells per component; more make a course finer, which relaxation does better."""
+
+HOPS = 16
+"""Hops from a cell to its nearest cells, before those in the other direction are added."""
+
+REACH = 4.2
+"""Longest hop, in square roots of the area per cell."""
+
+SAME_SHEET = 1.6
+"""Longest distance along edges of a hop, relative to its length in space.
+
+Beyond that the two cells lie on different sheets of the surface.
+"""
+
+EDGE_DETOUR = 1.07
+"""Mean length of the shortest path along edges, relative to the distance along the surface."""
+
+
+@dataclass(frozen=True)
+class Hops:
+    """Directed hops.
+
+    Attributes
+    ----------
+    start, end : (m,) int array
+        Cells; start ascends.
+    length : (m,) float array
+    leaving, arriving : (m, 3) float array
+        Unit tangents at start and end.
+    """
+
+    start: IntArray
+    end: IntArray
+    length: FloatArray
+    leaving: FloatArray
+    arriving: FloatArray
+
+
+@dataclass(frozen=True)
+class HopGraph:
+    """The graph of one component of a surface, without control points.
+
+    Attributes
+    ----------
+    surface : CurveSurface
+    vertex : (n,) int array
+        The vertices at which the n cells are.
+    spacing : float
+        Square root of the area per cell.
+    hops : Hops
+    reverse : (m,) int array
+        The same hop in the other direction.
+    """
+
+    surface: CurveSurface
+    vertex: IntArray
+    spacing: float
+    hops: Hops
+    reverse: IntArray
+
+    @cached_property
+    def arcs(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """From each hop to each continuation: `indptr`, `indices` and the bending θ² / h."""
+        hops = self.hops
+        first = np.searchsorted(hops.start, np.arange(len(self.vertex) + 1))
+        before, after = continuations(hops.end, first)
+        kept = after != self.reverse[before]
+        before, after = before[kept], after[kept]
+        indptr = np.searchsorted(before, np.arange(len(hops.start) + 1))
+        return indptr, after, bending(hops, before, hops, after)
+
+    @cached_property
+    def edge_graph(self) -> sparse.csr_array:
+        """Lengths of the edges of the mesh, each stored once."""
+        mesh = self.surface.mesh
+        length = edge_lengths(mesh.vertices, mesh.edges)
+        size = len(mesh.vertices)
+        return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
+
+
+def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
+    """The graph of a component of a surface."""
+    mesh = surface.mesh
+    inside = mesh.face_component == component
+    areas = np.zeros(len(mesh.vertices))
+    np.add.at(areas, mesh.faces[inside], mesh.face_areas[inside, None] / 3.0)
+    vertex = np.flatnonzero(areas > 0.0)
+    spacing = float(np.sqrt(areas.sum() / min(CELLS, len(vertex))))
+    if len(vertex) > CELLS:
+        # Numbers of vertices follow from their places (`geometry.numbering`).
+        chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
+        normals = surface.vertex_normals
+        distance = PACKING * spacing
+        vertex = spread_vertices(mesh, normals, areas, chance, CANDIDATES * CELLS, distance)
+    graph = HopGraph(surface, vertex, spacing, _no_hops(), np.zeros(0, dtype=np.int64))
+    checkpoint()
+    along = csgraph.dijkstra(
+        graph.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
+    )[:, vertex]
+    np.fill_diagonal(along, np.inf)
+    start, end = _nearest(along, HOPS)
+    size = len(vertex)
+    key = np.unique(np.concatenate([start * size + end, end * size + start]))
+    start, end = key // size, key % size
+    positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
+    hops = _hops(start, end, along[start, end], (positions, normals), (positions, normals))
+    same_sheet = along[start, end] <= SAME_SHEET * _distances(positions, start, end)
+    hops, key = taken(hops, same_sheet), key[same_sheet]
+    reverse = np.searchsorted(key, hops.end * size + hops.start)
+    return HopGraph(surface, vertex, spacing, hops, reverse)
+
+
+@dataclass(frozen=True)
+class CourseGraph:
+    """A hop graph with control points, and least costs from each of them.
+
+    States are the m hops of the graph, then d departures from control points, then the d arrivals
+    in the other direction. Cells are the n of the graph, then the k control points.
+
+    Attributes
+    ----------
+    graph : HopGraph
+    points : SurfacePoints
+        k control points.
+    positions, normals : (n + k, 3) float array
+        Of the cells.
+    hops : Hops
+        Of all m + 2 d states.
+    reverse : (m + 2 d,) int array
+    length : (m + 2 d,) float array
+        Weighted by maps.
+    tension : float
+        τ.
+    cost : (k, m + 2 d) float array
+        Least cost of a path from each control point that ends with each state; inf if there is
+        none.
+    previous : (k, m + 2 d) int array
+        The state before on this path, -1 at its first one.
+    """
+
+    graph: HopGraph
+    points: SurfacePoints
+    positions: FloatArray
+    normals: FloatArray
+    hops: Hops
+    reverse: IntArray
+    length: FloatArray
+    tension: float
+    cost: FloatArray
+    previous: IntArray
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells that are not control points."""
+        return len(self.graph.vertex)
+
+    @cached_property
+    def first(self) -> IntArray:
+        """The first state on the path to each state, (k, m + 2 d); itself where there is none."""
+        states = np.arange(self.cost.shape[1])
+        found = np.where(self.previous < 0, states, self.previous)
+        while True:
+            further = np.take_along_axis(found, found, axis=1)
+            if np.array_equal(further, found):
+                return found
+            found = further
+
+    def by_state(self, start: int, end: int) -> FloatArray:
+        """Least cost of a leg between two control points through each state, (m + 2 d,)."""
+        return self.cost[start] + self.cost[end][self.reverse] - self.tension * self.length
+
+
+def with_control_points(
+    graph: HopGraph,
+    points: SurfacePoints,
+    legs: IntArray,
+    factor: FloatArray | None,
+    tension: float,
+) -> CourseGraph:
+    """Add control points to a graph, and find the least costs from them.
+
+    Parameters
+    ----------
+    graph : HopGraph
+    points : SurfacePoints
+        k points of its component.
+    legs : (l, 2) int array
+        Consecutive points.
+    factor : (V,) float array or None
+        Factor of lengths at the vertices.
+    tension : float
+        τ L² for the length L of the shortest path through the points.
+    """
+    surface, n, k = graph.surface, len(graph.vertex), len(points)
+    along = _along_edges(graph, points)
+    length = along[:, len(surface.mesh.vertices) :][legs[:, 0], legs[:, 1]].sum()
+    cells = np.concatenate([graph.vertex, len(surface.mesh.vertices) + np.arange(k)])
+    to_cells = along[:, cells]
+    to_cells[np.arange(k), n + np.arange(k)] = np.inf
+    to_cells[to_cells > REACH * graph.spacing] = np.inf
+    nodes = nodes_at(surface, points, closed=False)
+    mesh = surface.mesh
+    positions = np.concatenate([mesh.vertices[graph.vertex], nodes.positions])
+    normals = np.concatenate([surface.vertex_normals[graph.vertex], nodes.normals])
+    control, cell = _nearest(to_cells, HOPS)
+    departures = _hops(
+        n + control, cell, to_cells[control, cell], (positions, normals), (positions, normals)
+    )
+    arrivals = Hops(
+        departures.end, departures.start, departures.length, -departures.arriving,
+        -departures.leaving,
+    )  # fmt: skip
+    hops = joined_hops([graph.hops, departures, arrivals])
+    m, d = len(graph.reverse), len(control)
+    reverse = np.concatenate([graph.reverse, np.arange(m + d, m + 2 * d), np.arange(m, m + d)])
+    weighted = hops.length
+    if factor is not None:
+        at_cells = np.concatenate([factor[graph.vertex], _at_points(surface, points, factor)])
+        weighted = weighted * 0.5 * (at_cells[hops.start] + at_cells[hops.end])
+    tension = tension / max(float(length), tolerances.TINY) ** 2
+    cost, previous = _least_costs(graph, hops, departures, control, weighted, tension, k)
+    return CourseGraph(
+        graph, points, positions, normals, hops, reverse, weighted, tension, cost, previous
+    )
+
+
+def _least_costs(
+    graph: HopGraph,
+    hops: Hops,
+    departures: Hops,
+    control: IntArray,
+    length: FloatArray,
+    tension: float,
+    k: int,
+) -> tuple[FloatArray, IntArray]:
+    """Least costs from k control points to all states, and the states before."""
+    m, d, n = len(graph.reverse), len(departures.start), len(graph.vertex)
+    indptr, after, bent = graph.arcs
+    first = np.searchsorted(graph.hops.start, np.arange(n + 1))
+    first = np.concatenate([first, np.full(k, first[-1])])  # no path passes a control point
+    before, onward = continuations(departures.end, first)
+    leaving = bending(departures, before, graph.hops, onward) + tension * length[onward]
+    rows = np.concatenate(
+        [
+            indptr,
+            indptr[-1] + np.searchsorted(before, np.arange(1, d + 1)),
+            indptr[-1] + len(before) + np.searchsorted(control, np.arange(1, k + 1)),
+        ]
+    )
+    columns = np.concatenate([after, onward, m + np.arange(d)])
+    values = np.concatenate([bent + tension * length[after], leaving, tension * length[m : m + d]])
+    size = m + d + k
+    matrix = sparse.csr_array((values, columns, rows), shape=(size, size))
+    checkpoint()
+    cost, previous = csgraph.dijkstra(
+        matrix, indices=m + d + np.arange(k), return_predecessors=True
+    )
+    cost, previous = cost[:, : m + d], previous[:, : m + d]
+    previous[(previous >= m + d) | (previous < 0)] = -1
+    # Arrivals continue hops that end at the cell before.
+    order = np.argsort(hops.end[: m + d], kind="stable")
+    ends = np.searchsorted(hops.end[: m + d][order], np.arange(n + k + 1))
+    arrival, place = continuations(departures.end, ends)
+    state = order[place]
+    backward = m + d + arrival
+    kept = departures.start[arrival] != hops.start[state]
+    arrival, state, backward = arrival[kept], state[kept], backward[kept]
+    added = bending(hops, state, hops, backward) + tension * length[backward]
+    arriving, came = np.full((k, d), np.inf), np.full((k, d), -1)
+    for number in range(k):
+        total = cost[number, state] + added
+        best = np.lexsort((total, arrival))
+        best = best[np.unique(arrival[best], return_index=True)[1]]
+        best = best[np.isfinite(total[best])]
+        arriving[number, arrival[best]] = total[best]
+        came[number, arrival[best]] = state[best]
+    # A hop between two control points is the whole path from the other one too.
+    direct = np.flatnonzero(departures.end >= n)
+    arriving[:, direct], came[:, direct] = np.inf, -1
+    arriving[departures.end[direct] - n, direct] = tension * length[m + direct]
+    return np.concatenate([cost, arriving], axis=1), np.concatenate([previous, came], axis=1)
+
+
+def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
+    """Pairs of a hop, by the cell at which it ends, and each hop from there."""
+    count = first[ends + 1] - first[ends]
+    hop = np.repeat(np.arange(len(ends)), count)
+    place = np.arange(len(hop)) - np.repeat(np.cumsum(count) - count, count)
+    return hop, first[ends[hop]] + place
+
+
+def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
+    """θ² / h from hops to their continuations."""
+    cosine = np.einsum("ad,ad->a", one.arriving[before], other.leaving[after])
+    step = 0.5 * (one.length[before] + other.length[after])
+    return np.arccos(cosine.clip(-1.0, 1.0)) ** 2 / np.maximum(step, tolerances.TINY)
+
+
+def taken(hops: Hops, which: IntArray | BoolArray) -> Hops:
+    """Some of the hops."""
+    return Hops(
+        hops.start[which], hops.end[which], hops.length[which], hops.leaving[which],
+        hops.arriving[which],
+    )  # fmt: skip
+
+
+def joined_hops(parts: list[Hops]) -> Hops:
+    """Hops one after another."""
+    return Hops(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("start", "end", "length", "leaving", "arriving")
+        )
+    )
+
+
+def _no_hops() -> Hops:
+    none, vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    return Hops(none, none, np.zeros(0), vectors, vectors)
+
+
+def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:
+    """Row and column of the least finite distances of each row, rows ascending."""
+    nearest = np.argsort(distance, axis=1, kind="stable")[:, :count]
+    row, column = np.repeat(np.arange(len(distance)), nearest.shape[1]), nearest.ravel()
+    finite = np.isfinite(distance[row, column])
+    return row[finite], column[finite]
+
+
+def _hops(
+    start: IntArray,
+    end: IntArray,
+    along_edges: FloatArray,
+    here: tuple[FloatArray, FloatArray],
+    there: tuple[FloatArray, FloatArray],
+) -> Hops:
+    """Hops between cells with positions and normals."""
+    offset = there[0][end] - here[0][start]
+    length = np.maximum(np.linalg.norm(offset, axis=1), along_edges / EDGE_DETOUR)
+    return Hops(
+        start, end, length, tangents(offset, here[1][start]), tangents(offset, there[1][end])
+    )
+
+
+def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
+    """Unit vectors along vectors, (m, 3), in the planes with the given normals."""
+    flat = vectors - np.einsum("md,md->m", vectors, normals)[:, None] * normals
+    return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
+
+
+def _distances(positions: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
+    return np.linalg.norm(positions[start] - positions[end], axis=1)
+
+
+def _along_edges(graph: HopGraph, points: SurfacePoints) -> FloatArray:
+    """Distances along edges from points to the vertices and the points, (k, V + k)."""
+    mesh, k = graph.surface.mesh, len(points)
+    corners = mesh.faces[points.faces]
+    size = len(mesh.vertices)
+    away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
+    # A length of zero would not be stored as an arc.
+    away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
+    edges = graph.edge_graph.tocoo()
+    values = np.concatenate([edges.data, away.ravel()])
+    rows = np.concatenate([edges.coords[0], np.repeat(size + np.arange(k), 3)])
+    columns = np.concatenate([edges.coords[1], corners.ravel()])
+    matrix = sparse.csr_array((values, (rows, columns)), shape=(size + k, size + k))
+    return csgraph.dijkstra(matrix, directed=False, indices=size + np.arange(k))
+
+
+def _at_points(surface: CurveSurface, points: SurfacePoints, values: FloatArray) -> FloatArray:
+    corners = values[surface.mesh.faces[points.faces]]
+    return np.einsum("kc,kc->k", points.barycentric, corners)

@@ -1,0 +1,221 @@
+"""Combinations of routes, one a leg, that do not cross: whole courses, the cheapest first.
+
+Routes are laid over the surface as straight traces between a few nodes, and relaxed a little, so
+that routes through the same cells separate. Then all of them are tested against each other at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.crossings import overlapping_segments, segments_meet
+from ..geometry.surface_points import SurfacePoints, joined
+from ..geometry.tracing import strictly_inside, trace_from
+from ..progress import checkpoint
+from ..relaxation.curve_nodes import Nodes, nodes_at
+from ..relaxation.node_traces import places_along, traced_segments
+from ..relaxation.relaxing_together import TogetherConfig, relax_together
+from .hop_graph import CourseGraph, tangents
+from .leg_routes import Routes, junction_cost
+
+NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
+"""Nodes of each route, the least number, and the sum over all legs above which they get fewer."""
+
+NODES = 96
+"""Nodes of a course, distributed over its legs by length."""
+
+SEPARATING = TogetherConfig(iterations=4, contact=False, longest_move=2.0)
+"""Relaxation of routes before they are tested; their directions at both ends are kept."""
+
+BEAM = 3_000
+"""Incomplete combinations kept after each leg."""
+
+
+@dataclass(frozen=True)
+class Combinations:
+    """Courses by their routes.
+
+    Attributes
+    ----------
+    choice : (c, l) int array
+        The route of each leg.
+    cost : (c,) float array
+        Ascending.
+    """
+
+    choice: IntArray
+    cost: FloatArray
+
+
+def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
+    """Nodes on all routes, as one open curve each, with equally many nodes."""
+    surface = graph.graph.surface
+    count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // len(routes)))
+    paths = [path for leg in routes for path in leg.cells]
+    from_cell, to_cell, share = [], [], []
+    for path in paths:
+        steps = np.linalg.norm(np.diff(graph.positions[path], axis=0), axis=1)
+        arc = np.append(0.0, np.cumsum(steps))
+        at = np.linspace(0.0, arc[-1], count)
+        hop = np.searchsorted(arc, at, side="right").clip(1, len(steps)) - 1
+        along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0)
+        nearer = along <= 0.5
+        from_cell.append(np.where(nearer, path[hop], path[hop + 1]))
+        to_cell.append(np.where(nearer, path[hop + 1], path[hop]))
+        share.append(np.where(nearer, along, 1.0 - along))
+    start, end = np.concatenate(from_cell), np.concatenate(to_cell)
+    places = _places_of_cells(graph)[start]
+    offset = graph.positions[end] - graph.positions[start]
+    direction = tangents(offset, graph.normals[start])
+    length = np.concatenate(share) * np.linalg.norm(offset, axis=1)
+    ends = _is_end(count, paths)
+    length[ends | (length <= tolerances.AT_ONE_PLACE * surface.mesh.diagonal)] = 0.0
+    inside = SurfacePoints(places.faces, strictly_inside(places.barycentric))
+    moved = trace_from(surface.mesh, inside, direction, length, surface.folded)[0]
+    # Control points stay exactly where they are.
+    faces = np.where(ends, places.faces, moved.faces)
+    barycentric = np.where(ends[:, None], places.barycentric, moved.barycentric)
+    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), False, len(paths))
+    clamped = np.zeros((len(paths), count), dtype=bool)
+    clamped[:, [0, 1, -2, -1]] = True
+    return relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
+
+
+def _is_end(count: int, paths: list[IntArray]) -> BoolArray:
+    ends = np.zeros((len(paths), count), dtype=bool)
+    ends[:, [0, -1]] = True
+    return ends.ravel()
+
+
+def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
+    """Cells as points of faces."""
+    mesh, vertex = graph.graph.surface.mesh, graph.graph.vertex
+    faces = mesh.vertex_faces.indices[mesh.vertex_faces.indptr[vertex]]
+    barycentric = (mesh.faces[faces] == vertex[:, None]).astype(np.float64)
+    return joined([SurfacePoints(faces, barycentric), graph.points])
+
+
+def crossing_routes(graph: CourseGraph, routes: list[Routes], nodes: Nodes) -> BoolArray:
+    """Which pairs of routes of different legs cross, and which routes cross themselves, (r, r).
+
+    Routes that leave the same control point may touch there.
+    """
+    segments = traced_segments(graph.graph.surface, nodes)
+    count = len(nodes.positions) // nodes.curves
+    legs = np.concatenate([np.full((len(leg.cells), 2), [leg.start, leg.end]) for leg in routes])
+    leg = np.repeat(np.arange(len(routes)), [len(leg.cells) for leg in routes])
+    one, other = overlapping_segments(segments.face, segments.start, segments.end)
+    first, second = segments.node[one] // count, segments.node[other] // count
+    kept = (leg[first] != leg[second]) | ((first == second) & (np.abs(one - other) > 1))
+    one, other, first, second = one[kept], other[kept], first[kept], second[kept]
+    common = np.zeros(len(one), dtype=bool)
+    ends = (0, count - 2)  # the nodes whose segments touch control points
+    for i, node in enumerate(ends):
+        for j, node_there in enumerate(ends):
+            common |= (
+                (legs[first, i] == legs[second, j])
+                & (segments.node[one] % count == node)
+                & (segments.node[other] % count == node_there)
+            )
+    one, other, first, second = one[~common], other[~common], first[~common], second[~common]
+    meet = segments_meet(segments.start, segments.end, one, other)
+    crosses = np.zeros((nodes.curves, nodes.curves), dtype=bool)
+    crosses[first[meet], second[meet]] = crosses[second[meet], first[meet]] = True
+    return crosses
+
+
+def combined(
+    graph: CourseGraph, routes: list[Routes], crosses: BoolArray, closed: bool
+) -> Combinations:
+    """The cheapest combinations of routes that do not cross, by beam search leg by leg."""
+    count = len(routes)
+    offset = np.cumsum([0] + [len(leg.cells) for leg in routes])
+    first = [np.array([_state(graph, path[0], path[1]) for path in leg.cells]) for leg in routes]
+    last = [np.array([_state(graph, path[-2], path[-1]) for path in leg.cells]) for leg in routes]
+    simple = ~np.diagonal(crosses)
+    choice = np.flatnonzero(simple[: offset[1]])[:, None]
+    cost = routes[0].cost[choice[:, 0]]
+    for number in range(1, count):
+        checkpoint()
+        here = slice(offset[number], offset[number + 1])
+        total = cost[:, None] + routes[number].cost
+        total = total + junction_cost(graph, last[number - 1], first[number])[choice[:, -1]]
+        if closed and number == count - 1:
+            total = total + junction_cost(graph, last[number], first[0])[:, choice[:, 0]].T
+        blocked = np.broadcast_to(~simple[here], total.shape).copy()
+        for earlier in range(number):
+            blocked |= crosses[offset[earlier] + choice[:, earlier]][:, here]
+        total[blocked] = np.inf
+        best = np.argsort(total, axis=None, kind="stable")[:BEAM]
+        best = best[np.isfinite(total.ravel()[best])]
+        row, route = np.divmod(best, total.shape[1])
+        choice = np.concatenate([choice[row], route[:, None]], axis=1)
+        cost = total.ravel()[best]
+    return Combinations(choice, cost)
+
+
+def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
+    """The cheapest combinations of which no two run beside each other on all legs, (d, l)."""
+    choice = combinations.choice
+    left = np.ones(len(choice), dtype=bool)
+    chosen: list[int] = []
+    while left.any() and len(chosen) < most:
+        best = int(left.argmax())
+        chosen.append(best)
+        same = np.ones(len(choice), dtype=bool)
+        for leg, route in enumerate(routes):
+            same &= route.alike[choice[best, leg]][choice[:, leg]]
+        left &= ~same
+    return choice[chosen]
+
+
+def course_nodes(
+    graph: CourseGraph, routes: list[Routes], nodes: Nodes, choice: IntArray, closed: bool
+) -> tuple[Nodes, BoolArray]:
+    """Nodes on courses, and which of them are control points.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+    routes : list of Routes
+    nodes : Nodes
+        On all routes.
+    choice : (c, l) int array
+    closed : bool
+    """
+    surface = graph.graph.surface
+    size = len(nodes.positions) // nodes.curves
+    offset = np.cumsum([0] + [len(leg.cells) for leg in routes])[:-1]
+    curve = offset + choice
+    lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
+    typical = np.median(lengths[curve], axis=0)
+    counts = np.round(NODES * typical / typical.sum()).astype(np.int64).clip(FEWEST_NODES)
+    leg = np.repeat(np.arange(len(routes)), counts)
+    place = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    at = place * (size - 1) / counts[leg]
+    node = np.floor(at).astype(np.int64)
+    places = places_along(
+        surface, nodes, (curve[:, leg] * size + node).ravel(), np.tile(at - node, len(choice))
+    )
+    starts = np.tile(place == 0, len(choice))
+    own = nodes.places[(curve * size).ravel()]
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    faces[starts], barycentric[starts] = own.faces, own.barycentric
+    if not closed:
+        last = nodes.places[curve[:, -1] * size + size - 1]
+        after = np.arange(1, len(choice) + 1) * len(leg)
+        faces = np.insert(faces, after, last.faces)
+        barycentric = np.insert(barycentric, after, last.barycentric, axis=0)
+        starts = np.insert(starts, after, True)
+    places = SurfacePoints(faces, barycentric)
+    return nodes_at(surface, places, closed, len(choice)), starts
+
+
+def _state(graph: CourseGraph, start: int, end: int) -> int:
+    """The state from one cell to another."""
+    hops = graph.hops
+    return int(np.flatnonzero((hops.start == start) & (hops.end == end))[0])

@@ -1,0 +1,79 @@
+"""Midpoint subdivision: more vertices on the same surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from . import tolerances
+from .array_types import FloatArray, IntArray
+from .mesh import Mesh
+from .surface_points import SurfacePoints
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A mesh whose faces are divided into equal parts.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    parent : (f,) int array
+        The original face of each face.
+    corners : (f, 3, 3) float array
+        Barycentric coordinates of the corners in that face.
+    interpolation : (v, V) sparse array
+        Weights of the original vertices at each vertex.
+    """
+
+    mesh: Mesh
+    parent: IntArray
+    corners: FloatArray
+    interpolation: sparse.csr_array
+
+    def in_parents(self, points: SurfacePoints) -> SurfacePoints:
+        """Points as points of the original faces."""
+        barycentric = np.einsum("pc,pcd->pd", points.barycentric, self.corners[points.faces])
+        return SurfacePoints(self.parent[points.faces], barycentric)
+
+    def in_parts(self, points: SurfacePoints) -> SurfacePoints:
+        """Points of the original as points of the parts."""
+        begin = np.searchsorted(self.parent, points.faces)
+        parts = begin[:, None] + np.arange(len(self.parent) // (self.parent[-1] + 1))
+        matrix = self.corners[parts].transpose(0, 1, 3, 2)
+        local = np.linalg.solve(matrix, points.barycentric[:, None, :, None])[..., 0]
+        best = local.min(axis=2).argmax(axis=1)
+        rows = np.arange(len(best))
+        local = local[rows, best]
+        local = np.where(local < tolerances.ROUNDED, 0.0, local)
+        return SurfacePoints(parts[rows, best], local / local.sum(axis=1, keepdims=True))
+
+
+def refined(mesh: Mesh, times: int) -> Refined:
+    """Divide every face into four equal parts, several times."""
+    count = len(mesh.vertices)
+    faces, weights = mesh.faces, sparse.eye_array(count, format="csr")
+    corners = np.broadcast_to(np.eye(3), (len(faces), 3, 3))
+    parent = np.arange(len(faces))
+    for _ in range(times):
+        edge = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
+        ends, number = np.unique(edge, axis=0, return_inverse=True)
+        a, b, c = faces.T
+        # Midpoints opposite each corner.
+        at_a, at_b, at_c = (weights.shape[0] + number.reshape(-1, 3)).T
+        halves = sparse.csr_array(
+            (np.full(2 * len(ends), 0.5), ends.ravel(), 2 * np.arange(len(ends) + 1)),
+            shape=(len(ends), weights.shape[0]),
+        )
+        weights = sparse.csr_array(sparse.vstack([weights, halves @ weights]))
+        parts = [(a, at_c, at_b), (at_c, b, at_a), (at_b, at_a, c), (at_a, at_b, at_c)]
+        faces = np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3)
+        p, q, r = corners.transpose(1, 0, 2)
+        pq, qr, rp = 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)
+        inner = [(p, pq, rp), (pq, q, qr), (rp, qr, r), (qr, rp, pq)]
+        corners = np.stack([np.stack(part, axis=1) for part in inner], axis=1).reshape(-1, 3, 3)
+        parent = np.repeat(parent, 4)
+    divided = mesh if times == 0 else Mesh(weights @ mesh.vertices, faces)
+    return Refined(divided, parent, corners, weights)

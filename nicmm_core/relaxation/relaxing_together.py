@@ -1,0 +1,171 @@
+"""Relax several curves together, to compare them: nodes only, without tracing between them.
+
+The steps are those of `levenberg_marquardt`, with all nodes of all curves in one set of arrays,
+since the number of calls and not of nodes decides the time. Each curve has its own damping and
+takes or rejects its own steps. A curve may cross itself, although the contact term resists it;
+`node_traces.simple_curves` tells whether it has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, IntArray
+from ..geometry.surface_points import SurfacePoints
+from ..progress import checkpoint
+from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .elastic_energy import balance, curve_energies, damped_step, elastic_system
+from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
+from .noded_curve import moved_along_conormals, shifted
+from .strand_contact import contacts_between
+
+
+@dataclass(frozen=True)
+class TogetherConfig:
+    """Settings; lengths are in mean distances between neighbouring nodes.
+
+    Attributes
+    ----------
+    iterations : int
+        Most iterations, of one step each.
+    longest_move : float
+        Trust radius of the linearised energy.
+    respacing : int
+        Iterations from one respacing of the nodes to the next.
+    least_decrease : float
+        Relative decrease of the energy below which an iteration counts as quiet.
+    quiet : int
+        Quiet iterations after which a curve has converged.
+    contact : bool
+        Whether strands are kept apart.
+    """
+
+    iterations: int = 30
+    longest_move: float = 1.0
+    respacing: int = 3
+    least_decrease: float = 1e-3
+    quiet: int = 2
+    contact: bool = True
+
+
+SHORT_MOVE = 1e-3
+"""Distance, in mean distances between nodes, that is too short for respacing."""
+
+
+def relax_together(
+    surface: CurveSurface,
+    nodes: Nodes,
+    fixed: BoolArray,
+    smoothness: float,
+    config: TogetherConfig,
+) -> Nodes:
+    """Relax some curves.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+        c curves of n / c nodes.
+    fixed : (n,) bool array
+        Nodes that stay, as control points do; the first node of each curve is one of them.
+    smoothness : float
+        Divides the tension.
+    config : TogetherConfig
+    """
+    size = len(nodes.positions) // nodes.curves
+    steps = StepConfig()
+    least = steps.least_damping(size)
+    damping = np.full(nodes.curves, least)
+    quiet = np.zeros(nodes.curves, dtype=np.int64)
+    which = np.arange(nodes.curves)  # curves that have not converged
+    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
+    whole = nodes
+    for iteration in range(config.iterations):
+        checkpoint(iteration / config.iterations)
+        if iteration % config.respacing == 0:
+            nodes = _respaced(surface, nodes, fixed)
+        # Nodes may coincide where a route could not be laid; that curve then stays as it is.
+        with np.errstate(over="ignore", invalid="ignore"):
+            weights = balance(surface, nodes, smoothness, apart=config.contact)
+            contacts = contacts_between(nodes) if config.contact else None
+            before = curve_energies(nodes, weights, contacts)
+            system = elastic_system(surface, nodes, weights, contacts)
+            move = damped_step(system, ~fixed, damping)
+        move = np.nan_to_num(move, nan=0.0, posinf=0.0, neginf=0.0)
+        spacing = nodes.by_curve(nodes.step_lengths).sum(axis=1) / size
+        farthest = np.abs(nodes.by_curve(move)).max(axis=1) / np.maximum(spacing, tolerances.TINY)
+        share = np.minimum(1.0, config.longest_move / np.maximum(farthest, tolerances.TINY))
+        moved, _, _ = moved_along_conormals(surface, nodes, move * nodes.spread(share))
+        with np.errstate(over="ignore", invalid="ignore"):
+            after = curve_energies(moved, weights)
+        lower = after < before
+        nodes = _chosen(surface, nodes, moved, lower)
+        damping = np.where(
+            lower, np.maximum(damping / DAMPING_FACTOR, least), damping * DAMPING_FACTOR
+        )
+        fall = np.where(lower, before - after, 0.0)
+        still = (fall <= config.least_decrease * before) & (
+            share * farthest <= 0.5 * config.longest_move
+        )
+        quiet = np.where(still, quiet + 1, 0)
+        done = (quiet >= config.quiet) | (damping > steps.most_damping)
+        if done.any() or iteration == config.iterations - 1:
+            place = (which[:, None] * size + np.arange(size)).ravel()
+            faces[place], barycentric[place] = nodes.places.faces, nodes.places.barycentric
+            if done.all():
+                break
+            left = np.flatnonzero(~done)
+            nodes, fixed = curves_of(nodes, left), nodes.by_curve(fixed)[left].ravel()
+            damping, quiet, which = damping[left], quiet[left], which[left]
+    return nodes_at(surface, SurfacePoints(faces, barycentric), whole.closed, whole.curves)
+
+
+def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
+    """Some of the curves."""
+    size = len(nodes.positions) // nodes.curves
+    place = (which[:, None] * size + np.arange(size)).ravel()
+    return Nodes(
+        nodes.places[place], nodes.closed, nodes.positions[place], nodes.normals[place],
+        nodes.phi_fea[place], len(which),
+    )  # fmt: skip
+
+
+def _chosen(surface: CurveSurface, one: Nodes, other: Nodes, take: BoolArray) -> Nodes:
+    """The curves of the other nodes where they are taken, (c,)."""
+    if take.all():
+        return other
+    taken = one.spread(take)
+    places = SurfacePoints(
+        np.where(taken, other.places.faces, one.places.faces),
+        np.where(taken[:, None], other.places.barycentric, one.places.barycentric),
+    )
+    return nodes_at(surface, places, one.closed, one.curves)
+
+
+def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
+    """Nodes moved along their curves, so that they are equally spaced between fixed ones."""
+    size = len(nodes.positions) // nodes.curves
+    lengths = nodes.by_curve(nodes.step_lengths)
+    # Arc length over all curves, each with its first node once more at its end.
+    last = np.where(nodes.closed, nodes.first, nodes.last)
+    around = np.append(
+        np.arange(len(nodes.positions)).reshape(nodes.curves, size), last[:, None], 1
+    )
+    ends = np.append(nodes.by_curve(fixed), np.ones((nodes.curves, 1), dtype=bool), axis=1)
+    begins = np.cumsum(lengths.sum(axis=1)) - lengths.sum(axis=1)
+    arc = np.cumsum(np.append(np.zeros((nodes.curves, 1)), lengths, axis=1), axis=1)
+    arc = (arc + begins[:, None]).ravel()
+    place = np.arange(len(arc))
+    along = np.interp(place, place[ends.ravel()], arc[ends.ravel()])
+    along = along.reshape(nodes.curves, size + 1)[:, :-1].ravel()
+    path = nodes.positions[around.ravel()]
+    target = np.stack([np.interp(along, arc, axis) for axis in path.T], axis=1)
+    move = target - nodes.positions
+    move -= (move * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
+    length = np.linalg.norm(move, axis=1)
+    direction = move / np.maximum(length, tolerances.TINY)[:, None]
+    length[fixed | (length < SHORT_MOVE * nodes.spread(lengths.mean(axis=1)))] = 0.0
+    return shifted(surface, nodes, direction, length)[0]

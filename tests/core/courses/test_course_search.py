@@ -1,0 +1,97 @@
+"""Whole courses: simple, through the control points, and the best with the least energy."""
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.courses import course_surface
+from nicmm_core.courses.course_search import find_courses
+from nicmm_core.courses.hop_graph import build_hop_graph
+from nicmm_core.courses.leg_combinations import combined, crossing_routes, laid_routes
+from nicmm_core.courses.leg_routes import routes_of_legs
+from nicmm_core.geometry.refinement import refined
+from nicmm_core.relaxation.curve_nodes import curve_surface
+from nicmm_core.relaxation.elastic_energy import bending_energy
+from tests.core.checks import assert_valid_design, points_near, random_surface_points
+from tests.core.courses.test_hop_graph import LEGS, graph_through
+
+
+@pytest.fixture(scope="module")
+def body():
+    return shapes.creature(5, resolution=32, faces=1500)
+
+
+def test_combinations_do_not_cross(body):
+    graph = graph_through(body, body.vertices[[20, 250, 600]])
+    routes = routes_of_legs(graph, LEGS, closed=True)
+    nodes = laid_routes(graph, routes, 1.0)
+    crosses = crossing_routes(graph, routes, nodes)
+    assert crosses.any() and not crosses.all()
+    found = combined(graph, routes, crosses, closed=True)
+    assert (np.diff(found.cost) >= 0.0).all()
+    offset = np.cumsum([0, *(len(leg.cells) for leg in routes)])[:-1]
+    chosen = found.choice + offset
+    for one in range(3):
+        for other in range(3):
+            assert not crosses[chosen[:, one], chosen[:, other]].any()
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_courses_pass_their_points_in_order(body, closed):
+    surface = curve_surface(body)
+    points = random_surface_points(body, 4, seed=3)
+    found = find_courses(
+        build_hop_graph(surface, 0), surface, points, np.ones(4, bool), closed, 1.0
+    )
+    for number in range(found.nodes.curves):
+        nodes, control = found.course(number)
+        passed = nodes.positions[control]
+        np.testing.assert_allclose(passed, points.positions(body), atol=1e-9 * body.diagonal)
+
+
+def test_the_best_course_round_a_ball_is_a_great_circle():
+    ball = shapes.sphere(4)
+    surface = curve_surface(ball)
+    angle = np.array([0.3, 2.2, 4.6])
+    on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
+    points = points_near(ball, on_circle)
+    graph = build_hop_graph(surface, 0)
+    found = find_courses(graph, surface, points, np.ones(3, bool), True, 1.0)
+    nodes, _ = found.course(0)
+    assert np.abs(nodes.positions[:, 2]).max() < 0.02
+    assert found.energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
+
+
+@pytest.mark.slow
+def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
+    """By the geometric mean over some bodies; single ones may bend more."""
+
+    def total(seed):
+        mesh = shapes.creature(seed, resolution=32, faces=1500)
+        chosen = np.random.default_rng(seed).choice(len(mesh.vertices), 4, replace=False)
+        design = nicmm.design_curve(mesh, chosen, order="shortest")
+        assert_valid_design(mesh, design)
+        curve = design.resumable.curve
+        return curve.length * bending_energy(curve.nodes) + 4.0 * np.pi**2
+
+    searched = [total(seed) for seed in range(8)]
+    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: None)
+    by_network = [total(seed) for seed in range(8)]
+    assert np.mean(np.log(np.divide(searched, by_network))) < np.log(0.9)
+
+
+@pytest.mark.parametrize("times", [0, 1, 2])
+def test_a_refined_mesh_is_the_same_surface(body, times):
+    divided = refined(body, times)
+    assert len(divided.mesh.faces) == 4**times * len(body.faces)
+    parents = np.bincount(divided.parent, divided.mesh.face_areas)
+    np.testing.assert_allclose(parents, body.face_areas, rtol=1e-9)
+    points = random_surface_points(body, 60, seed=1)
+    there = divided.in_parts(points)
+    np.testing.assert_allclose(
+        there.positions(divided.mesh), points.positions(body), atol=1e-12 * body.diagonal
+    )
+    back = divided.in_parents(there)
+    np.testing.assert_array_equal(back.faces, points.faces)
+    np.testing.assert_allclose(back.barycentric, points.barycentric, atol=1e-12)

@@ -1,0 +1,93 @@
+"""The hop graph: its costs, their symmetry, and what they say about straight and bent courses."""
+
+import numpy as np
+import pytest
+
+from nicmm_core import shapes
+from nicmm_core.courses.hop_graph import build_hop_graph, with_control_points
+from nicmm_core.courses.leg_routes import routes_of_legs
+from nicmm_core.relaxation.curve_nodes import curve_surface
+from tests.core.checks import grid, points_near
+
+LEGS = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+def graph_through(mesh, positions, legs=LEGS, tension=160.0):
+    surface = curve_surface(mesh)
+    points = points_near(mesh, np.asarray(positions, dtype=float))
+    return with_control_points(build_hop_graph(surface, 0), points, legs, None, tension)
+
+
+@pytest.fixture(scope="module")
+def on_square():
+    return graph_through(grid(40), [[0.1, 0.1, 0.0], [0.9, 0.2, 0.0], [0.5, 0.9, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def on_body():
+    mesh = shapes.creature(2, resolution=32, faces=1500)
+    return graph_through(mesh, mesh.vertices[[10, 300, 700]])
+
+
+@pytest.mark.parametrize("name", ["on_square", "on_body"])
+def test_a_path_and_its_reverse_cost_the_same(name, request):
+    graph = request.getfixturevalue(name)
+    for start, end in LEGS:
+        there, back = graph.by_state(start, end), graph.by_state(end, start)
+        np.testing.assert_allclose(there, back[graph.reverse], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["on_square", "on_body"])
+def test_the_best_leg_by_any_of_its_states_is_the_same(name, request):
+    """Paths from both ends meet in every state of the best leg."""
+    graph = request.getfixturevalue(name)
+    for start, end in LEGS:
+        total = graph.by_state(start, end)
+        arrivals = np.flatnonzero(graph.hops.end == graph.n_cells + end)
+        departures = np.flatnonzero(graph.hops.start == graph.n_cells + start)
+        best = total[np.isfinite(total)].min()
+        assert total[arrivals].min() == pytest.approx(best)
+        assert total[departures].min() == pytest.approx(best)
+
+
+def test_a_straight_leg_costs_at_least_its_length_and_not_much_more(on_square):
+    for start, end in LEGS:
+        places = on_square.positions[on_square.n_cells :]
+        straight = on_square.tension * np.linalg.norm(places[start] - places[end])
+        least = on_square.by_state(start, end).min()
+        assert straight <= least <= 2.0 * straight
+
+
+def test_routes_run_along_hops_and_are_simple(on_body):
+    routes = routes_of_legs(on_body, LEGS, closed=True)
+    hops = set(zip(on_body.hops.start.tolist(), on_body.hops.end.tolist(), strict=True))
+    for leg in routes:
+        assert len(leg.cells) > 5
+        for path in leg.cells:
+            assert path[0] == on_body.n_cells + leg.start
+            assert path[-1] == on_body.n_cells + leg.end
+            assert len(np.unique(path)) == len(path)
+            assert set(zip(path[:-1].tolist(), path[1:].tolist(), strict=True)) <= hops
+
+
+def test_routes_pass_a_tube_on_both_sides():
+    """On a torus, both ways round the hole and round the tube are among the routes."""
+    torus = shapes.torus(around=48, across=24)
+    angle = np.array([0.0, 0.8 * np.pi])
+    radius = np.linalg.norm(torus.vertices[:, :2], axis=1).max()
+    places = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(2)])
+    graph = graph_through(torus, places, np.array([[0, 1]]))
+    sides = {
+        bool(np.sign(graph.positions[path[len(path) // 2], 1]) > 0)
+        for path in routes_of_legs(graph, np.array([[0, 1]]), closed=False)[0].cells
+    }
+    assert sides == {True, False}
+
+
+def test_hops_between_neighbouring_control_points_need_no_cell():
+    square = grid(40)
+    near = [[0.5, 0.5, 0.0], [0.52, 0.5, 0.0], [0.51, 0.53, 0.0]]
+    graph = graph_through(square, near)
+    for start, end in LEGS:
+        assert np.isfinite(graph.by_state(start, end)).any()
+    assert all(len(leg.cells) for leg in routes_of_legs(graph, LEGS, closed=True))

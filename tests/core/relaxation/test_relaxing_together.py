@@ -1,0 +1,119 @@
+"""Several curves in one set of arrays: the same energies, steps and results as one by one."""
+
+import numpy as np
+import pytest
+
+from nicmm_core import shapes
+from nicmm_core.geometry.surface_points import joined
+from nicmm_core.relaxation.curve_nodes import CurveSurface, curve_surface, nodes_at
+from nicmm_core.relaxation.elastic_energy import (
+    balance,
+    curve_energies,
+    damped_step,
+    elastic_energy,
+    elastic_system,
+)
+from nicmm_core.relaxation.node_traces import simple_curves, with_midpoints
+from nicmm_core.relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
+from tests.core.checks import circle, points_near
+
+SIZE = 40
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return curve_surface(shapes.sphere(4))
+
+
+def rings(surface, closed=True):
+    """Three wavy circles of latitude as one set of nodes, and each alone."""
+    angle = np.arange(SIZE) * 2.0 * np.pi / (SIZE if closed else 1.3 * SIZE)
+    places = []
+    for height, waves in ((0.1, 2), (-0.3, 3), (0.5, 0)):
+        z = height + 0.1 * np.sin(waves * angle)
+        ring = np.sqrt(1.0 - z**2)
+        positions = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
+        places.append(points_near(surface.mesh, positions))
+    return nodes_at(surface, joined(places), closed, 3), [
+        nodes_at(surface, place, closed) for place in places
+    ]
+
+
+def fixed_nodes(count=1):
+    fixed = np.zeros(SIZE, dtype=bool)
+    fixed[[0, 13, 27, SIZE - 1]] = True
+    return np.tile(fixed, count)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("mapped", [True, False])
+def test_energies_and_steps_are_those_of_each_curve(surface, closed, mapped):
+    if mapped:
+        phi_fea = 1.0 + 0.5 * np.sin(3.0 * surface.mesh.vertices[:, 0])
+        surface = CurveSurface(surface.mesh, surface.vertex_normals, phi_fea, 40.0)
+    together, alone = rings(surface, closed)
+    weights = balance(surface, together, 1.0, apart=False)
+    energies = curve_energies(together, weights)
+    move = damped_step(elastic_system(surface, together, weights), ~fixed_nodes(3), 1e-3)
+    for number, nodes in enumerate(alone):
+        own = balance(surface, nodes, 1.0, apart=False)
+        assert energies[number] == pytest.approx(elastic_energy(nodes, own))
+        step = damped_step(elastic_system(surface, nodes, own), ~fixed_nodes(), 1e-3)
+        here = move[number * SIZE : (number + 1) * SIZE]
+        np.testing.assert_allclose(here, step, atol=1e-9 * np.abs(step).max())
+
+
+def test_contact_is_within_each_curve(surface):
+    """Curves at the same place do not repel each other."""
+    _, alone = rings(surface)
+    twice = nodes_at(surface, joined([alone[0].places, alone[0].places]), True, 2)
+    weights = balance(surface, twice, 1.0, apart=True)
+    own = balance(surface, alone[0], 1.0, apart=True)
+    np.testing.assert_allclose(
+        curve_energies(twice, weights), elastic_energy(alone[0], own), rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_relaxing_together_is_relaxing_alone(surface, closed):
+    together, alone = rings(surface, closed)
+    config = TogetherConfig(iterations=6)
+    found = relax_together(surface, together, fixed_nodes(3), 1.0, config)
+    for number, nodes in enumerate(alone):
+        own = relax_together(surface, nodes, fixed_nodes(), 1.0, config)
+        here = curves_of(found, np.array([number])).positions
+        np.testing.assert_allclose(here, own.positions, atol=1e-5)
+
+
+def test_energies_fall_and_fixed_nodes_stay(surface):
+    nodes, _ = rings(surface)
+    found = relax_together(surface, nodes, fixed_nodes(3), 1.0, TogetherConfig())
+    before = curve_energies(nodes, balance(surface, nodes, 1.0, apart=False))
+    after = curve_energies(found, balance(surface, found, 1.0, apart=False))
+    assert (after <= before).all() and after[1] < 0.9 * before[1]
+    fixed = fixed_nodes(3)
+    np.testing.assert_array_equal(found.positions[fixed], nodes.positions[fixed])
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_midpoints_lie_between_their_nodes(surface, closed):
+    nodes, _ = rings(surface, closed)
+    finer, fixed = with_midpoints(surface, nodes, fixed_nodes(3))
+    assert len(finer.positions) == 3 * (2 * SIZE - (not closed))
+    assert fixed.sum() == fixed_nodes(3).sum()
+    lengths = finer.step_lengths.reshape(3, -1).sum(axis=1)
+    before = nodes.step_lengths.reshape(3, -1).sum(axis=1)
+    assert (lengths >= 0.999 * before).all() and (lengths <= 1.03 * before).all()
+    assert finer.step_lengths.max() < 0.6 * nodes.step_lengths.max()
+
+
+def test_a_curve_that_crosses_itself_is_told(surface):
+    angles = np.arange(SIZE) * 2.0 * np.pi / SIZE
+    eight = np.column_stack([0.5 * np.sin(angles), 0.4 * np.sin(2.0 * angles)])
+    ring = circle(angles, 0.5)[:, :2]
+    places = []
+    for flat in (eight, ring):
+        heights = np.sqrt(1.0 - (flat**2).sum(axis=1))
+        places.append(points_near(surface.mesh, np.column_stack([flat, heights])))
+    nodes = nodes_at(surface, joined(places), True, 2)
+    assert simple_curves(surface, nodes).tolist() == [False, True]
