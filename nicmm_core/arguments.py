@@ -79,6 +79,13 @@ def check_iterations(max_iterations: Any) -> None:
         )
 
 
+def check_alternatives(alternatives: Any) -> None:
+    """Raise ArgumentError unless it is a whole number that is not negative."""
+    whole = isinstance(alternatives, int | np.integer) and not isinstance(alternatives, bool)
+    if not (whole and alternatives >= 0):
+        raise ArgumentError(f"alternatives is {alternatives!r}; pass a whole number, 0 for none")
+
+
 def check_torch() -> None:
     """Raise MissingPackageError unless PyTorch can be imported."""
     try:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_iterations, check_torch, checked_options
+from .arguments import check_alternatives, check_iterations, check_torch, checked_options
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -88,6 +88,7 @@ class Designer:
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
         smoothness: float = 1.0,
+        alternatives: int = 0,
         start: Design | SurfaceCurve | None = None,
         max_iterations: int | None = None,
         progress: Progress | None = None,
@@ -130,7 +131,7 @@ class Designer:
         try:
             with watched(progress), self._its_turn():
                 options = checked_options(self.mesh, given)
-                _check_start(start, method, max_iterations)
+                _check_start(start, method, max_iterations, alternatives)
                 if method == "nicmm-paper":
                     check_torch()
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)
@@ -143,7 +144,7 @@ class Designer:
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(mapped, start)
                 with placed(lambda points: points + mapped.origin):
-                    found = designer.design(there, started, begin, max_iterations)
+                    found = designer.design(there, started, begin, max_iterations, alternatives)
                     return design_on_original(mapped, found)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
@@ -195,9 +196,15 @@ def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
     )
 
 
-def _check_start(start: object, method: str, max_iterations: int | None) -> None:
-    """Raise ArgumentError unless a start and a limit can be used with the method."""
+def _check_start(start: object, method: str, max_iterations: int | None, alternatives: int) -> None:
+    """Raise ArgumentError unless these fit the method and each other."""
     check_iterations(max_iterations)
+    check_alternatives(alternatives)
+    if alternatives and (method != "nicmm" or start is not None or max_iterations is not None):
+        raise ArgumentError(
+            f'alternatives is {alternatives}, which needs the method "nicmm" and neither start nor '
+            "max_iterations; leave it out"
+        )
     if start is not None and not isinstance(start, Design | SurfaceCurve):
         raise ArgumentError(
             f"start is a {type(start).__name__}; pass a Design, a SurfaceCurve or None"
@@ -219,6 +226,7 @@ def design_curve(
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
     smoothness: float = 1.0,
+    alternatives: int = 0,
     progress: Progress | None = None,
 ) -> Design:
     """Design a smooth curve on a mesh through control points.
@@ -249,6 +257,9 @@ def design_curve(
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
+    alternatives : int, default 0
+        Most other courses to return too, in `Design.alternatives`: whole curves of their own, the
+        fairest first. Only with the method "nicmm".
     progress : callable, optional
         Called a few times a second with the fraction done and the points of the present curve, at
         first none. If it returns False, the design stops with the last curve, or with none.
@@ -288,5 +299,6 @@ def design_curve(
         alignment=alignment,
         clearance=clearance,
         smoothness=smoothness,
+        alternatives=alternatives,
         progress=progress,
     )

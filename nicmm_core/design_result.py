@@ -36,6 +36,9 @@ class Design:
         Finds `field` when it is first asked for.
     resumable : Resumable or None
         What another design goes on from by ``start=``; None where `curves` has to do.
+    alternatives : list of Design
+        Curves along other courses, the fairest first, each at least 2 % of the diagonal away from
+        the others somewhere; empty unless they were asked for.
     """
 
     status: Status
@@ -46,6 +49,7 @@ class Design:
     breaking_vertices: int
     find_field: Callable[[], FloatArray] = dataclass_field(repr=False, compare=False)
     resumable: Resumable | None = dataclass_field(default=None, repr=False, compare=False)
+    alternatives: list[Design] = dataclass_field(default_factory=list)
 
     @cached_property
     def field(self) -> FloatArray:

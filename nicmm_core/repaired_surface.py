@@ -160,6 +160,7 @@ def design_on_original(mapped: MappedMesh, design: Design) -> Design:
     return replace(
         design,
         curves=[mapped.curve(curve) for curve in design.curves],
+        alternatives=[design_on_original(mapped, other) for other in design.alternatives],
         find_field=partial(_field_on_original, mapped, design),
     )
 

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import itertools
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from .coarsening.coarse_start import COURSES, CoarseStarts
+from .coarsening.coarse_start import CoarseStarts
+from .courses.course_search import APART, farthest_between
 from .courses.course_surface import CourseSurface
 from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
@@ -32,6 +34,7 @@ from .path.initial_loop import path_curve
 from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
+from .relaxation.elastic_energy import bending_energy, comparable_energies
 from .relaxation.noded_curve import NodedCurve, is_simple, noded, traced_through
 from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from .relaxation.warm_start import WARM
@@ -44,6 +47,12 @@ STARTED = 0.6
 
 SOON_DONE = 10
 """The limit on iterations of a relaxation, relative to the number that most curves need."""
+
+STRONGLY_BENT = 160.0
+"""L ∮ κ_g² ds above which the network's curve is relaxed too, and the better one kept.
+
+Four times that of a circle: such curves wind around thin limbs, where few candidates are simple.
+"""
 
 COLLISIONS = 3
 """Designs for which strands are assumed to collide after a collision."""
@@ -79,6 +88,7 @@ class SurfaceDesigner:
         started: float,
         start: Resumable | SurfaceCurve | None = None,
         max_iterations: int | None = None,
+        alternatives: int = 0,
     ) -> Design:
         """Design a curve.
 
@@ -91,6 +101,8 @@ class SurfaceDesigner:
             A curve on this mesh from which the method "nicmm" starts.
         max_iterations : int, optional
             Limit on the iterations of the relaxation in total.
+        alternatives : int
+            Most other courses to design too, by the method "nicmm" without a start or a limit.
 
         Raises
         ------
@@ -102,7 +114,7 @@ class SurfaceDesigner:
         if request.method == "nicmm":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
-            return self._designed(request, max_iterations, started)
+            return self._designed(request, max_iterations, alternatives, started)
         with subrange(0.0, 0.3):
             problem = requested_problem(self.mesh, request)
         watch = _FieldWatch(self.mesh, problem)
@@ -133,38 +145,67 @@ class SurfaceDesigner:
         begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
         return self._relaxed(request, begin, config, max_iterations, started)
 
-    def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
-        """Relax the curve of a coarse mesh or of the network."""
+    def _designed(
+        self, request: Request, max_iterations: int | None, alternatives: int, started: float
+    ) -> Design:
+        """Relax the best course, or the curve of the network where none is found."""
+        config = RelaxationConfig() if request.alignment is None else GUIDED
         with subrange(0.0, STARTED):
-            start = self._start_from_coarse(request)
+            courses = self._course_starts(request)
+            start = next(courses, None)
+            by_course = start is not None
             if start is None:
-                start = self._start_from_course(request)
-            if start is None:
-                start = self._start_from_network(request)
+                start = self._start_by_network(request)
         with subrange(STARTED, 1.0):
-            config = RelaxationConfig() if request.alignment is None else GUIDED
-            return self._relaxed(request, start, config, max_iterations, started)
+            designs = [self._relaxed(request, start, config, max_iterations, started)]
+            if max_iterations is None:
+                if by_course and self._bent(designs[0]):
+                    other = self._start_by_network(request)
+                    designs.append(self._relaxed(request, other, config, None, started))
+                if alternatives:
+                    for other in itertools.islice(courses, 2 * alternatives + 2):
+                        designs.append(self._relaxed(request, other, config, None, started))
+            return _fairest(start.surface, designs, request.smoothness, alternatives)
 
-    def _start_from_course(self, request: Request) -> _Start | None:
-        """The best course that is simple on the mesh; None if none is found."""
-        surface = self._surface
-        for course in itertools.islice(self._courses.courses(request), COURSES):
+    def _bent(self, design: Design) -> bool:
+        """Whether a curve bends so much that the search may have missed a far better one."""
+        assert design.resumable is not None
+        nodes = design.resumable.curve.nodes
+        return bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
+
+    def _course_starts(self, request: Request) -> Iterator[_Start]:
+        """Courses that are simple on the mesh, the best first."""
+        there, unit = self._curve_surface(request), self._unit(request)
+        if self._coarse_starts.is_large(request):
+            for found in self._coarse_starts.courses(request):
+                yield _Start(found.curve, found.visited, there, unit)
+            return
+        for course in self._courses.courses(request):
             checkpoint()
             controls = request.points[course.visited]
-            faces, barycentric = course.places.faces.copy(), course.places.barycentric.copy()
+            faces, barycentric = (
+                course.places.faces.copy(),
+                strictly_inside(course.places.barycentric),
+            )
             faces[course.control_nodes] = controls.faces
             barycentric[course.control_nodes] = controls.barycentric
-            places = SurfacePoints(faces, strictly_inside(barycentric))
-            places.barycentric[course.control_nodes] = controls.barycentric
-            nodes = noded(surface, places, course.control_nodes, request.closed)
-            curve = traced_through(surface, nodes, nodes.nodes)
-            if curve is not None and is_simple(surface, curve):
-                there, unit = self._curve_surface(request), self._unit(request)
-                return _Start(curve, course.visited, there, unit)
-        return None
+            places = SurfacePoints(faces, barycentric)
+            nodes = noded(self._surface, places, course.control_nodes, request.closed)
+            curve = traced_through(self._surface, nodes, nodes.nodes)
+            if curve is not None and is_simple(self._surface, curve):
+                yield _Start(curve, course.visited, there, unit)
 
-    def _start_from_network(self, request: Request) -> _Start:
+    def _start_by_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path where that is not one curve."""
+        coarse = self._coarse_starts.by_network(request)
+        if coarse is not None:
+            return _Start(
+                curve=coarse.curve,
+                visited=coarse.visited,
+                surface=self._curve_surface(request),
+                unit=self._unit(request),
+                breaking=coarse.breaking_vertices,
+            )
         there = self._courses.copy
         with placed(there.in_original):
             found = infer(there.mesh, renumbered_request(there, request))
@@ -178,19 +219,6 @@ class SurfaceDesigner:
             surface=self._curve_surface(request),
             unit=problem.unit,
             breaking=zeros.breaking_vertices,
-        )
-
-    def _start_from_coarse(self, request: Request) -> _Start | None:
-        """The curve of a coarse mesh; None if the mesh is small or no curve is found."""
-        found = self._coarse_starts.find(request)
-        if found is None:
-            return None
-        return _Start(
-            curve=found.curve,
-            visited=found.visited,
-            surface=self._curve_surface(request),
-            unit=self._unit(request),
-            breaking=found.breaking_vertices,
         )
 
     def _relaxed(
@@ -272,6 +300,30 @@ class SurfaceDesigner:
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
         return CoarseStarts(self._surface)
+
+
+def _fairest(
+    surface: CurveSurface, designs: list[Design], smoothness: float, alternatives: int
+) -> Design:
+    """The design of least energy, with others that differ from it and from each other."""
+    curves = [design.resumable.curve for design in designs if design.resumable is not None]
+    if len(designs) == 1 or len(curves) < len(designs):
+        return designs[0]
+    scale = min(curve.length for curve in curves)
+    energy = [
+        float(comparable_energies(surface, curve.nodes, smoothness, scale)[0]) for curve in curves
+    ]
+    best, *others = np.argsort(energy, kind="stable").tolist()
+    limit = APART * surface.mesh.diagonal
+    chosen = [best]
+    for number in others:
+        positions = curves[number].nodes.positions
+        away = [farthest_between(positions, curves[each].nodes.positions) for each in chosen]
+        if min(away) > limit:
+            chosen.append(number)
+    return replace(
+        designs[best], alternatives=[designs[each] for each in chosen[1 : alternatives + 1]]
+    )
 
 
 class _FieldWatch:

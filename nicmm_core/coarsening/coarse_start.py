@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..courses.course_surface import CourseSurface
-from ..errors import NicmmError
+from ..errors import MeshError, NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
@@ -34,9 +33,6 @@ SMALL = 3_000
 GROWTH = 4
 """Factor of the number of cells after a coarse mesh on which no curve was found."""
 
-
-COURSES = 16
-"""Most tries to map a course to the mesh itself, two for each course."""
 
 COARSE_SHARE = 0.3
 """Approximate share of the time to a first start that building the coarse mesh takes."""
@@ -82,26 +78,62 @@ class CoarseStarts:
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._sizes: dict[int, int] = {}
 
-    def find(self, request: Request) -> CoarseStart | None:
-        """The curve of the coarsest mesh on which one is found; None if there is none.
+    def courses(self, request: Request) -> Iterator[CoarseStart]:
+        """The courses on a coarse mesh that are simple on the fine mesh, the best first.
+
+        There are none on a small mesh, and perhaps none where points are close together.
+        """
+        for level in self._levels(request):
+            try:
+                on_coarse = _on_coarse(self._mesh, level.coarse, request)
+                for course in level.courses.courses(on_coarse):
+                    checkpoint()
+                    nodes = noded(
+                        level.surface, course.places, course.control_nodes, request.closed
+                    )
+                    controls = request.points[course.visited]
+                    curve = nodes_on_fine_mesh(self._fine, level.coarse, nodes, controls)
+                    if curve is not None:
+                        yield CoarseStart(curve, course.visited)
+            except NicmmError:
+                return
+            return
+
+    def by_network(self, request: Request) -> CoarseStart | None:
+        """The curve of the coarsest mesh on which the network finds one; None if there is none.
 
         There is none on a small mesh, and perhaps none where points or strands are close together;
         the caller then falls back to full resolution.
         """
+        for level in self._levels(request):
+            try:
+                start = self._by_network_on(level, request)
+            except NicmmError:
+                continue
+            if start is not None:
+                return start
+        return None
+
+    def is_large(self, request: Request) -> bool:
+        """Whether the mesh has a coarse mesh for a request."""
+        component = int(self._mesh.face_component[request.points.faces[0]])
+        return self._n_vertices(component) // REDUCTION * REDUCTION > SMALL
+
+    def _levels(self, request: Request) -> Iterator[_CoarseSurface]:
+        """The coarse meshes of the component of a request, the coarsest first."""
+        if not self.is_large(request):
+            return
         component = int(self._mesh.face_component[request.points.faces[0]])
         most = self._n_vertices(component) // REDUCTION
-        if most * REDUCTION <= SMALL:
-            return None
         count = min(CELLS, most)
         while count <= most:
             try:
-                start = self._start_on(self._surface(component, count), request)
-            except NicmmError:
-                start = None
-            if start is not None:
-                return start
+                level = self._surface(component, count)
+            except MeshError:
+                level = None
+            if level is not None:
+                yield level
             count *= GROWTH
-        return None
 
     def _n_vertices(self, component: int) -> int:
         if component not in self._sizes:
@@ -109,13 +141,10 @@ class CoarseStarts:
             self._sizes[component] = np.count_nonzero(np.bincount(inside.ravel()))
         return self._sizes[component]
 
-    def _start_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
+    def _by_network_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse, copy = level.coarse, level.courses.copy
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        with subrange(COARSE_SHARE, 0.6):
-            for start in self._courses(level, on_coarse, request):
-                return start
-        with subrange(0.6, 0.9), placed(copy.in_original):
+        with subrange(COARSE_SHARE, 0.9), placed(copy.in_original):
             zeros = infer(copy.mesh, renumbered_request(copy, on_coarse)).zeros
         if not zeros.is_simple_curve(copy.mesh, request.closed):
             return None
@@ -125,21 +154,6 @@ class CoarseStarts:
             self._fine, coarse, level.surface, curve, request.points[visited]
         )
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
-
-    def _courses(
-        self, level: _CoarseSurface, on_coarse: Request, request: Request
-    ) -> Iterator[CoarseStart]:
-        """The courses on a coarse mesh that are simple on the fine one, the best first."""
-        for course in itertools.islice(level.courses.courses(on_coarse), COURSES):
-            checkpoint()
-            curve = nodes_on_fine_mesh(
-                self._fine,
-                level.coarse,
-                noded(level.surface, course.places, course.control_nodes, request.closed),
-                request.points[course.visited],
-            )
-            if curve is not None:
-                yield CoarseStart(curve, course.visited)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:
         key = component, count

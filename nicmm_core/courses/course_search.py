@@ -6,7 +6,7 @@ Courses are compared by the energy that relaxation minimises, with one length sc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,11 +27,11 @@ TENSION = 4.0
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path. Hops overrate
 bending, since they turn at cells only."""
 
-CANDIDATES, FINALISTS = 16, 5
+CANDIDATES, FINALISTS = 24, 6
 """Courses relaxed with few nodes, and those of them relaxed with twice as many."""
 
-CROSSING = 10.0
-"""Factor of the energy of a course that crosses itself, which may yet be simple on the mesh."""
+SPARSE = 8
+"""One node in so many is compared first."""
 
 APART = 0.02
 """Greatest distance of two courses that count as the same, relative to the diagonal."""
@@ -43,30 +43,6 @@ FIRST = TogetherConfig(iterations=12)
 SECOND = TogetherConfig(iterations=8)
 
 
-@dataclass(frozen=True)
-class Courses:
-    """Relaxed courses, the best first.
-
-    Attributes
-    ----------
-    nodes : Nodes
-        On c curves.
-    control : (n,) bool array
-        Which nodes are control points.
-    energy : (c,) float array
-        `comparable_energies`; courses that cross themselves come later.
-    """
-
-    nodes: Nodes
-    control: BoolArray
-    energy: FloatArray
-
-    def course(self, number: int) -> tuple[Nodes, BoolArray]:
-        """Nodes of one course, and which of them are control points."""
-        which = np.array([number])
-        return curves_of(self.nodes, which), self.nodes.by_curve(self.control)[number]
-
-
 def find_courses(
     graph: HopGraph,
     surface: CurveSurface,
@@ -74,8 +50,10 @@ def find_courses(
     fixed: BoolArray,
     closed: bool,
     smoothness: float,
-) -> Courses | None:
-    """Simple courses through points in their order; None if there are no candidates.
+) -> Iterator[tuple[Nodes, BoolArray]]:
+    """Simple relaxed courses through points in their order, by ascending energy.
+
+    Each by its nodes, and which of these are control points.
 
     Parameters
     ----------
@@ -92,7 +70,7 @@ def find_courses(
     """
     count = len(points) if closed else len(points) - 1
     if count > MOST_LEGS:
-        return None
+        return
     ends = np.arange(count)
     legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
@@ -101,28 +79,29 @@ def find_courses(
     checkpoint()
     routes = routes_of_legs(courses, legs, closed)
     if not routes or not all(len(leg.cells) for leg in routes):
-        return None
+        return
     with subrange(0.2, 0.3):
         on_routes = laid_routes(courses, routes, smoothness)
     crosses = crossing_routes(courses, routes, on_routes)
     combinations = combined(courses, routes, crosses, closed)
     choice = different(routes, combinations, CANDIDATES)
     if not len(choice):
-        return None
+        return
     nodes, at_points = course_nodes(courses, routes, on_routes, choice, closed)
     control = at_points.copy()
     control[at_points] = np.tile(fixed, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
     with subrange(0.4, 0.7):
         nodes = relax_together(surface, nodes, control, smoothness, FIRST)
-    best = _best(surface, nodes, smoothness)[:FINALISTS]
+    simple, crossing = _best(surface, nodes, smoothness)
+    best = np.append(simple, crossing)[:FINALISTS]
     nodes, control = curves_of(nodes, best), nodes.by_curve(control)[best].ravel()
     nodes, control = with_midpoints(surface, nodes, control)
     with subrange(0.7, 1.0):
         nodes = relax_together(surface, nodes, control, smoothness, SECOND)
-    best = _best(surface, nodes, smoothness)
-    energy = _energies(surface, nodes, smoothness)[best]
-    return Courses(curves_of(nodes, best), nodes.by_curve(control)[best].ravel(), energy)
+    simple, _ = _best(surface, nodes, smoothness)
+    for number in simple.tolist():
+        yield curves_of(nodes, np.array([number])), nodes.by_curve(control)[number]
 
 
 def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:
@@ -131,20 +110,30 @@ def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatAr
     return comparable_energies(surface, nodes, smoothness, shortest)
 
 
-def _best(surface: CurveSurface, nodes: Nodes, smoothness: float) -> IntArray:
-    """Courses that differ, simple ones first, then by energy."""
+def _best(surface: CurveSurface, nodes: Nodes, smoothness: float) -> tuple[IntArray, IntArray]:
+    """Courses that differ by ascending energy: those that are simple, and the others."""
     energy = _energies(surface, nodes, smoothness)
-    simple = simple_curves(surface, nodes)
-    order = np.argsort(np.where(simple, energy, CROSSING * energy), kind="stable")
     positions = nodes.positions.reshape(nodes.curves, -1, 3)
+    trees = [cKDTree(points) for points in positions]
+    limit = APART * surface.mesh.diagonal
     chosen: list[int] = []
-    for number in order.tolist():
-        away = [_farthest(positions[number], positions[other]) for other in chosen]
-        if min(away, default=np.inf) > APART * surface.mesh.diagonal:
+    for number in np.argsort(energy, kind="stable").tolist():
+        if not any(
+            _near(positions[number], trees[other], limit)
+            and _near(positions[other], trees[number], limit)
+            for other in chosen
+        ):
             chosen.append(number)
-    return np.array(chosen)
+    order, simple = np.array(chosen), simple_curves(surface, nodes)[chosen]
+    return order[simple], order[~simple]
 
 
-def _farthest(one: FloatArray, other: FloatArray) -> float:
-    """Greatest distance of a point of either set to the other set."""
+def _near(points: FloatArray, tree: cKDTree, limit: float) -> bool:
+    """Whether no point is farther than a limit from those of a tree."""
+    few = tree.query(points[::SPARSE])[0].max() <= limit
+    return bool(few and tree.query(points)[0].max() <= limit)
+
+
+def farthest_between(one: FloatArray, other: FloatArray) -> float:
+    """Greatest distance of a point of either set, (n, 3) and (m, 3), to the other set."""
     return float(max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()))

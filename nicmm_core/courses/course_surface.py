@@ -111,10 +111,7 @@ class CourseSurface:
         found = find_courses(
             self._graph(component), surface, on_refined, fixed, there.closed, there.smoothness
         )
-        if found is None:
-            return
-        for number in range(found.nodes.curves):
-            nodes, control = found.course(number)
+        for nodes, control in found:
             for _ in range(2):
                 on_copy = self._refined.in_parents(nodes.places)
                 places = self.copy.original_points(on_copy)

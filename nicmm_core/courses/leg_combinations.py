@@ -17,7 +17,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import Nodes, nodes_at
-from ..relaxation.node_traces import places_along, traced_segments
+from ..relaxation.node_traces import places_along, traced_segments, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost
@@ -28,7 +28,7 @@ NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
 NODES = 96
 """Nodes of a course, distributed over its legs by length."""
 
-SEPARATING = TogetherConfig(iterations=4, contact=False, longest_move=2.0)
+SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
 """Relaxation of routes before they are tested; their directions at both ends are kept."""
 
 BEAM = 3_000
@@ -52,7 +52,10 @@ class Combinations:
 
 
 def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
-    """Nodes on all routes, as one open curve each, with equally many nodes."""
+    """Nodes on all routes, as one open curve each, with equally many nodes.
+
+    They are relaxed with few nodes, then get twice as many, between which hardly a trace fails.
+    """
     surface = graph.graph.surface
     count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // len(routes)))
     paths = [path for leg in routes for path in leg.cells]
@@ -82,7 +85,8 @@ def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> 
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), False, len(paths))
     clamped = np.zeros((len(paths), count), dtype=bool)
     clamped[:, [0, 1, -2, -1]] = True
-    return relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
+    nodes = relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
+    return with_midpoints(surface, nodes, clamped.ravel())[0]
 
 
 def _is_end(count: int, paths: list[IntArray]) -> BoolArray:

@@ -16,7 +16,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from .hop_graph import CourseGraph
 
-DIRECTIONS = 100
+DIRECTIONS = 64
 """Pairs of directions at both ends of a leg that are compared with those of other legs."""
 
 ALIGNED = 24
@@ -25,7 +25,7 @@ ALIGNED = 24
 DIFFERENT = 12
 """Further routes of a leg, each along another way."""
 
-ALL_DIRECTIONS, ALL_ROUTES = 500, 180
+ALL_DIRECTIONS, ALL_ROUTES = 320, 180
 """Caps on the sums of these over all legs, except that every leg has a few."""
 
 WORST = 8.0

@@ -14,7 +14,7 @@ from nicmm_core.options import Choice, Kind, Option
 from nicmm_core.request import Request
 
 DEFAULTS = {option.name: option.default for option in options.OPTIONS}
-BESIDE = {"progress"}
+BESIDE = {"alternatives", "progress"}
 """Arguments of `design_curve` that are no options of the curve."""
 
 ADDED = (

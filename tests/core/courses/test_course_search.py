@@ -6,13 +6,13 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
-from nicmm_core.courses.course_search import find_courses
+from nicmm_core.courses.course_search import farthest_between, find_courses
 from nicmm_core.courses.hop_graph import build_hop_graph
 from nicmm_core.courses.leg_combinations import combined, crossing_routes, laid_routes
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.relaxation.elastic_energy import bending_energy
+from nicmm_core.relaxation.elastic_energy import bending_energy, comparable_energies
 from tests.core.checks import assert_valid_design, points_near, random_surface_points
 from tests.core.courses.test_hop_graph import LEGS, graph_through
 
@@ -41,11 +41,11 @@ def test_combinations_do_not_cross(body):
 def test_courses_pass_their_points_in_order(body, closed):
     surface = curve_surface(body)
     points = random_surface_points(body, 4, seed=3)
-    found = find_courses(
-        build_hop_graph(surface, 0), surface, points, np.ones(4, bool), closed, 1.0
+    found = list(
+        find_courses(build_hop_graph(surface, 0), surface, points, np.ones(4, bool), closed, 1.0)
     )
-    for number in range(found.nodes.curves):
-        nodes, control = found.course(number)
+    assert found
+    for nodes, control in found:
         passed = nodes.positions[control]
         np.testing.assert_allclose(passed, points.positions(body), atol=1e-9 * body.diagonal)
 
@@ -57,10 +57,10 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
     points = points_near(ball, on_circle)
     graph = build_hop_graph(surface, 0)
-    found = find_courses(graph, surface, points, np.ones(3, bool), True, 1.0)
-    nodes, _ = found.course(0)
+    nodes, _ = next(find_courses(graph, surface, points, np.ones(3, bool), True, 1.0))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
-    assert found.energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
+    energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
+    assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
 
 
 @pytest.mark.slow
@@ -76,7 +76,7 @@ def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
         return curve.length * bending_energy(curve.nodes) + 4.0 * np.pi**2
 
     searched = [total(seed) for seed in range(8)]
-    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: None)
+    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: iter(()))
     by_network = [total(seed) for seed in range(8)]
     assert np.mean(np.log(np.divide(searched, by_network))) < np.log(0.9)
 
@@ -95,3 +95,35 @@ def test_a_refined_mesh_is_the_same_surface(body, times):
     back = divided.in_parents(there)
     np.testing.assert_array_equal(back.faces, points.faces)
     np.testing.assert_allclose(back.barycentric, points.barycentric, atol=1e-12)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_alternatives_are_whole_curves_that_differ(body, closed):
+    chosen = [20, 250, 600]
+    plain = nicmm.design_curve(body, chosen, closed=closed)
+    assert plain.alternatives == []
+    design = nicmm.design_curve(body, chosen, closed=closed, alternatives=2)
+    np.testing.assert_array_equal(design.curves[0].points, plain.curves[0].points)
+    assert 1 <= len(design.alternatives) <= 2
+    every = [design, *design.alternatives]
+    scale = min(one.curves[0].length for one in every)
+    energies = []
+    for one in every:
+        assert_valid_design(body, one, body.vertices[chosen], closed)
+        nodes = one.resumable.curve.nodes
+        energies += comparable_energies(curve_surface(body), nodes, 1.0, scale).tolist()
+    assert energies == sorted(energies)
+    for number, one in enumerate(every):
+        for other in every[:number]:
+            away = farthest_between(one.curves[0].points, other.curves[0].points)
+            assert away > 0.01 * body.diagonal
+
+
+def test_alternatives_that_cannot_be_given(body):
+    for wrong in (-1, 1.5, True, "two"):
+        with pytest.raises(nicmm.ArgumentError, match="alternatives"):
+            nicmm.design_curve(body, [20, 250, 600], alternatives=wrong)
+    with pytest.raises(nicmm.ArgumentError, match="alternatives"):
+        nicmm.design_curve(body, [20, 250, 600], alternatives=1, method="variational")
+    with pytest.raises(nicmm.ArgumentError, match="alternatives"):
+        nicmm.Designer(body).design([20, 250, 600], alternatives=1, max_iterations=3)
