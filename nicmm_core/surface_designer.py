@@ -48,10 +48,10 @@ STARTED = 0.6
 SOON_DONE = 10
 """The limit on iterations of a relaxation, relative to the number that most curves need."""
 
-STRONGLY_BENT = 160.0
+STRONGLY_BENT = 400.0
 """L ∮ κ_g² ds above which the network's curve is relaxed too, and the better one kept.
 
-Four times that of a circle: such curves wind around thin limbs, where few candidates are simple.
+Ten times that of a circle: such curves wind around thin limbs, where few candidates are simple.
 """
 
 COLLISIONS = 3

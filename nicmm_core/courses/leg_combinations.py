@@ -35,6 +35,10 @@ BEAM = 3_000
 """Incomplete combinations kept after each leg."""
 
 
+WORST = 1.5
+"""Cost of a combination, relative to the least, above which it is not relaxed."""
+
+
 @dataclass(frozen=True)
 class Combinations:
     """Courses by their routes.
@@ -165,7 +169,7 @@ def combined(
 def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
     """The cheapest combinations of which no two run beside each other on all legs, (d, l)."""
     choice = combinations.choice
-    left = np.ones(len(choice), dtype=bool)
+    left = combinations.cost <= WORST * combinations.cost.min(initial=np.inf)
     chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())

@@ -86,7 +86,7 @@ def test_every_stage_asks_and_fractions_only_grow(at_every_checkpoint, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", [name for name in STAGES if name != "paper"])
 def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     at_every_checkpoint, name
 ):
