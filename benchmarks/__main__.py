@@ -36,6 +36,7 @@ MEASUREMENTS = (
     "sharp_edges",
     "peers",
     "degraded",
+    "degraded_start",
     "courses",
     "resolution",
     "gallery",
