@@ -44,10 +44,10 @@ FIELDS, GRAPHS = "paths over random fields", "hop graphs with random weights"
 
 def run(scale: Scale) -> None:
     """Compare the default with the best known, and with itself on changed meshes."""
-    starts = scale.choose(24, 8, 1)
+    starts = scale.choose(8, 4, 1)
     ratios: dict[tuple[str, str], list[float]] = defaultdict(list)
     moved: dict[tuple[str, str], list[float]] = defaultdict(list)
-    surfaces = list(collections.surfaces(scale, scale.choose(24, 6, 1)))
+    surfaces = list(collections.surfaces(scale, scale.choose(12, 4, 1)))
     for number, (_, mesh, points) in enumerate(random_sets(surfaces, 1, SEED)):
         for kind, closed in (("closed", True), ("open", False)):
             every = _portfolio(mesh, points, closed, starts, number)

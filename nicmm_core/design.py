@@ -4,6 +4,10 @@ A request is checked, faces inside obstacles are removed (`repair.free_surface`)
 surface is made a manifold if it is not one (`repaired_surface`), and the curve is designed there
 (`surface_designer`):
 
+control points → courses that do not cross (`courses`), compared → relaxation of the curve,
+
+or, where no course is found,
+
 control points → initial loop → signed distance → features (`problem`) → pretrained network
 → its level set → one loop through the points → contour → relaxation of the curve.
 

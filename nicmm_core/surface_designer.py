@@ -1,4 +1,4 @@
-"""Designs curves on a manifold: starts from an earlier curve, a coarse mesh or the network.
+"""Designs curves on a manifold: starts from an earlier curve, a course or the network.
 
 This is the main course of a checked request; `design` is its entry point.
 """
@@ -48,10 +48,10 @@ STARTED = 0.6
 SOON_DONE = 10
 """The limit on iterations of a relaxation, relative to the number that most curves need."""
 
-STRONGLY_BENT = 400.0
+STRONGLY_BENT = 80.0
 """L ∮ κ_g² ds above which the network's curve is relaxed too, and the better one kept.
 
-Ten times that of a circle: such curves wind around thin limbs, where few candidates are simple.
+Twice that of a circle: such curves wind around thin limbs, where few candidates are simple.
 """
 
 COLLISIONS = 3

@@ -1,4 +1,4 @@
-"""The start of a curve on a large mesh: inferred on a coarse mesh, then mapped to the fine mesh."""
+"""The start of a curve on a large mesh: found on a coarse mesh, then mapped to the fine mesh."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ MOST_LEGS = 60
 """Number of legs above which no courses are sought: hardly any combination is simple then."""
 
 FIRST = TogetherConfig(iterations=12)
-SECOND = TogetherConfig(iterations=8)
+SECOND = TogetherConfig(iterations=14)
 
 
 def find_courses(

@@ -26,7 +26,6 @@ from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import edge_lengths
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
@@ -104,14 +103,6 @@ class HopGraph:
         indptr = np.searchsorted(before, np.arange(len(hops.start) + 1))
         return indptr, after, bending(hops, before, hops, after)
 
-    @cached_property
-    def edge_graph(self) -> sparse.csr_array:
-        """Lengths of the edges of the mesh, each stored once."""
-        mesh = self.surface.mesh
-        length = edge_lengths(mesh.vertices, mesh.edges)
-        size = len(mesh.vertices)
-        return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
-
 
 def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
     """The graph of a component of a surface."""
@@ -130,7 +121,7 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
     graph = HopGraph(surface, vertex, spacing, _no_hops(), np.zeros(0, dtype=np.int64))
     checkpoint()
     along = csgraph.dijkstra(
-        graph.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
+        graph.surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
     )[:, vertex]
     np.fill_diagonal(along, np.inf)
     start, end = _nearest(along, HOPS)
@@ -395,7 +386,7 @@ def _along_edges(graph: HopGraph, points: SurfacePoints) -> FloatArray:
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
     # A length of zero would not be stored as an arc.
     away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
-    edges = graph.edge_graph.tocoo()
+    edges = graph.surface.edge_graph.tocoo()
     values = np.concatenate([edges.data, away.ravel()])
     rows = np.concatenate([edges.coords[0], np.repeat(size + np.arange(k), 3)])
     columns = np.concatenate([edges.coords[1], corners.ravel()])

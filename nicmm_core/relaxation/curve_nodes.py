@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, unoriented_vertices
+from ..geometry.mesh import Mesh, edge_lengths, unoriented_vertices
 from ..geometry.surface_points import SurfacePoints
 from ..level_set.features import vertex_normals
 from ..maps.guidance import feature_map
@@ -48,6 +49,14 @@ class CurveSurface:
     feature_map: FloatArray | None = None
     feature_weight: float = 0.0
     folded: BoolArray | None = None
+
+    @cached_property
+    def edge_graph(self) -> sparse.csr_array:
+        """Lengths of the edges of the mesh, each stored once."""
+        mesh = self.mesh
+        length = edge_lengths(mesh.vertices, mesh.edges)
+        size = len(mesh.vertices)
+        return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
 
 
 def curve_surface(mesh: Mesh) -> CurveSurface:

@@ -9,16 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import overlapping_segments, segments_meet
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
-from ..geometry.tracing import strictly_inside, trace_between, trace_from
+from ..geometry.tracing import strictly_inside, trace_between
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 
 LONG_WAY = 3.0
 """Longest trace, relative to the distance of its ends in space: nodes may be far apart."""
+
+AROUND = 6.0
+"""Longest path along edges where a trace fails, relative to the longest distance in space."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ def with_midpoints(
 ) -> tuple[Nodes, BoolArray]:
     """Twice as many nodes: one more halfway along each trace.
 
-    Where a trace fails, the new node lies halfway along the chord, moved onto the surface.
+    Where a trace fails, it lies halfway along edges.
 
     Parameters
     ----------
@@ -114,10 +118,9 @@ def places_along(
 ) -> SurfacePoints:
     """Points at a share of the traces from some nodes, (q,), to the next ones, inside faces.
 
-    Where a trace fails, the point lies at this share of the chord, moved onto the surface.
+    Where a trace fails, as around a thin part, the point lies on the shortest path along edges.
     """
-    in_space = _along_chords(surface, nodes, node, share)
-    faces, barycentric = in_space.faces.copy(), in_space.barycentric.copy()
+    faces, barycentric = np.zeros(len(node), dtype=np.int64), np.zeros((len(node), 3))
     owner, points = _traces(surface, nodes)
     positions = points.positions(surface.mesh)
     step = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
@@ -126,6 +129,9 @@ def places_along(
     first = np.searchsorted(owner, node)
     last = np.searchsorted(owner, node, side="right") - 1
     traced = np.flatnonzero(last > first)
+    lost = np.flatnonzero(last <= first)
+    at_vertices = _along_edges(surface, nodes, node[lost], share[lost])
+    faces[lost], barycentric[lost] = at_vertices.faces, at_vertices.barycentric
     first, last = first[traced], last[traced]
     at = arc[first] + share[traced] * (arc[last] - arc[first])
     segment = (np.searchsorted(arc, at, side="right") - 1).clip(first, last - 1)
@@ -157,15 +163,40 @@ def _traces(surface: CurveSurface, nodes: Nodes) -> tuple[IntArray, SurfacePoint
     return node[owner[order]], points
 
 
-def _along_chords(
+def _along_edges(
     surface: CurveSurface, nodes: Nodes, node: IntArray, share: FloatArray
 ) -> SurfacePoints:
-    """Some nodes moved by a share of the way to the next one."""
-    normals = nodes.normals[node]
-    way = share[:, None] * nodes.steps[node]
-    way -= (way * normals).sum(axis=1, keepdims=True) * normals
-    length = np.linalg.norm(way, axis=1)
-    direction = way / np.maximum(length, tolerances.TINY)[:, None]
-    here = nodes.places[node]
-    inside = SurfacePoints(here.faces, strictly_inside(here.barycentric))
-    return trace_from(surface.mesh, inside, direction, length, surface.folded)[0]
+    """Points at a share of the shortest paths along edges from some nodes to the next ones.
+
+    Paths run from vertex to vertex; where there is none, the point stays at its vertex.
+    """
+    mesh = surface.mesh
+    following = np.arange(1, len(nodes.positions) + 1)
+    following[nodes.last] = nodes.first
+    corner = mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]
+    start, end = corner[node], corner[following[node]]
+    low, high, weight = start.copy(), start.copy(), np.zeros(len(node))
+    if len(node):
+        length, previous = csgraph.dijkstra(
+            surface.edge_graph,
+            directed=False,
+            indices=start,
+            limit=AROUND * float(nodes.step_lengths[node].max()),
+            return_predecessors=True,
+        )
+        for number in np.flatnonzero(np.isfinite(length[np.arange(len(node)), end])).tolist():
+            here, arc = int(end[number]), length[number]
+            wanted = share[number] * arc[here]
+            while arc[here] > wanted:
+                high[number], here = here, int(previous[number, here])
+            low[number] = here
+            step = arc[high[number]] - arc[here]
+            weight[number] = (wanted - arc[here]) / step if step > 0.0 else 0.0
+    around = [
+        np.intersect1d(mesh.faces_at(np.array([one])), mesh.faces_at(np.array([other])))[0]
+        for one, other in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+    face = np.array(around, dtype=np.int64)
+    corners, weight = mesh.faces[face], weight[:, None]
+    at_high = weight * (corners == high[:, None])
+    return SurfacePoints(face, (1.0 - weight) * (corners == low[:, None]) + at_high)
