@@ -20,7 +20,7 @@ from ..relaxation.curve_nodes import Nodes, nodes_at
 from ..relaxation.node_traces import places_along, traced_segments, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
-from .leg_routes import Routes, junction_cost
+from .leg_routes import Routes, junction_cost, rounded
 
 NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
 """Nodes of each route, the least number, and the sum over all legs above which they get fewer."""
@@ -158,7 +158,7 @@ def combined(
         for earlier in range(number):
             blocked |= crosses[offset[earlier] + choice[:, earlier]][:, here]
         total[blocked] = np.inf
-        best = np.argsort(total, axis=None, kind="stable")[:BEAM]
+        best = np.argsort(rounded(total), axis=None, kind="stable")[:BEAM]
         best = best[np.isfinite(total.ravel()[best])]
         row, route = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], route[:, None]], axis=1)

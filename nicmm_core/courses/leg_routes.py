@@ -31,6 +31,9 @@ ALL_DIRECTIONS, ALL_ROUTES = 320, 180
 WORST = 8.0
 """Greatest cost of a route relative to the best of its leg."""
 
+RESOLUTION = 1e-9
+"""Relative difference of costs that is a rounding error."""
+
 VIA_CELLS = 120
 """Most cells by which other ways are tried."""
 
@@ -88,7 +91,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
     n_different = min(DIFFERENT, n_routes // 3)
     by_direction, by_cell = [], []
     for start, end in legs.tolist():
-        total = graph.by_state(start, end)
+        total = rounded(graph.by_state(start, end))
         first, last = graph.first[start], graph.reverse[graph.first[end][graph.reverse]]
         directions = _least_of_each(first * len(total) + last, total)[:n_directions]
         cells = _least_of_each(graph.hops.end, total)
@@ -105,7 +108,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
     for (start, end), aligned, other, least in zip(
         legs.tolist(), by_direction, by_cell, totals, strict=True
     ):
-        best = np.argsort(least, kind="stable")[: 3 * n_aligned]
+        best = np.argsort(rounded(least), kind="stable")[: 3 * n_aligned]
         states = np.concatenate([aligned.state[best], other.state])
         cost = np.concatenate([aligned.cost[best], other.cost])
         paths = _paths(graph, start, end, states)
@@ -125,6 +128,12 @@ def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> 
     cosine = hops.arriving[arriving] @ hops.leaving[leaving].T
     step = 0.5 * (hops.length[arriving][:, None] + hops.length[leaving])
     return np.arccos(cosine.clip(-1.0, 1.0)) ** 2 / np.maximum(step, tolerances.TINY)
+
+
+def rounded(cost: FloatArray) -> FloatArray:
+    """Costs without rounding errors: the best leg by each of its own states costs the same."""
+    unit = RESOLUTION * float(cost[np.isfinite(cost)].min(initial=np.inf))
+    return np.round(cost / unit) * unit if 0.0 < unit < np.inf else cost
 
 
 def _least_of_each(key: IntArray, value: FloatArray) -> IntArray:
