@@ -117,7 +117,7 @@ def _keeps_proportions(linear: np.ndarray) -> bool:
 
 
 def shown_beyond_the_mesh(mesh_object) -> str:
-    """Name the modifiers and shape keys, which the curve ignores; empty if there are none."""
+    """Name the modifiers and shape keys, which the curve ignores; may be empty."""
     shown = []
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
         shown.append("modifiers")

@@ -215,11 +215,11 @@ class EditSession:
         self.ask_for(smoothness=float(np.clip(wanted, *SMOOTHNESS_LIMITS)))
 
     def undo(self) -> bool:
-        """Undo the last change; False if there is none."""
+        """Undo the last change; False without a change to undo."""
         return self._go(self._done, self._undone)
 
     def redo(self) -> bool:
-        """Redo the last change that was undone; False if there is none."""
+        """Redo the last change that was undone; False without such a change."""
         return self._go(self._undone, self._done)
 
     # Work.

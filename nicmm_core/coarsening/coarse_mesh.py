@@ -178,7 +178,7 @@ def _nearest_seeds(
 ) -> IntArray:
     """The nearest seed of each vertex along edges, shape (V,).
 
-    -1 where there is none, or none within the margin on a mesh of several slabs. Paths no longer
+    -1 where no seed is connected, or none within the margin on a mesh of several slabs. Paths no longer
     than the margin from a vertex of a slab stay in the widened slab, so the results for its own
     vertices hold on the whole mesh.
     """

@@ -81,7 +81,7 @@ class CoarseStarts:
     def courses(self, request: Request) -> Iterator[CoarseStart]:
         """The courses on a coarse mesh that are simple on the fine mesh, the best first.
 
-        There are none on a small mesh, and perhaps none where points are close together.
+        A small mesh has no coarse mesh, and where points are close together no course may be found.
         """
         for level in self._levels(request):
             try:
@@ -100,10 +100,10 @@ class CoarseStarts:
             return
 
     def by_network(self, request: Request) -> CoarseStart | None:
-        """The curve of the coarsest mesh on which the network finds one; None if there is none.
+        """The curve of the coarsest mesh on which the network finds one, or None.
 
-        There is none on a small mesh, and perhaps none where points or strands are close together;
-        the caller then falls back to full resolution.
+        A small mesh has no coarse mesh, and the network may find no curve where points or strands
+        are close together; the caller then falls back to full resolution.
         """
         for level in self._levels(request):
             try:

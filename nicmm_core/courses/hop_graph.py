@@ -130,7 +130,8 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
     start, end = key // size, key % size
     positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
     hops = _hops(start, end, along[start, end], (positions, normals), (positions, normals))
-    same_sheet = along[start, end] <= SAME_SHEET * _distances(positions, start, end)
+    in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
+    same_sheet = along[start, end] <= SAME_SHEET * in_space
     hops, key = taken(hops, same_sheet), key[same_sheet]
     reverse = np.searchsorted(key, hops.end * size + hops.start)
     return HopGraph(surface, vertex, spacing, hops, reverse)
@@ -158,8 +159,8 @@ class CourseGraph:
     tension : float
         τ.
     cost : (k, m + 2 d) float array
-        Least cost of a path from each control point that ends with each state; inf if there is
-        none.
+        Least cost of a path from each control point that ends with each state; inf without
+        one.
     previous : (k, m + 2 d) int array
         The state before on this path, -1 at its first one.
     """
@@ -182,7 +183,7 @@ class CourseGraph:
 
     @cached_property
     def first(self) -> IntArray:
-        """The first state on the path to each state, (k, m + 2 d); itself where there is none."""
+        """The first state on the path to each state, (k, m + 2 d); itself at the beginning."""
         states = np.arange(self.cost.shape[1])
         found = np.where(self.previous < 0, states, self.previous)
         while True:
@@ -372,10 +373,6 @@ def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
     """Unit vectors along vectors, (m, 3), in the planes with the given normals."""
     flat = vectors - np.einsum("md,md->m", vectors, normals)[:, None] * normals
     return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
-
-
-def _distances(positions: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
-    return np.linalg.norm(positions[start] - positions[end], axis=1)
 
 
 def _along_edges(graph: HopGraph, points: SurfacePoints) -> FloatArray:

@@ -251,7 +251,7 @@ class _Fronts:
         return np.linalg.norm(self._crossing - self._position, axis=1)
 
     def beyond(self) -> IntArray:
-        """The face beyond this edge, -1 if there is none or more than one, shape (w,)."""
+        """The face beyond this edge, -1 if no or several faces are there, shape (w,)."""
         return self.mesh.face_neighbours[self.faces, self._side]
 
     def exit_barycentric(self) -> FloatArray:

@@ -134,7 +134,7 @@ class LegSearch:
             self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
 
     def shortest(self, source: int, target: int, obstacles: BlockedElements) -> Leg | None:
-        """The shortest free leg; None if there is none.
+        """The shortest free leg, or None.
 
         The search covers the part of the surface that a leg of limited length can reach, and is
         repeated with greater limits. The leg found is the shortest on the whole surface.

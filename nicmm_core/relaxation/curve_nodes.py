@@ -41,7 +41,7 @@ class CurveSurface:
         λ_fea / λ_smooth, in 1/length², where there is a feature map.
     folded : (F,) bool array or None
         Faces that are folded back over others: they point against the normals of their corners.
-        None if there are none.
+        None if no face is folded.
     """
 
     mesh: Mesh
@@ -114,7 +114,7 @@ def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
 
 
 def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
-    """Faces that point against the normals of their corners; None if there are none.
+    """Faces that point against the normals of their corners; None if no face does.
 
     Faces at vertices where opposite orientations meet never count: signs have no meaning there.
     """
@@ -201,6 +201,19 @@ class Nodes:
     def last(self) -> IntArray:
         """The last node of each curve, (c,)."""
         return self.first + len(self.positions) // self.curves - 1
+
+    @property
+    def following(self) -> IntArray:
+        """The index of the next node of each, (n,); the first of the curve after its last."""
+        following = np.arange(1, len(self.positions) + 1)
+        following[self.last] = self.first
+        return following
+
+    @property
+    def with_step(self) -> IntArray:
+        """Nodes with a step to the next one: all but the last of open curves."""
+        every = np.arange(len(self.positions))
+        return every if self.closed else np.delete(every, self.last)
 
     def after_each(self, values: FloatArray) -> FloatArray:
         """Values at the next node of the curve, (…, n)."""

@@ -170,7 +170,7 @@ def less_damping(moved: Moved, config: StepConfig) -> float:
 def _first_step(
     stepping: Stepping, start: Linearised, free: BoolArray, damping: float
 ) -> Moved | None:
-    """The least damped step that lowers the energy; None if there is none."""
+    """The least damped step that lowers the energy, or None."""
     nodes, weights = start.nodes, stepping.weights
     while damping <= stepping.config.most_damping and free.any() and not stepping.work.exhausted():
         move = damped_step(start.system, free, damping)

@@ -100,9 +100,10 @@ def with_midpoints(
     (2 n,) bool array
         The fixed ones of these.
     """
-    n = len(nodes.positions)
-    middle = places_along(surface, nodes, np.arange(n), np.full(n, 0.5))
-    faces, barycentric = middle.faces, middle.barycentric
+    begins = nodes.with_step
+    middle = places_along(surface, nodes, begins, np.full(len(begins), 0.5))
+    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
+    faces[begins], barycentric[begins] = middle.faces, middle.barycentric
     both = np.stack([nodes.places.faces, faces], axis=1).ravel()
     weights = np.stack([nodes.places.barycentric, barycentric], axis=1).reshape(-1, 3)
     stays = np.stack([fixed, np.zeros_like(fixed)], axis=1).ravel()
@@ -130,8 +131,8 @@ def places_along(
     last = np.searchsorted(owner, node, side="right") - 1
     traced = np.flatnonzero(last > first)
     lost = np.flatnonzero(last <= first)
-    at_vertices = _along_edges(surface, nodes, node[lost], share[lost])
-    faces[lost], barycentric[lost] = at_vertices.faces, at_vertices.barycentric
+    on_edges = _along_edges(surface, nodes, node[lost], share[lost])
+    faces[lost], barycentric[lost] = on_edges.faces, on_edges.barycentric
     first, last = first[traced], last[traced]
     at = arc[first] + share[traced] * (arc[last] - arc[first])
     segment = (np.searchsorted(arc, at, side="right") - 1).clip(first, last - 1)
@@ -145,10 +146,7 @@ def places_along(
 
 def _traces(surface: CurveSurface, nodes: Nodes) -> tuple[IntArray, SurfacePoints]:
     """Points of the traces that succeed, with both ends, and the node before each, ascending."""
-    n = len(nodes.positions)
-    following = np.arange(1, n + 1)
-    following[nodes.last] = nodes.first
-    node = np.arange(n) if nodes.closed else np.delete(np.arange(n), nodes.last)
+    node, following = nodes.with_step, nodes.following
     places = SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric))
     # On an unoriented mesh, turn both normals to the same side.
     one, other = nodes.normals[node], nodes.normals[following[node]]
@@ -168,13 +166,11 @@ def _along_edges(
 ) -> SurfacePoints:
     """Points at a share of the shortest paths along edges from some nodes to the next ones.
 
-    Paths run from vertex to vertex; where there is none, the point stays at its vertex.
+    Paths run from vertex to vertex; without a path the point stays at its vertex.
     """
     mesh = surface.mesh
-    following = np.arange(1, len(nodes.positions) + 1)
-    following[nodes.last] = nodes.first
     corner = mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]
-    start, end = corner[node], corner[following[node]]
+    start, end = corner[node], corner[nodes.following[node]]
     low, high, weight = start.copy(), start.copy(), np.zeros(len(node))
     if len(node):
         length, previous = csgraph.dijkstra(
