@@ -178,9 +178,9 @@ def _nearest_seeds(
 ) -> IntArray:
     """The nearest seed of each vertex along edges, shape (V,).
 
-    -1 where no seed is connected, or none within the margin on a mesh of several slabs. Paths no longer
-    than the margin from a vertex of a slab stay in the widened slab, so the results for its own
-    vertices hold on the whole mesh.
+    -1 where no seed is connected, or none within the margin on a mesh of several slabs. Paths from
+    a vertex of a slab that are no longer than the margin stay in the widened slab, so the results
+    for its own vertices hold on the whole mesh.
     """
     n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
     along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]
