@@ -31,9 +31,6 @@ ALL_DIRECTIONS, ALL_ROUTES = 320, 180
 WORST = 8.0
 """Greatest cost of a route relative to the best of its leg."""
 
-RESOLUTION = 1e-9
-"""Relative difference of costs that is a rounding error."""
-
 VIA_CELLS = 120
 """Most cells by which other ways are tried."""
 
@@ -132,7 +129,7 @@ def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> 
 
 def rounded(cost: FloatArray) -> FloatArray:
     """Costs without rounding errors: the best leg by each of its own states costs the same."""
-    unit = RESOLUTION * float(cost[np.isfinite(cost)].min(initial=np.inf))
+    unit = tolerances.SAME_COST * float(cost[np.isfinite(cost)].min(initial=np.inf))
     return np.round(cost / unit) * unit if 0.0 < unit < np.inf else cost
 
 

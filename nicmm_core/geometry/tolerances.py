@@ -43,5 +43,8 @@ ROUNDED = 1e-12
 """Barycentric coordinates below this are zero up to rounding, after conversion of a point to a part
 of its face."""
 
+SAME_COST = 1e-9
+"""Difference of two costs of paths, relative to the least cost, that is a rounding error."""
+
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor, where the dividend is zero too."""
