@@ -22,6 +22,7 @@ from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_toge
 from .hop_graph import HopGraph, with_control_points
 from .leg_combinations import combined, course_nodes, crossing_routes, different, laid_routes
 from .leg_routes import routes_of_legs
+from .uncrossing import uncrossed
 
 TENSION = 4.0
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path. Hops overrate
@@ -50,10 +51,11 @@ def find_courses(
     fixed: BoolArray,
     closed: bool,
     smoothness: float,
-) -> Iterator[tuple[Nodes, BoolArray]]:
-    """Simple relaxed courses through points in their order, by ascending energy.
+    any_order: bool,
+) -> Iterator[tuple[Nodes, IntArray]]:
+    """Simple relaxed courses through points, by ascending energy.
 
-    Each by its nodes, and which of these are control points.
+    Each by its nodes, and the number of the control point at each of them, -1 at the others.
 
     Parameters
     ----------
@@ -67,6 +69,8 @@ def find_courses(
         The control points among them; curves pass the others only at the start.
     closed : bool
     smoothness : float
+    any_order : bool
+        Whether a course may visit control points in another order, if it would cross itself.
     """
     count = len(points) if closed else len(points) - 1
     if count > MOST_LEGS:
@@ -88,20 +92,36 @@ def find_courses(
     if not len(choice):
         return
     nodes, at_points = course_nodes(courses, routes, on_routes, choice, closed)
-    control = at_points.copy()
-    control[at_points] = np.tile(fixed, len(choice))
+    # Control points are numbered without the others.
+    number = np.where(fixed, np.cumsum(fixed) - 1, -1)
+    visit = np.full(len(at_points), -1)
+    visit[at_points] = np.tile(number, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
+    nodes, visit = uncrossed(surface, nodes, visit, any_order)
     with subrange(0.4, 0.7):
-        nodes = relax_together(surface, nodes, control, smoothness, FIRST)
+        nodes = relax_together(surface, nodes, visit >= 0, smoothness, FIRST)
+    nodes, visit = uncrossed(surface, nodes, visit, any_order)
     simple, crossing = _best(surface, nodes, smoothness)
     best = np.append(simple, crossing)[:FINALISTS]
-    nodes, control = curves_of(nodes, best), nodes.by_curve(control)[best].ravel()
-    nodes, control = with_midpoints(surface, nodes, control)
+    nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
+    nodes, visit = _denser(surface, nodes, visit)
     with subrange(0.7, 1.0):
-        nodes = relax_together(surface, nodes, control, smoothness, SECOND)
+        nodes = relax_together(surface, nodes, visit >= 0, smoothness, SECOND)
+    nodes, visit = uncrossed(surface, nodes, visit, any_order)
     simple, _ = _best(surface, nodes, smoothness)
-    for number in simple.tolist():
-        yield curves_of(nodes, np.array([number])), nodes.by_curve(control)[number]
+    for one in simple.tolist():
+        own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
+        for _ in range(2):
+            yield own, visited
+            own, visited = _denser(surface, own, visited)
+
+
+def _denser(surface: CurveSurface, nodes: Nodes, visit: IntArray) -> tuple[Nodes, IntArray]:
+    """Twice as many nodes, with their control points."""
+    finer, stays = with_midpoints(surface, nodes, visit >= 0)
+    among = np.full(len(stays), -1)
+    among[stays] = visit[visit >= 0]
+    return finer, among
 
 
 def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:

@@ -21,7 +21,6 @@ from ..maps.guidance import component_unit
 from ..path.initial_loop import visiting_order
 from ..path.via_points import with_via_points
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, unsigned_normals, with_maps
-from ..relaxation.node_traces import with_midpoints
 from ..request import Request, renumbered_request
 from .course_search import find_courses
 from .hop_graph import HopGraph, build_hop_graph
@@ -109,14 +108,19 @@ class CourseSurface:
         component = int(self._refined.mesh.face_component[on_refined.faces[0]])
         surface = self._with_maps(there, int(on_refined.faces[0]))
         found = find_courses(
-            self._graph(component), surface, on_refined, fixed, there.closed, there.smoothness
+            self._graph(component),
+            surface,
+            on_refined,
+            fixed,
+            there.closed,
+            there.smoothness,
+            any_order=there.order == "shortest" and not there.via_points,
         )
-        for nodes, control in found:
-            for _ in range(2):
-                on_copy = self._refined.in_parents(nodes.places)
-                places = self.copy.original_points(on_copy)
-                yield Course(places, np.flatnonzero(control), visited)
-                nodes, control = with_midpoints(surface, nodes, control)
+        for nodes, visit in found:
+            on_copy = self._refined.in_parents(nodes.places)
+            control = np.flatnonzero(visit >= 0)
+            places = self.copy.original_points(on_copy)
+            yield Course(places, control, visited[visit[control]])
 
     def _graph(self, component: int) -> HopGraph:
         if component not in self._graphs:

@@ -63,6 +63,13 @@ def traced_segments(surface: CurveSurface, nodes: Nodes) -> TracedSegments:
 
 def simple_curves(surface: CurveSurface, nodes: Nodes) -> BoolArray:
     """Which curves do not cross themselves, (c,), where traces succeed."""
+    simple = np.ones(nodes.curves, dtype=bool)
+    simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
+    return simple
+
+
+def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
+    """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next ones cross."""
     segments = traced_segments(surface, nodes)
     size = len(nodes.positions) // nodes.curves
     curve = segments.node // size
@@ -74,9 +81,8 @@ def simple_curves(surface: CurveSurface, nodes: Nodes) -> BoolArray:
         apart = np.minimum(apart, np.diff(first)[curve[one]] - apart)
     one, other = one[apart > 1], other[apart > 1]
     meet = segments_meet(segments.start, segments.end, one, other)
-    simple = np.ones(nodes.curves, dtype=bool)
-    simple[curve[one[meet]]] = False
-    return simple
+    pairs = np.stack([segments.node[one[meet]], segments.node[other[meet]]], axis=1)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def with_midpoints(
