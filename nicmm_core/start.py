@@ -21,12 +21,15 @@ from .geometry.surface_points import SurfacePoints, in_faces, joined
 from .geometry.tracing import strictly_inside, trace_between
 from .relaxation.curve_nodes import CurveSurface
 from .relaxation.node_spacing import arc_lengths
-from .relaxation.noded_curve import DETOUR, NodedCurve, is_simple, noded_curve
+from .relaxation.noded_curve import NodedCurve, is_simple, noded_curve
 from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, moved_along
 from .request import Request
 
 WITHOUT_START = "; design it without start"
+
+LONGEST_WAY = 1.5
+"""Longest trace from the old to the new place of a control point, relative to their distance."""
 
 STEPS = 4
 """Steps in which a curve is moved if it would cross itself in one step."""
@@ -148,7 +151,8 @@ def _routes(
     here = curve.nodes.places[at_controls]
     inside = SurfacePoints(here.faces, strictly_inside(here.barycentric))
     normals = curve.nodes.normals[at_controls]
-    traces = trace_between(mesh, inside, points, normals, DETOUR, surface.folded)
+    distance = np.linalg.norm(points.positions(mesh) - here.positions(mesh), axis=1)
+    traces = trace_between(mesh, inside, points, normals, LONGEST_WAY * distance, surface.folded)
     if not traces.reached.all():
         return None
     routes = []

@@ -27,7 +27,7 @@ CELLS = 4_000
 REDUCTION = 2
 """Least number of fine vertices per cell."""
 
-SMALL = 3_000
+SMALL = 6_000
 """Number of vertices up to which a mesh needs no coarse mesh."""
 
 GROWTH = 4

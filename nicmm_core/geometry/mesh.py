@@ -113,6 +113,16 @@ class Mesh:
         return bool((self.unpaired_edges[1] > 1).any())
 
     @cached_property
+    def is_oriented(self) -> bool:
+        """Whether no two faces have an edge in the same direction."""
+        return not len(self.unoriented_vertices)
+
+    @cached_property
+    def unoriented_vertices(self) -> IntArray:
+        """Vertices of edges that two faces have in the same direction, ascending."""
+        return unoriented_vertices(self.faces)
+
+    @cached_property
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:
         """Bounding-box trees for parts of the faces, each with the range of its faces."""
         trees = []

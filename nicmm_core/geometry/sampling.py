@@ -31,6 +31,7 @@ def spread_vertices(
     chance: FloatArray,
     n_candidates: int,
     distance: float,
+    normal_weight: float = NORMAL_WEIGHT,
 ) -> IntArray:
     """Vertices at least a distance apart, ascending; ``chance`` is a number in (0, 1) for each."""
     there = np.flatnonzero(areas > 0.0)
@@ -39,7 +40,7 @@ def spread_vertices(
     checkpoint()
     candidates = there[np.argsort(times)[:n_candidates]]
     scaled = np.concatenate(
-        [mesh.vertices[candidates] / distance, NORMAL_WEIGHT * normals[candidates]], axis=1
+        [mesh.vertices[candidates] / distance, normal_weight * normals[candidates]], axis=1
     )
     checkpoint()
     near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")

@@ -51,8 +51,9 @@ def trace_between(
     start: SurfacePoints,
     end: SurfacePoints,
     normals: FloatArray,
-    detour: float,
+    longest: FloatArray,
     folded: BoolArray | None = None,
+    ahead: FloatArray | None = None,
 ) -> Traces:
     """Trace from points inside faces to other points nearby.
 
@@ -68,17 +69,21 @@ def trace_between(
         m points anywhere; a vertex counts as reached in every face round it.
     normals : (m, 3) float array
         Directions that the planes contain.
-    detour : float
-        Greatest length of a trace, relative to the straight distance in space.
+    longest : (m,) float array
+        Greatest lengths.
     folded : (F,) bool array, optional
         Which faces of the mesh are folded back.
+    ahead : (m, 3) float array, optional
+        Directions in which the traces leave; by default towards the ends. Round the edge of a thin
+        part the trace may begin in another direction.
     """
     origin, goal = start.positions(mesh), end.positions(mesh)
     forward = goal - origin
-    longest = detour * np.linalg.norm(forward, axis=1)
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
     reached = _holds(mesh, end, start.faces)
-    fronts = _Fronts(mesh, start.faces, origin, normals, forward, np.flatnonzero(~reached))
+    across = np.cross(normals, forward)
+    ahead = forward if ahead is None else ahead
+    fronts = _Fronts(mesh, start.faces, origin, across, ahead, np.flatnonzero(~reached))
     travelled, covered = np.zeros(len(origin)), np.zeros(len(origin))
     pairs, crossings = [], []
     for _ in range(MOST_FACES):
@@ -154,7 +159,8 @@ def trace_from(
     origin = start.positions(mesh)
     normals = mesh.face_normals[start.faces]
     blocked = length > 0.0
-    fronts = _Fronts(mesh, start.faces, origin, normals, direction, np.flatnonzero(blocked))
+    across = np.cross(normals, direction)
+    fronts = _Fronts(mesh, start.faces, origin, across, direction, np.flatnonzero(blocked))
     blocked[fronts.index] = False
     outside = np.ones(len(length), dtype=bool) if folded is None else ~folded[start.faces]
     left = length.copy()
@@ -210,7 +216,7 @@ class _Fronts:
         mesh: Mesh,
         faces: IntArray,
         origin: FloatArray,
-        normals: FloatArray,
+        across: FloatArray,
         forward: FloatArray,
         index: IntArray,
     ) -> None:
@@ -218,7 +224,7 @@ class _Fronts:
         self.index = index  # (w,) indices of the caller's traces
         self.faces = self._start = faces[index]
         self._origin = origin[index]
-        self._across = np.cross(normals[index], forward[index])
+        self._across = across[index]
         self._position = self._crossing = self._origin
         self._fraction = np.zeros(len(index))
         corners = mesh.faces[self.faces]  # (w, 3)

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, edge_lengths, unoriented_vertices
+from ..geometry.mesh import Mesh, edge_lengths
 from ..geometry.surface_points import SurfacePoints
 from ..level_set.features import vertex_normals
 from ..maps.guidance import feature_map
@@ -87,14 +87,14 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     would cancel; there the normal is the principal direction of the face normals.
     """
     normals = vertex_normals(mesh.vertices, mesh.faces)
-    mixed = unoriented_vertices(mesh.faces)
+    mixed = mesh.unoriented_vertices
     checkpoint()
     folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
     owner, face_normals, areas = _faces_around(mesh, folded)
     area_vector = np.zeros((len(folded), 3))
     np.add.at(area_vector, owner, areas[:, None] * face_normals)
     there = area_vector.any(axis=1)
-    normals[folded[there]] = _unit(area_vector[there])
+    normals[folded[there]] = unit_vectors(area_vector[there])
     owner, face_normals, areas = _faces_around(mesh, mixed)
     weighted = areas[:, None] * face_normals
     spread = np.zeros((len(mixed), 3, 3))
@@ -121,7 +121,7 @@ def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
     folded = _facing(mesh, normals).sum(axis=1) < 0.0
     if folded.any():
         mixed = np.zeros(len(mesh.vertices), dtype=bool)
-        mixed[unoriented_vertices(mesh.faces)] = True
+        mixed[mesh.unoriented_vertices] = True
         folded &= ~mixed[mesh.faces].any(axis=1)
     return folded if folded.any() else None
 
@@ -232,8 +232,8 @@ class Nodes:
     @cached_property
     def conormals(self) -> FloatArray:
         """Unit vectors normal to the curve in the tangent planes, shape (n, 3)."""
-        unit = _unit(self.steps)
-        return _unit(cross(self.normals.T, unit.T + self.before_each(unit.T)).T)
+        unit = unit_vectors(self.steps)
+        return unit_vectors(cross(self.normals.T, unit.T + self.before_each(unit.T)).T)
 
     def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
         """Derivatives of normals, (n, 3), and φ_fea, (n,), by moves along conormals."""
@@ -262,7 +262,7 @@ class Nodes:
 def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
     """Nodes with the normals and φ_fea that the energy needs."""
     weight = places.barycentric
-    normals = _unit(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
+    normals = unit_vectors(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
     phi_fea = np.ones(len(places))
     if surface.feature_map is not None:
         corners = surface.mesh.faces[places.faces]
@@ -277,7 +277,8 @@ def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
     return normals * np.where(against, -1.0, 1.0)[..., None]
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Vectors, (n, 3), divided by their lengths."""
     lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
     return vectors / np.maximum(lengths, tolerances.TINY)[:, None]
 

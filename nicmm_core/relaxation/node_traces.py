@@ -15,11 +15,11 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import overlapping_segments, segments_meet
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
-from ..geometry.tracing import strictly_inside, trace_between
-from .curve_nodes import CurveSurface, Nodes, nodes_at
+from ..geometry.tracing import Traces, strictly_inside, trace_between
+from .curve_nodes import CurveSurface, Nodes, nodes_at, unit_vectors
 
-LONG_WAY = 3.0
-"""Longest trace, relative to the distance of its ends in space: nodes may be far apart."""
+DETOUR = 3.0
+"""Longest trace between two nodes, relative to their distance in space; longer ones fail."""
 
 AROUND = 6.0
 """Longest path along edges where a trace fails, relative to the longest distance in space."""
@@ -154,17 +154,63 @@ def _traces(surface: CurveSurface, nodes: Nodes) -> tuple[IntArray, SurfacePoint
     """Points of the traces that succeed, with both ends, and the node before each, ascending."""
     node, following = nodes.with_step, nodes.following
     places = SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric))
-    # On an unoriented mesh, turn both normals to the same side.
-    one, other = nodes.normals[node], nodes.normals[following[node]]
-    agree = np.where((one * other).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     start, end = places[node], places[following[node]]
-    traces = trace_between(surface.mesh, start, end, one + agree * other, LONG_WAY, surface.folded)
+    traces = traces_of_steps(surface, nodes, places, node, following[node])
     reached = np.flatnonzero(traces.reached)
     owner = np.concatenate([reached, traces.pair, reached])
     rank = np.repeat([0, 1, 2], [len(reached), len(traces.pair), len(reached)])
     order = np.lexsort((rank, owner))  # stable, so crossings stay in order
     points = joined([start[reached], traces.crossings, end[reached]])[order]
     return node[owner[order]], points
+
+
+def traces_of_steps(
+    surface: CurveSurface,
+    nodes: Nodes,
+    places: SurfacePoints,
+    start: IntArray,
+    end: IntArray,
+) -> Traces:
+    """Straight traces from nodes, (m,), to the next or the previous ones.
+
+    Round the edge of a thin part the normals of both nodes may be opposite, and no plane along them
+    contains the trace; there the directions of the curve before and after span the plane.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+    places : SurfacePoints
+        Of all n nodes; those of the starts strictly inside faces.
+    start, end : (m,) int array
+    """
+    mesh, one, other = surface.mesh, nodes.normals[start], nodes.normals[end]
+    if not mesh.is_oriented:  # turn both normals to the same side
+        other = np.where((one * other).sum(axis=1, keepdims=True) < 0.0, -other, other)
+    distance = np.linalg.norm(nodes.positions[end] - nodes.positions[start], axis=1)
+    traces = trace_between(
+        mesh, places[start], places[end], one + other, DETOUR * distance, surface.folded
+    )
+    lost = np.flatnonzero(~traces.reached)
+    if not len(lost):
+        return traces
+    start, end = start[lost], end[lost]
+    onward = nodes.steps
+    backward = -nodes.before_each(onward.T).T
+    goes_on = (nodes.following[start] == end)[:, None]
+    before = np.where(goes_on, -backward[start], -onward[start])
+    after = np.where(goes_on, -onward[end], -backward[end])
+    length = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
+    ahead = unit_vectors(before) + unit_vectors(after)
+    longest = DETOUR * np.maximum(distance[lost], length)
+    found = trace_between(
+        mesh, places[start], places[end], ahead, longest, surface.folded, ahead
+    )
+    reached = traces.reached.copy()
+    reached[lost] = found.reached
+    pair = np.concatenate([traces.pair, lost[found.pair]])
+    order = np.argsort(pair, kind="stable")
+    return Traces(reached, pair[order], joined([traces.crossings, found.crossings])[order])
 
 
 def _along_edges(

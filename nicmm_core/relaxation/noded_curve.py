@@ -19,13 +19,11 @@ from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined
-from ..geometry.tracing import strictly_inside, trace_between, trace_from
+from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .node_traces import traces_of_steps
 from .node_spacing import arc_lengths, node_arcs
-
-DETOUR = 1.5
-"""Longest trace between two nodes, relative to their distance in space; longer ones fail."""
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, within which a new node replaces an old point."""
@@ -360,7 +358,7 @@ def _traced_polyline(
     for backwards in (False, True):
         here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
-        part, reached = _traced_pieces(surface, nodes.normals, places, here, ends, backwards)
+        part, reached = _traced_pieces(surface, nodes, here, ends, backwards)
         lost[here[~reached]] = True
         parts.append(part)
     if not curve.closed:
@@ -385,19 +383,15 @@ def _kept_pieces(curve: NodedCurve, nodes: IntArray) -> Pieces:
 
 def _traced_pieces(
     surface: CurveSurface,
-    normals: FloatArray,
-    places: SurfacePoints,
+    of: Nodes,
     nodes: IntArray,
     ends: tuple[IntArray, IntArray],
     backwards: bool,
 ) -> tuple[Pieces, BoolArray]:
     """Straight traces from nodes to the next ones, traced in reverse if backwards."""
-    mesh = surface.mesh
+    mesh, places = surface.mesh, of.places
     start, end = reversed(ends) if backwards else ends
-    # On an unoriented mesh, turn both normals to the same side.
-    agree = np.where((normals[start] * normals[end]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-    plane = normals[start] + agree * normals[end]
-    traces = trace_between(mesh, places[start], places[end], plane, DETOUR, surface.folded)
+    traces = traces_of_steps(surface, of, places, start, end)
     first, crossings = places[start], traces.crossings
     if not backwards:
         owner = np.concatenate([nodes, nodes[traces.pair]])

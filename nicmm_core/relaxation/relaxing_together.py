@@ -51,6 +51,7 @@ class TogetherConfig:
     contact: bool = True
 
 
+W=1.0
 SHORT_MOVE = 1e-3
 """Distance, in mean distances between nodes, that is too short for respacing."""
 
@@ -148,7 +149,10 @@ def _chosen(surface: CurveSurface, one: Nodes, other: Nodes, take: BoolArray) ->
 def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
     """Nodes moved along their curves, so that they are equally spaced between fixed ones."""
     size = len(nodes.positions) // nodes.curves
-    lengths = nodes.by_curve(nodes.step_lengths)
+    mean = nodes.by_curve(nodes.step_lengths).mean(axis=1)
+    turn = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
+    if not nodes.closed: turn[nodes.last] = 0.0
+    lengths = nodes.by_curve(nodes.step_lengths) + W * mean[:, None] * nodes.by_curve(turn)
     # Arc length over all curves, each with its first node once more at its end.
     last = np.where(nodes.closed, nodes.first, nodes.last)
     around = np.append(
