@@ -128,7 +128,7 @@ def _energies(mesh: Mesh, every: dict[str, list[nicmm.Design]]) -> dict[str, lis
 
 @contextmanager
 def _without_courses() -> Iterator[None]:
-    with mock.patch.object(course_surface, "find_courses", lambda *arguments: iter(())):
+    with mock.patch.object(course_surface, "find_courses", lambda *arguments, **named: iter(())):
         yield
 
 

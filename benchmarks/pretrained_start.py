@@ -211,7 +211,7 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
     with (
         mock.patch.object(single_pass, "infer_level_set", solution),
         mock.patch.object(single_pass, "zero_set", collected),
-        mock.patch.object(course_surface, "find_courses", lambda *arguments: iter(())),
+        mock.patch.object(course_surface, "find_courses", lambda *arguments, **named: iter(())),
     ):
         yield level_sets
 

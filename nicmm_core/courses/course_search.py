@@ -40,8 +40,10 @@ APART = 0.02
 MOST_LEGS = 60
 """Number of legs above which no courses are sought: hardly any combination is simple then."""
 
-FIRST = TogetherConfig(iterations=12)
-SECOND = TogetherConfig(iterations=14)
+STAGES = (
+    (24, TogetherConfig(iterations=12)),
+    (6, TogetherConfig(iterations=14)),
+)
 
 
 def find_courses(
@@ -98,16 +100,14 @@ def find_courses(
     visit[at_points] = np.tile(number, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
     nodes, visit = uncrossed(surface, nodes, visit, any_order)
-    with subrange(0.4, 0.7):
-        nodes = relax_together(surface, nodes, visit >= 0, smoothness, FIRST)
-    nodes, visit = uncrossed(surface, nodes, visit, any_order)
-    simple, crossing = _best(surface, nodes, smoothness)
-    best = np.append(simple, crossing)[:FINALISTS]
-    nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
-    nodes, visit = _denser(surface, nodes, visit)
-    with subrange(0.7, 1.0):
-        nodes = relax_together(surface, nodes, visit >= 0, smoothness, SECOND)
-    nodes, visit = uncrossed(surface, nodes, visit, any_order)
+    for stage, (most, config) in enumerate(STAGES):
+        if stage:
+            best = np.concatenate(_best(surface, nodes, smoothness))[:most]
+            nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
+            nodes, visit = _denser(surface, nodes, visit)
+        with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):
+            nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
+        nodes, visit = uncrossed(surface, nodes, visit, any_order)
     simple, _ = _best(surface, nodes, smoothness)
     for one in simple.tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]

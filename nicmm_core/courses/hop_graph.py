@@ -34,7 +34,9 @@ from ..relaxation.curve_nodes import CurveSurface, nodes_at
 CELLS = 700
 """Cells per component; more make a course finer, which relaxation does better."""
 
-NW=1.2
+NORMAL_WEIGHT = 1.2
+"""As `geometry.sampling.NORMAL_WEIGHT`, but larger: courses round thin limbs need cells there."""
+
 HOPS = 16
 """Hops from a cell to its nearest cells, before those in the other direction are added."""
 
@@ -118,7 +120,9 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
         chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
         normals = surface.vertex_normals
         distance = PACKING * spacing
-        vertex = spread_vertices(mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NW)
+        vertex = spread_vertices(
+            mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
+        )
     graph = HopGraph(surface, vertex, spacing, _no_hops(), np.zeros(0, dtype=np.int64))
     checkpoint()
     along = csgraph.dijkstra(

@@ -1,4 +1,4 @@
-"""Combinations of routes, one a leg, that do not cross: whole courses, the cheapest first.
+"""Combinations of routes, one a leg: whole courses, the cheapest first, where crossings cost extra.
 
 Routes are laid over the surface as straight traces between a few nodes, and relaxed a little, so
 that routes through the same cells separate. Then all of them are tested against each other at once.
@@ -30,6 +30,10 @@ NODES = 96
 
 SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
 """Relaxation of routes before they are tested; their directions at both ends are kept."""
+
+CROSSING = 0.1
+"""Cost of two routes that cross, relative to the sum of the best of all legs: `uncrossing` may
+separate them."""
 
 BEAM = 3_000
 """Incomplete combinations kept after each leg."""
@@ -139,25 +143,24 @@ def crossing_routes(graph: CourseGraph, routes: list[Routes], nodes: Nodes) -> B
 def combined(
     graph: CourseGraph, routes: list[Routes], crosses: BoolArray, closed: bool
 ) -> Combinations:
-    """The cheapest combinations of routes that do not cross, by beam search leg by leg."""
+    """The cheapest combinations of routes, by beam search leg by leg."""
     count = len(routes)
     offset = np.cumsum([0] + [len(leg.cells) for leg in routes])
     first = [np.array([_state(graph, path[0], path[1]) for path in leg.cells]) for leg in routes]
     last = [np.array([_state(graph, path[-2], path[-1]) for path in leg.cells]) for leg in routes]
-    simple = ~np.diagonal(crosses)
-    choice = np.flatnonzero(simple[: offset[1]])[:, None]
-    cost = routes[0].cost[choice[:, 0]]
+    price = CROSSING * sum(leg.cost.min() for leg in routes)
+    of_itself = np.where(np.diagonal(crosses), price, 0.0)
+    choice = np.arange(offset[1])[:, None]
+    cost = routes[0].cost + of_itself[: offset[1]]
     for number in range(1, count):
         checkpoint()
         here = slice(offset[number], offset[number + 1])
-        total = cost[:, None] + routes[number].cost
+        total = cost[:, None] + routes[number].cost + of_itself[here]
         total = total + junction_cost(graph, last[number - 1], first[number])[choice[:, -1]]
         if closed and number == count - 1:
             total = total + junction_cost(graph, last[number], first[0])[:, choice[:, 0]].T
-        blocked = np.broadcast_to(~simple[here], total.shape).copy()
         for earlier in range(number):
-            blocked |= crosses[offset[earlier] + choice[:, earlier]][:, here]
-        total[blocked] = np.inf
+            total += price * crosses[offset[earlier] + choice[:, earlier]][:, here]
         best = np.argsort(rounded(total), axis=None, kind="stable")[:BEAM]
         best = best[np.isfinite(total.ravel()[best])]
         row, route = np.divmod(best, total.shape[1])

@@ -16,7 +16,7 @@ import numpy as np
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import LARGEST, Mesh
-from .surface_points import SurfacePoints
+from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
 RESOLUTION = 1e-7
@@ -62,13 +62,12 @@ class Renumbered:
         return positions @ self.axes.T + self.centre
 
     def points(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the original on the copy."""
+        """Points of the original on the copy; vertices of it in faces that the copy decides."""
         place = np.empty(len(self.face), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
         faces = place[points.faces]
-        return SurfacePoints(
-            faces, np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
-        )
+        weights = np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
+        return in_first_faces(self.mesh, SurfacePoints(faces, weights))
 
     def values(self, values: FloatArray | None) -> FloatArray | None:
         """Values at the vertices of the original, (V,), at those of the copy."""

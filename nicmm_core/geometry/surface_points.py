@@ -374,6 +374,17 @@ def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoint
     )
 
 
+def in_first_faces(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:
+    """The same points, each in the face of lowest index that contains it."""
+    faces = points.faces.copy()
+    for number in np.flatnonzero((points.barycentric == 0.0).any(axis=1)).tolist():
+        support = mesh.faces[faces[number]][points.barycentric[number] > 0.0]
+        around = mesh.faces_at(support[:1])
+        holds = (mesh.faces[around][:, :, None] == support).any(axis=1).all(axis=1)
+        faces[number] = around[holds.argmax()]
+    return in_faces(mesh, points, faces)
+
+
 def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
     """Barycentric coordinates with respect to other vertices.
 

@@ -203,9 +203,7 @@ def traces_of_steps(
     length = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
     ahead = unit_vectors(before) + unit_vectors(after)
     longest = DETOUR * np.maximum(distance[lost], length)
-    found = trace_between(
-        mesh, places[start], places[end], ahead, longest, surface.folded, ahead
-    )
+    found = trace_between(mesh, places[start], places[end], ahead, longest, surface.folded, ahead)
     reached = traces.reached.copy()
     reached[lost] = found.reached
     pair = np.concatenate([traces.pair, lost[found.pair]])

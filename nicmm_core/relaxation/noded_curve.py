@@ -22,8 +22,8 @@ from ..geometry.surface_points import SurfacePoints, in_faces, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .node_traces import traces_of_steps
 from .node_spacing import arc_lengths, node_arcs
+from .node_traces import traces_of_steps
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, within which a new node replaces an old point."""

@@ -20,7 +20,7 @@ from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .elastic_energy import balance, curve_energies, damped_step, elastic_system
 from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
 from .noded_curve import moved_along_conormals, shifted
-from .strand_contact import contacts_between
+from .strand_contact import close_pairs, contacts_of_pairs
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,9 @@ class TogetherConfig:
     contact: bool = True
 
 
-W=1.0
+NODES_PER_RADIAN = 1.0
+"""Additional nodes where the normals turn by one radian, as round the edge of a thin part."""
+
 SHORT_MOVE = 1e-3
 """Distance, in mean distances between nodes, that is too short for respacing."""
 
@@ -88,10 +90,11 @@ def relax_together(
         checkpoint(iteration / config.iterations)
         if iteration % config.respacing == 0:
             nodes = _respaced(surface, nodes, fixed)
+            pairs = close_pairs(nodes) if config.contact else None
         # Nodes may coincide where a route could not be laid; that curve then stays as it is.
         with np.errstate(over="ignore", invalid="ignore"):
             weights = balance(surface, nodes, smoothness, apart=config.contact)
-            contacts = contacts_between(nodes) if config.contact else None
+            contacts = None if pairs is None else contacts_of_pairs(nodes, pairs)
             before = curve_energies(nodes, weights, contacts)
             system = elastic_system(surface, nodes, weights, contacts)
             move = damped_step(system, ~fixed, damping)
@@ -101,9 +104,10 @@ def relax_together(
         share = np.minimum(1.0, config.longest_move / np.maximum(farthest, tolerances.TINY))
         moved, _, _ = moved_along_conormals(surface, nodes, move * nodes.spread(share))
         with np.errstate(over="ignore", invalid="ignore"):
-            after = curve_energies(moved, weights)
+            contacts = None if pairs is None else contacts_of_pairs(moved, pairs)
+            after = curve_energies(moved, weights, contacts)
         lower = after < before
-        nodes = _chosen(surface, nodes, moved, lower)
+        nodes = _chosen(nodes, moved, lower)
         damping = np.where(
             lower, np.maximum(damping / DAMPING_FACTOR, least), damping * DAMPING_FACTOR
         )
@@ -121,6 +125,8 @@ def relax_together(
             left = np.flatnonzero(~done)
             nodes, fixed = curves_of(nodes, left), nodes.by_curve(fixed)[left].ravel()
             damping, quiet, which = damping[left], quiet[left], which[left]
+            if pairs is not None:
+                pairs = _renumbered(pairs, left, size)
     return nodes_at(surface, SurfacePoints(faces, barycentric), whole.closed, whole.curves)
 
 
@@ -134,26 +140,46 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     )  # fmt: skip
 
 
-def _chosen(surface: CurveSurface, one: Nodes, other: Nodes, take: BoolArray) -> Nodes:
+def _chosen(one: Nodes, other: Nodes, take: BoolArray) -> Nodes:
     """The curves of the other nodes where they are taken, (c,)."""
     if take.all():
         return other
     taken = one.spread(take)
+    row = taken[:, None]
     places = SurfacePoints(
         np.where(taken, other.places.faces, one.places.faces),
-        np.where(taken[:, None], other.places.barycentric, one.places.barycentric),
+        np.where(row, other.places.barycentric, one.places.barycentric),
     )
-    return nodes_at(surface, places, one.closed, one.curves)
+    return Nodes(
+        places,
+        one.closed,
+        np.where(row, other.positions, one.positions),
+        np.where(row, other.normals, one.normals),
+        np.where(taken, other.phi_fea, one.phi_fea),
+        one.curves,
+    )
+
+
+def _renumbered(pairs: IntArray, left: IntArray, size: int) -> IntArray:
+    """Pairs of nodes of the curves that are left, by their new numbers."""
+    curve = pairs[:, 0] // size
+    place = np.searchsorted(left, curve).clip(max=len(left) - 1)
+    kept = left[place] == curve
+    return (pairs + ((place - curve) * size)[:, None])[kept]
 
 
 def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
-    """Nodes moved along their curves, so that they are equally spaced between fixed ones."""
+    """Nodes moved along their curves, so that they are evenly spaced between fixed ones.
+
+    They are closer together where the normals turn (`NODES_PER_RADIAN`).
+    """
     size = len(nodes.positions) // nodes.curves
     mean = nodes.by_curve(nodes.step_lengths).mean(axis=1)
-    turn = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
-    if not nodes.closed: turn[nodes.last] = 0.0
-    lengths = nodes.by_curve(nodes.step_lengths) + W * mean[:, None] * nodes.by_curve(turn)
-    # Arc length over all curves, each with its first node once more at its end.
+    turning = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
+    turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve
+    lengths = nodes.step_lengths + NODES_PER_RADIAN * nodes.spread(mean) * turning
+    lengths = nodes.by_curve(lengths)
+    # Weighted arc length over all curves, each with its first node once more at its end.
     last = np.where(nodes.closed, nodes.first, nodes.last)
     around = np.append(
         np.arange(len(nodes.positions)).reshape(nodes.curves, size), last[:, None], 1
@@ -171,5 +197,5 @@ def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
     move -= (move * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
     length = np.linalg.norm(move, axis=1)
     direction = move / np.maximum(length, tolerances.TINY)[:, None]
-    length[fixed | (length < SHORT_MOVE * nodes.spread(lengths.mean(axis=1)))] = 0.0
+    length[fixed | (length < SHORT_MOVE * nodes.spread(mean))] = 0.0
     return shifted(surface, nodes, direction, length)[0]

@@ -42,10 +42,14 @@ class Contacts:
 
 def contacts_between(nodes: Nodes) -> Contacts:
     """Pairs of nodes of different strands of a curve that are closer than the clearance."""
+    return contacts_of_pairs(nodes, close_pairs(nodes))
+
+
+def close_pairs(nodes: Nodes) -> IntArray:
+    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve."""
     lengths = nodes.by_curve(nodes.step_lengths)
     total = lengths.sum(axis=1)
-    steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
-    clearance = nodes.spread(CLEARANCE * np.maximum(total / steps, tolerances.TINY))
+    clearance = _clearance(nodes)
     places = nodes.positions / clearance[:, None]
     if nodes.curves > 1:
         # Another dimension keeps curves apart.
@@ -56,14 +60,26 @@ def contacts_between(nodes: Nodes) -> Contacts:
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
         along = np.minimum(along, nodes.spread(total)[pairs[:, 0]] - along)
-    pairs = pairs[along > ALONG * clearance[pairs[:, 0]]]
-    clearance = clearance[pairs[:, 0]]
+    return pairs[along > ALONG * clearance[pairs[:, 0]]]
+
+
+def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
+    """Those of some pairs that are closer than the clearance, on the same side of the surface."""
+    clearance = _clearance(nodes)[pairs[:, 0]]
     normals, positions = nodes.normals[pairs], nodes.positions[pairs]
     offset = positions[:, 0] - positions[:, 1]
     distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
-    direction = offset / distance[:, None]
     kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
-    pairs, distance, direction = pairs[kept], distance[kept], direction[kept]
-    clearance = clearance[kept]
+    kept &= distance < clearance
+    pairs, distance, clearance = pairs[kept], distance[kept], clearance[kept]
+    direction = offset[kept] / distance[:, None]
     approach = np.einsum("pd,pkd->pk", direction, nodes.conormals[pairs]) * [-1.0, 1.0]
     return Contacts(pairs, 1.0 - distance / clearance, approach / clearance[:, None])
+
+
+def _clearance(nodes: Nodes) -> FloatArray:
+    """The clearance of the curve of each node, (n,)."""
+    lengths = nodes.by_curve(nodes.step_lengths)
+    steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
+    mean = np.maximum(lengths.sum(axis=1) / steps, tolerances.TINY)
+    return nodes.spread(CLEARANCE * mean)

@@ -111,6 +111,11 @@ def points_near(mesh, positions):
     return nicmm.SurfacePoints(faces.astype(np.int64), strictly_inside(barycentric))
 
 
+def distances(mesh, start, end):
+    """Distances in space between pairs of points."""
+    return np.linalg.norm(end.positions(mesh) - start.positions(mesh), axis=1)
+
+
 def curve_through(mesh, positions, controls, closed=True):
     """A curve along the positions, straight from each to the next, for places near one another.
 
@@ -122,7 +127,8 @@ def curve_through(mesh, positions, controls, closed=True):
     normals = mesh.face_normals[points.faces]
     agree = np.where((normals[here] * normals[there]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     plane = normals[here] + agree * normals[there]
-    ways = trace_between(mesh, chosen(points, here), chosen(points, there), plane, detour=3.0)
+    start, end = chosen(points, here), chosen(points, there)
+    ways = trace_between(mesh, start, end, plane, 3.0 * distances(mesh, start, end))
     assert ways.reached.all()
     owner = np.concatenate([np.arange(len(points)), ways.pair])
     order = np.argsort(owner, kind="stable")

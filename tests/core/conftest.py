@@ -59,4 +59,4 @@ def surface(request) -> nicmm.Mesh:
 @pytest.fixture
 def without_courses(monkeypatch):
     """Curves start from the network's level set, as where no course is found."""
-    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: iter(()))
+    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))

@@ -8,7 +8,7 @@ from nicmm_core import shapes
 from nicmm_core.courses import course_surface
 from nicmm_core.courses.course_search import farthest_between, find_courses
 from nicmm_core.courses.hop_graph import build_hop_graph
-from nicmm_core.courses.leg_combinations import combined, crossing_routes, laid_routes
+from nicmm_core.courses.leg_combinations import CROSSING, combined, crossing_routes, laid_routes
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
 from nicmm_core.relaxation.curve_nodes import curve_surface
@@ -22,32 +22,54 @@ def body():
     return shapes.creature(5, resolution=32, faces=1500)
 
 
-def test_combinations_do_not_cross(body):
-    graph = graph_through(body, body.vertices[[20, 250, 600]])
+def test_combinations_that_cross_cost_more(body):
+    graph = graph_through(body, body.vertices[[5, 100, 700]])
     routes = routes_of_legs(graph, LEGS, closed=True)
     nodes = laid_routes(graph, routes, 1.0)
     crosses = crossing_routes(graph, routes, nodes)
     assert crosses.any() and not crosses.all()
+    offset = np.cumsum([0, *(len(leg.cells) for leg in routes)])[:-1]
+
+    def crossings(found):
+        chosen = found.choice + offset
+        one, other = np.triu_indices(3)
+        return crosses[chosen[:, one], chosen[:, other]].sum(axis=1)
+
     found = combined(graph, routes, crosses, closed=True)
     assert (np.diff(found.cost) >= 0.0).all()
-    offset = np.cumsum([0, *(len(leg.cells) for leg in routes)])[:-1]
-    chosen = found.choice + offset
-    for one in range(3):
-        for other in range(3):
-            assert not crosses[chosen[:, one], chosen[:, other]].any()
+    free = combined(graph, routes, np.zeros_like(crosses), closed=True)
+    price = CROSSING * sum(leg.cost.min() for leg in routes)
+    without = {
+        tuple(choice): cost for choice, cost in zip(free.choice.tolist(), free.cost, strict=True)
+    }
+    for choice, cost, number in zip(
+        found.choice.tolist(), found.cost, crossings(found), strict=True
+    ):
+        if tuple(choice) in without:
+            assert cost == pytest.approx(without[tuple(choice)] + number * price)
+    assert crossings(found).sum() < crossings(free).sum()
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_courses_pass_their_points_in_order(body, closed):
+def test_courses_pass_their_points(body, closed):
+    """In the order given, or as the numbers at their nodes say."""
     surface = curve_surface(body)
     points = random_surface_points(body, 4, seed=3)
-    found = list(
-        find_courses(build_hop_graph(surface, 0), surface, points, np.ones(4, bool), closed, 1.0)
-    )
-    assert found
-    for nodes, control in found:
-        passed = nodes.positions[control]
-        np.testing.assert_allclose(passed, points.positions(body), atol=1e-9 * body.diagonal)
+    graph, fixed = build_hop_graph(surface, 0), np.ones(4, dtype=bool)
+    for any_order in (False, True):
+        found = list(find_courses(graph, surface, points, fixed, closed, 1.0, any_order))
+        assert found
+        for nodes, visit in found:
+            order = visit[visit >= 0]
+            passed = nodes.positions[visit >= 0]
+            there = points.positions(body)[order]
+            np.testing.assert_allclose(passed, there, atol=1e-9 * body.diagonal)
+            assert order[0] == 0
+            if not any_order:
+                np.testing.assert_array_equal(
+                    np.minimum(order, order[[0, *range(3, 0, -1)]]),
+                    np.minimum(np.arange(4), [0, 3, 2, 1]),
+                )
 
 
 def test_the_best_course_round_a_ball_is_a_great_circle():
@@ -57,7 +79,7 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
     points = points_near(ball, on_circle)
     graph = build_hop_graph(surface, 0)
-    nodes, _ = next(find_courses(graph, surface, points, np.ones(3, bool), True, 1.0))
+    nodes, _ = next(find_courses(graph, surface, points, np.ones(3, bool), True, 1.0, False))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
     energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
     assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
@@ -76,7 +98,7 @@ def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
         return curve.length * bending_energy(curve.nodes) + 4.0 * np.pi**2
 
     searched = [total(seed) for seed in range(8)]
-    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments: iter(()))
+    monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))
     by_network = [total(seed) for seed in range(8)]
     assert np.mean(np.log(np.divide(searched, by_network))) < np.log(0.9)
 

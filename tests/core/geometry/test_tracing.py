@@ -9,12 +9,13 @@ from scipy.spatial.transform import Rotation
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
-from nicmm_core.geometry.surface_points import SurfacePoints
+from nicmm_core.geometry.surface_points import SurfacePoints, joined
 from nicmm_core.geometry.tracing import strictly_inside, trace_between, trace_from
 from tests.core.checks import (
     assert_does_not_touch_itself,
     assert_lies_on_surface,
     chosen,
+    distances,
     flipped,
     grid,
     points_near,
@@ -46,7 +47,7 @@ def plane_between(mesh, start, end):
 def ways(mesh, start, end, normals=None, detour=2.0):
     """Each way with its ends as an open curve, None for one that was lost."""
     normals = plane_between(mesh, start, end) if normals is None else normals
-    traces = trace_between(mesh, start, end, normals, detour)
+    traces = trace_between(mesh, start, end, normals, detour * distances(mesh, start, end))
     assert (np.diff(traces.pair) >= 0).all()
     assert traces.reached[traces.pair].all()
     found = []
@@ -78,7 +79,8 @@ def test_on_a_flat_disc_a_way_is_the_straight_segment(flat_disc, factor):
 def test_a_way_crosses_every_edge_between_its_ends_once(flat_disc):
     """The number of crossings is that of edges whose ends lie on both sides, within the segment."""
     start, end = (random_surface_points(flat_disc, 30, seed=seed) for seed in (5, 6))
-    traces = trace_between(flat_disc, start, end, plane_between(flat_disc, start, end), 2.0)
+    plane, longest = plane_between(flat_disc, start, end), np.full(len(start), np.inf)
+    traces = trace_between(flat_disc, start, end, plane, longest)
     first, second = start.positions(flat_disc)[:, :2], end.positions(flat_disc)[:, :2]
     sides = np.sort(flat_disc.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     a, b = flat_disc.vertices[np.unique(sides, axis=0)][:, :, :2].transpose(1, 0, 2)
@@ -181,10 +183,29 @@ def test_a_way_through_a_vertex_passes_it_once(end, through):
     assert (way.barycentric == 1.0).any() == through
 
 
+@pytest.mark.parametrize("thickness", [0.3, 0.03])
+def test_a_way_round_the_edge_of_a_plate_begins_ahead(thickness):
+    """Towards its end it would begin inwards, and no plane along the normals contains it."""
+    plate = shapes.cube(12)
+    mesh = nicmm.Mesh(0.5 * plate.vertices * [1.0, 1.0, thickness], plate.faces)
+    half = 0.5 * thickness
+    start, end = points_near(mesh, [[0.46, 0.1, half]]), points_near(mesh, [[0.44, 0.12, -half]])
+    outwards = np.array([[1.0, 0.0, 0.0]])
+    straight = 0.04 + thickness + 0.06  # to the edge, down and back
+    longest = np.array([1.5 * straight])
+    assert not trace_between(mesh, start, end, np.eye(3)[2:], longest).reached.any()
+    traces = trace_between(mesh, start, end, outwards, longest, ahead=outwards)
+    assert traces.reached.all()
+    points = joined([start, traces.crossings, end]).positions(mesh)
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    assert straight - 1e-9 <= length <= 1.1 * straight
+    assert points[:, 0].max() == pytest.approx(0.5)
+
+
 def test_points_of_one_face_need_no_crossing(ball):
     start = SurfacePoints(np.arange(5), np.tile([0.5, 0.3, 0.2], (5, 1)))
     end = SurfacePoints(np.arange(5), np.tile([0.0, 1.0, 0.0], (5, 1)))
-    traces = trace_between(ball, start, end, ball.face_normals[:5], 1.5)
+    traces = trace_between(ball, start, end, ball.face_normals[:5], np.ones(5))
     assert traces.reached.all()
     assert len(traces.pair) == 0
 

@@ -102,7 +102,7 @@ def test_a_long_way_without_folds_is_lost_though_the_mesh_has_some():
     start, end = (nicmm.SurfacePoints(points.faces[[k]], points.barycentric[[k]]) for k in (0, 1))
     plane = np.array([[0.0, 0.0, 1.0]])
     none = np.zeros(len(mesh.faces), dtype=bool)
-    assert not trace_between(mesh, start, end, plane, 1.5, none).reached.any()
+    assert not trace_between(mesh, start, end, plane, np.array([0.015]), none).reached.any()
 
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.5, 4.0])
