@@ -145,13 +145,15 @@ def _reversal(
     n = len(before) - 1
     best, least = None, (True, n)
     for number, (begin, end) in enumerate(steps):
-        controls, size = before[end + 1] - before[begin + 1], end - begin
+        inside = int(before[end + 1] - before[begin + 1])
+        outside = int(before[-1]) - inside
+        loops = [(inside > 1, end - begin, [(0, begin + 1), (end + 1, begin + 1), (end + 1, n)])]
         if closed:
-            controls, size = min(controls, before[-1] - controls), min(size, n - size)
-        cost = bool(controls > 1), size
-        if cost < least and (any_order or not cost[0]):
-            best = _Move([(0, begin + 1), (end + 1, begin + 1), (end + 1, n)], [number])
-            least = cost
+            around = [(0, 1), (n, end + 1), (begin + 1, end + 1), (begin + 1, 1)]
+            loops.append((outside > 1, n - end + begin, around))
+        for changes_order, size, parts in loops:
+            if (changes_order, size) < least and (any_order or not changes_order):
+                best, least = _Move(parts, [number]), (changes_order, size)
     return best
 
 
