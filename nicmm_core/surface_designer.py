@@ -49,10 +49,13 @@ SOON_DONE = 10
 """The limit on iterations of a relaxation, relative to the number that most curves need."""
 
 STRONGLY_BENT = 80.0
-"""L ∮ κ_g² ds above which the network's curve is relaxed too, and the better one kept.
+"""L ∮ κ_g² ds above which courses are sought again, with random lengths, and the best is kept.
 
-Twice that of a circle: such curves wind around thin limbs, where few candidates are simple.
+Twice that of a circle: such curves wind around thin limbs, where a search misses more courses.
 """
+
+DRAWS = 2
+"""Searches with random lengths."""
 
 COLLISIONS = 3
 """Designs for which strands are assumed to collide after a collision."""
@@ -160,8 +163,8 @@ class SurfaceDesigner:
             designs = [self._relaxed(request, start, config, max_iterations, started)]
             if max_iterations is None:
                 if by_course and self._bent(designs[0]):
-                    other = self._start_by_network(request)
-                    designs.append(self._relaxed(request, other, config, None, started))
+                    for other in self._drawn_starts(request):
+                        designs.append(self._relaxed(request, other, config, None, started))
                 if alternatives:
                     for other in itertools.islice(courses, 2 * alternatives + 2):
                         designs.append(self._relaxed(request, other, config, None, started))
@@ -173,14 +176,19 @@ class SurfaceDesigner:
         nodes = design.resumable.curve.nodes
         return bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
 
-    def _course_starts(self, request: Request) -> Iterator[_Start]:
-        """Courses that are simple on the mesh, the best first."""
+    def _drawn_starts(self, request: Request) -> Iterator[_Start]:
+        """The best course of each search with random lengths."""
+        for draw in range(1, 1 + DRAWS):
+            yield from itertools.islice(self._course_starts(request, draw), 1)
+
+    def _course_starts(self, request: Request, draw: int = 0) -> Iterator[_Start]:
+        """Courses that are simple on the mesh, the best first; draws above 0 give others."""
         there, unit = self._curve_surface(request), self._unit(request)
         if self._coarse_starts.is_large(request):
-            for found in self._coarse_starts.courses(request):
+            for found in self._coarse_starts.courses(request, draw):
                 yield _Start(found.curve, found.visited, there, unit)
             return
-        for course in self._courses.courses(request):
+        for course in self._courses.courses(request, draw):
             checkpoint()
             controls = request.points[course.visited]
             faces, barycentric = (

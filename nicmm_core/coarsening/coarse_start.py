@@ -78,15 +78,16 @@ class CoarseStarts:
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._sizes: dict[int, int] = {}
 
-    def courses(self, request: Request) -> Iterator[CoarseStart]:
+    def courses(self, request: Request, draw: int = 0) -> Iterator[CoarseStart]:
         """The courses on a coarse mesh that are simple on the fine mesh, the best first.
 
         A small mesh has no coarse mesh, and where points are close together no course may be found.
+        Draws above 0 give other courses.
         """
         for level in self._levels(request):
             try:
                 on_coarse = _on_coarse(self._mesh, level.coarse, request)
-                for course in level.courses.courses(on_coarse):
+                for course in level.courses.courses(on_coarse, draw):
                     checkpoint()
                     nodes = noded(
                         level.surface, course.places, course.control_nodes, request.closed

@@ -37,6 +37,9 @@ SPARSE = 8
 APART = 0.02
 """Greatest distance of two courses that count as the same, relative to the diagonal."""
 
+DRAWN = 0.4
+"""Standard deviation of the logarithms of random factors."""
+
 MOST_LEGS = 60
 """Number of legs above which no courses are sought: hardly any combination is simple then."""
 
@@ -54,6 +57,7 @@ def find_courses(
     closed: bool,
     smoothness: float,
     any_order: bool,
+    draw: int = 0,
 ) -> Iterator[tuple[Nodes, IntArray]]:
     """Simple relaxed courses through points, by ascending energy.
 
@@ -73,6 +77,8 @@ def find_courses(
     smoothness : float
     any_order : bool
         Whether a course may visit control points in another order, if it would cross itself.
+    draw : int
+        Numbers above 0 give other courses: lengths are multiplied by random factors.
     """
     count = len(points) if closed else len(points) - 1
     if count > MOST_LEGS:
@@ -80,6 +86,10 @@ def find_courses(
     ends = np.arange(count)
     legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
+    if draw:
+        # Numbers of vertices follow from their places (`geometry.numbering`).
+        chance = np.random.default_rng(draw).standard_normal(len(surface.mesh.vertices))
+        factor = np.exp(DRAWN * chance) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, legs, factor, tension)
     checkpoint()

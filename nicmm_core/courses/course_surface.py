@@ -85,10 +85,11 @@ class CourseSurface:
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return replace(own, vertex_normals=normals)
 
-    def courses(self, request: Request) -> Iterator[Course]:
+    def courses(self, request: Request, draw: int = 0) -> Iterator[Course]:
         """Courses for a request, the best first, each a second time with twice as many nodes.
 
-        Where strands are close together, traces between more nodes may avoid a crossing.
+        Where strands are close together, traces between more nodes may avoid a crossing. Draws
+        above 0 give other courses.
 
         Raises
         ------
@@ -115,6 +116,7 @@ class CourseSurface:
             there.closed,
             there.smoothness,
             any_order=there.order == "shortest" and not there.via_points,
+            draw=draw,
         )
         for nodes, visit in found:
             on_copy = self._refined.in_parents(nodes.places)
