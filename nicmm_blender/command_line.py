@@ -120,7 +120,7 @@ def _option(described) -> dict:
     if described.type == "ENUM":
         identifiers = [item.identifier for item in described.enum_items]
         return {"type": str.upper, "choices": identifiers, **words}
-    return {"type": {"FLOAT": float, "STRING": str}[described.type], **words}
+    return {"type": {"FLOAT": float, "INT": int, "STRING": str}[described.type], **words}
 
 
 def register() -> None:

@@ -2,10 +2,17 @@
 """The settings of a curve for the operators and the sidebar: core options and outputs."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..nicmm_core.options import OPTIONS, Kind
-from .outputs import sticky_curves
+from .outputs import sticky_curves, writing
 from .scene import curve_record
 
 AUTOMATIC = (
@@ -47,6 +54,9 @@ def _property(option):
     limits = {
         name: value for name, value in zip(names, values, strict=True) if value < float("inf")
     }
+    if option.kind is Kind.COUNT:
+        whole = {name: int(value) for name, value in limits.items()}
+        return IntProperty(**words, **whole, default=option.default)
     subtype = "DISTANCE" if option.kind is Kind.LENGTH else "NONE"
     return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
 
@@ -61,7 +71,7 @@ class EditingProperties:
     """The options of a curve that is being edited; its points already have an order."""
 
     __annotations__ = properties_of(
-        option for option in OPTIONS if option.name not in ("order", "method")
+        option for option in OPTIONS if option.name not in (*curve_record.OF_A_DESIGN, "method")
     )
 
 
@@ -211,6 +221,9 @@ def draw_course(layout, properties) -> None:
     layout.use_property_decorate = False
     for name in ("closed", "order", "method", "smoothness"):
         layout.prop(properties, name)
+    row = layout.row()
+    row.active = properties.method == "NICMM"
+    row.prop(properties, "alternatives")
 
 
 def draw_clearance(layout, properties) -> None:
@@ -228,7 +241,7 @@ def draw_output(layout, properties) -> None:
     output = properties.output
     cuts = output in {"EDGES", "PARTS"} or (output == "REGION" and properties.region_cut)
     shown = {
-        "thickness": output in {"CURVE", "STICKY"},
+        "thickness": output in writing.SEPARATE,
         "tube": output == "STICKY",
         "region_as": output == "REGION",
         "region_cut": output == "REGION",

@@ -83,13 +83,20 @@ def _design(given: argparse.Namespace) -> None:
     )
     if design.status is Status.NOT_ONE_CURVE:
         raise NicmmError(str(design.status))
-    (curve,) = design.curves
-    write_curve(given.output, curve)
-    print(
-        f"{len(points)} points, length {curve.length:g}, {design.status.name.lower()}: "
-        f"{given.output}",
-        file=sys.stderr,
-    )
+    for number, each in enumerate([design, *design.alternatives]):
+        (curve,) = each.curves
+        path = numbered(given.output, number)
+        write_curve(path, curve)
+        print(
+            f"{len(points)} points, length {curve.length:g}, {each.status.name.lower()}: {path}",
+            file=sys.stderr,
+        )
+
+
+def numbered(path: str, number: int) -> str:
+    """The file of an alternative: ``curve-1.obj`` beside ``curve.obj``."""
+    plain = Path(path)
+    return str(plain.with_stem(f"{plain.stem}-{number}")) if number else path
 
 
 def _flag(option: Option) -> dict[str, Any]:
@@ -109,7 +116,8 @@ def _flag(option: Option) -> dict[str, Any]:
             "help": "vertices that the initial path passes after the I-th of the points, from 0; "
             "repeatable",
         }
-    return {"type": float, "default": option.default, "help": words}
+    number = int if option.kind is Kind.COUNT else float
+    return {"type": number, "default": option.default, "help": words}
 
 
 def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:

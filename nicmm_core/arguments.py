@@ -53,6 +53,8 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
         return checked_map(name, value, mesh)
     if option.kind in (Kind.NUMBER, Kind.LENGTH):
         return _checked_number(option, value)
+    if option.kind is Kind.COUNT:
+        return _checked_count(option, value)
     return value
 
 
@@ -70,20 +72,25 @@ def _checked_number(option: Option, value: Any) -> float:
     return number
 
 
+def _checked_count(option: Option, value: Any) -> int:
+    """A whole number within the limits of an option."""
+    low, high = option.limits
+    if not (_is_whole(value) and low <= value <= high):
+        limits = f"of at least {low:g}" if np.isinf(high) else f"in {low:g} … {high:g}"
+        raise ArgumentError(f"{option.name} is {value!r}; pass a whole number {limits}")
+    return int(value)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
 def check_iterations(max_iterations: Any) -> None:
     """Raise ArgumentError unless it is a positive whole number, or None."""
-    whole = isinstance(max_iterations, int | np.integer) and not isinstance(max_iterations, bool)
-    if max_iterations is not None and not (whole and max_iterations >= 1):
+    if max_iterations is not None and not (_is_whole(max_iterations) and max_iterations >= 1):
         raise ArgumentError(
             f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
         )
-
-
-def check_alternatives(alternatives: Any) -> None:
-    """Raise ArgumentError unless it is a whole number that is not negative."""
-    whole = isinstance(alternatives, int | np.integer) and not isinstance(alternatives, bool)
-    if not (whole and alternatives >= 0):
-        raise ArgumentError(f"alternatives is {alternatives!r}; pass a whole number, 0 for none")
 
 
 def check_torch() -> None:

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_alternatives, check_iterations, check_torch, checked_options
+from .arguments import check_iterations, check_torch, checked_options
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -129,13 +129,14 @@ class Designer:
             "obstacles": obstacles,
             "clearance": clearance,
             "alignment": alignment,
+            "alternatives": alternatives,
         }
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         try:
             with watched(progress), self._its_turn():
                 options = checked_options(self.mesh, given)
-                _check_start(start, method, max_iterations, alternatives)
+                _check_start(start, method, max_iterations, options["alternatives"])
                 if method == "nicmm-paper":
                     check_torch()
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)
@@ -148,7 +149,7 @@ class Designer:
                     return replace(start, seconds=time.perf_counter() - started)
                 begin = None if start is None else start_on(mapped, start)
                 with placed(lambda points: points + mapped.origin):
-                    found = designer.design(there, started, begin, max_iterations, alternatives)
+                    found = designer.design(there, started, begin, max_iterations)
                     return design_on_original(mapped, found)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
@@ -203,7 +204,6 @@ def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
 def _check_start(start: object, method: str, max_iterations: int | None, alternatives: int) -> None:
     """Raise ArgumentError unless these fit the method and each other."""
     check_iterations(max_iterations)
-    check_alternatives(alternatives)
     if alternatives and (method != "nicmm" or start is not None or max_iterations is not None):
         raise ArgumentError(
             f'alternatives is {alternatives}, which needs the method "nicmm" and neither start nor '
@@ -244,7 +244,8 @@ def design_curve(
     closed : bool, default True
         Whether the curve is closed, or open from the first point visited to the last.
     order : {"given", "shortest"}
-        Visit the points in the given order, or in the shortest one, cyclic for a closed curve.
+        Visit the points in the given order, or in the shortest one, cyclic for a closed curve. The
+        fairest curve may visit them in another order than the shortest loop.
     via_points : mapping, optional
         Selects one of several courses between two control points. It maps the index of a control
         point to points, in any form that control points may have, which the initial path to the
@@ -262,8 +263,8 @@ def design_curve(
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
     alternatives : int, default 0
-        Most other courses to return too, in `Design.alternatives`: whole curves of their own, the
-        fairest first. Only with the method "nicmm".
+        Most other curves along other courses to return too, in `Design.alternatives`, the fairest
+        first. Only with the method "nicmm".
     progress : callable, optional
         Called a few times a second with the fraction done and the points of the present curve, at
         first none. If it returns False, the design stops with the last curve, or with none.

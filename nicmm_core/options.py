@@ -20,6 +20,7 @@ class Kind(Enum):
     SWITCH = "True or False"
     CHOICE = "one of several names"
     NUMBER = "a number without a unit"
+    COUNT = "a whole number"
     LENGTH = "a length in mesh units"
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
@@ -50,7 +51,7 @@ class Option:
         A sentence without its full stop.
     choices : tuple of Choice
     limits : (float, float)
-        Of a number or a length, both included.
+        Of a number, a count or a length, both included.
     usual : (float, float)
         Limits of a slider.
     needs : str
@@ -152,6 +153,14 @@ OPTIONS: tuple[Option, ...] = (
         "Alignment",
         "Weights that attract the curve",
         flag="align",
+    ),
+    Option(
+        "alternatives",
+        Kind.COUNT,
+        0,
+        "Alternatives",
+        "Number of curves along other courses to design too, the fairest first",
+        usual=(0.0, 5.0),
     ),
 )
 """In the order in which users see them."""

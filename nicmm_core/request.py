@@ -42,6 +42,7 @@ class Request:
     obstacles: FloatArray | None
     clearance: float
     alignment: FloatArray | None
+    alternatives: int
 
     @property
     def has_maps(self) -> bool:

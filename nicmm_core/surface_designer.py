@@ -91,7 +91,6 @@ class SurfaceDesigner:
         started: float,
         start: Resumable | SurfaceCurve | None = None,
         max_iterations: int | None = None,
-        alternatives: int = 0,
     ) -> Design:
         """Design a curve.
 
@@ -104,8 +103,6 @@ class SurfaceDesigner:
             A curve on this mesh from which the method "nicmm" starts.
         max_iterations : int, optional
             Limit on the iterations of the relaxation in total.
-        alternatives : int
-            Most other courses to design too, by the method "nicmm" without a start or a limit.
 
         Raises
         ------
@@ -117,7 +114,7 @@ class SurfaceDesigner:
         if request.method == "nicmm":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
-            return self._designed(request, max_iterations, alternatives, started)
+            return self._designed(request, max_iterations, started)
         with subrange(0.0, 0.3):
             problem = requested_problem(self.mesh, request)
         watch = _FieldWatch(self.mesh, problem)
@@ -148,9 +145,7 @@ class SurfaceDesigner:
         begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
         return self._relaxed(request, begin, config, max_iterations, started)
 
-    def _designed(
-        self, request: Request, max_iterations: int | None, alternatives: int, started: float
-    ) -> Design:
+    def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the curve of the network where none is found."""
         config = RelaxationConfig() if request.alignment is None else GUIDED
         with subrange(0.0, STARTED):
@@ -165,10 +160,10 @@ class SurfaceDesigner:
                 if by_course and self._bent(designs[0]):
                     for other in self._drawn_starts(request):
                         designs.append(self._relaxed(request, other, config, None, started))
-                if alternatives:
-                    for other in itertools.islice(courses, 2 * alternatives + 2):
+                if request.alternatives:
+                    for other in itertools.islice(courses, 2 * request.alternatives + 2):
                         designs.append(self._relaxed(request, other, config, None, started))
-            return _fairest(start.surface, designs, request.smoothness, alternatives)
+            return _fairest(start.surface, designs, request)
 
     def _bent(self, design: Design) -> bool:
         """Whether a curve bends so much that the search may have missed a far better one."""
@@ -310,16 +305,15 @@ class SurfaceDesigner:
         return CoarseStarts(self._surface)
 
 
-def _fairest(
-    surface: CurveSurface, designs: list[Design], smoothness: float, alternatives: int
-) -> Design:
+def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
     """The design of least energy, with others that differ from it and from each other."""
     curves = [design.resumable.curve for design in designs if design.resumable is not None]
     if len(designs) == 1 or len(curves) < len(designs):
         return designs[0]
     scale = min(curve.length for curve in curves)
     energy = [
-        float(comparable_energies(surface, curve.nodes, smoothness, scale)[0]) for curve in curves
+        float(comparable_energies(surface, curve.nodes, request.smoothness, scale)[0])
+        for curve in curves
     ]
     best, *others = np.argsort(energy, kind="stable").tolist()
     limit = APART * surface.mesh.diagonal
@@ -330,7 +324,7 @@ def _fairest(
         if min(away) > limit:
             chosen.append(number)
     return replace(
-        designs[best], alternatives=[designs[each] for each in chosen[1 : alternatives + 1]]
+        designs[best], alternatives=[designs[each] for each in chosen[1 : request.alternatives + 1]]
     )
 
 

@@ -50,7 +50,7 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         made = writing.apply(context, mesh_object, surface, curves, self, asked)
         if not self.keep_original:
             curve_object.remove(original)
-        if self.output not in {"CURVE", "STICKY"}:
+        if self.output not in writing.SEPARATE:
             curve_object.select_only(context, mesh_object)
         self.report({"INFO"}, f"{name}: {made}")
         return {"FINISHED"}

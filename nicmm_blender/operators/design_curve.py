@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that designs a curve through the selected vertices."""
 
+from dataclasses import replace
+
 import bpy
 from bpy.props import StringProperty
 
@@ -58,7 +60,13 @@ class NICMM_OT_design_curve(
         surface = mesh_data.triangles(mesh_object)
         points, order = self._control_points(mesh_object, surface)
         asked = curve_record.asked_by(self)
-        return [design_request.for_points(mesh_object, surface, points, order, asked)]
+        request = design_request.for_points(mesh_object, surface, points, order, asked)
+        if self.alternatives and self.output not in writing.SEPARATE:
+            raise mesh_data.InputError(
+                "Alternatives are separate curves. Choose the output Curve or Sticky Curves, or "
+                "set them to 0"
+            )
+        return [replace(request, options={**request.options, "alternatives": self.alternatives})]
 
     def _control_points(self, mesh_object, surface):
         if self.points and self.point_group:
@@ -80,12 +88,15 @@ class NICMM_OT_design_curve(
         if not design.curves:
             raise mesh_data.InputError(str(design.status))
         mesh_object = request.mesh_object()
-        made = writing.apply(
-            context, mesh_object, request.surface, design.curves, self, request.asked
-        )
+        made = [
+            writing.apply(context, mesh_object, request.surface, each.curves, self, request.asked)
+            for each in [*design.alternatives[::-1], design]  # the fairest is active at the end
+        ][-1]
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
         summary = f"{_summary(mesh_object, design, order)}: {made}"
+        if self.alternatives:
+            summary += f"; {len(design.alternatives)} alternatives"
         if design.status == nicmm.Status.CONVERGED:
             self.report({"INFO"}, summary)
         else:

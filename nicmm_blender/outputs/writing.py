@@ -11,6 +11,9 @@ from ..scene import curve_record
 from ..scene.mesh_data import InputError
 from . import curve_object, mesh_cut, sticky_curves
 
+SEPARATE = ("CURVE", "STICKY")
+"""Outputs that are objects of their own."""
+
 FACE_SETS = ".sculpt_face_set"
 DEFAULT_FACE_SET = 1
 INSIDE = ".nicmm_inside"
@@ -34,7 +37,7 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
 
     `asked` holds the settings of the curves, a `curve_record.Asked`.
     """
-    if settings.output in {"CURVE", "STICKY"}:
+    if settings.output in SEPARATE:
         made = as_object(mesh_object, surface, curves, settings)
         curve_record.remember(made, mesh_object, surface, curves, asked)
         curve_object.place(context, mesh_object, made)

@@ -41,10 +41,15 @@ def _default(option):
     return option.default
 
 
+OF_A_DESIGN = ("order", "alternatives")
+"""Options that matter once: control points are stored in the order visited."""
+
 RECORDED = tuple(
-    option for option in OPTIONS if option.kind is not Kind.POINTS and option.name != "order"
+    option
+    for option in OPTIONS
+    if option.kind is not Kind.POINTS and option.name not in OF_A_DESIGN
 )
-"""Options in a record. The order is not: the control points are stored in the order visited."""
+"""Options in a record."""
 
 Asked = make_dataclass(
     "Asked",

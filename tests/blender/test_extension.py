@@ -174,8 +174,11 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
             continue
         name = record.property_name(option)
         assert designing[name].name == option.label
-        assert (name in editing) == (option.name not in ("order", "method"))
-        assert (name in record.Asked.__dataclass_fields__) == (option.name != "order")
+        of_a_design = option.name in ("order", "alternatives")
+        assert (name in editing) == (not of_a_design and option.name != "method")
+        assert (name in record.Asked.__dataclass_fields__) == (not of_a_design)
     added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
-    made = settings.properties_of((*table.OPTIONS, added))["torsion"]
-    assert made.keywords["default"] == 2.0 and made.keywords["max"] == 5.0
+    whole = table.Option("turns", table.Kind.COUNT, 1, "Turns", "Winds", limits=(0.0, 9.0))
+    made = settings.properties_of((*table.OPTIONS, added, whole))
+    assert made["torsion"].keywords["default"] == 2.0 and made["torsion"].keywords["max"] == 5.0
+    assert made["turns"].keywords["max"] == 9

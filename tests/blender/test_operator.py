@@ -47,6 +47,33 @@ def test_equals_the_core(empty_scene, mode):
     np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
 
 
+def test_alternatives_become_curves_of_their_own(empty_scene):
+    bpy.ops.mesh.primitive_torus_add(major_segments=48, minor_segments=24)
+    torus = bpy.context.active_object
+    vertices = [0, 400, 801]
+    scenes.select(torus, vertices)
+    expected = design(empty_scene.core, torus, vertices, alternatives=2)
+    assert expected.alternatives
+    assert bpy.ops.nicmm.design_curve(alternatives=2) == {"FINISHED"}
+    made = scenes.curves()
+    every = [expected, *expected.alternatives]
+    assert len(made) == len(every)
+    found = {len(scenes.points(curve)): scenes.points(curve) for curve in made}
+    for each in every:
+        points = each.curves[0].points
+        np.testing.assert_allclose(found[len(points)], points, atol=ROUNDING)
+    active = bpy.context.active_object
+    np.testing.assert_allclose(scenes.points(active), expected.curves[0].points, atol=ROUNDING)
+    assert [found for found in bpy.data.objects if found.select_get()] == [active]
+
+
+def test_alternatives_of_outputs_that_change_the_mesh_are_refused(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 3, height=0.4))
+    for output in ("EDGES", "REGION", "PARTS"):
+        assert "Alternatives" in reported_error(alternatives=1, output=output)
+
+
 @pytest.mark.parametrize(
     ("settings", "arguments"),
     [

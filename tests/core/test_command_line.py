@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
+from nicmm_core import shapes
 from nicmm_core.__main__ import main
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.io.files import read_mesh, write_mesh
@@ -94,6 +95,21 @@ def test_options_reach_the_design(mesh_file, tmp_path):
         assert main([*arguments, *options]) == 0
         outputs.append(output.read_text())
     assert outputs[0] != outputs[1]
+
+
+def test_alternatives_are_written_beside_the_curve(tmp_path, capsys):
+    mesh_path, output = tmp_path / "body.obj", tmp_path / "curve.csv"
+    body = shapes.creature(5, resolution=32, faces=1500)
+    write_mesh(mesh_path, body)
+    arguments = ["design", str(mesh_path), "--points", "20,250,600", "-o", str(output)]
+    assert main([*arguments, "--alternatives", "2"]) == 0
+    expected = nicmm.design_curve(read_mesh(mesh_path), [20, 250, 600], alternatives=2)
+    assert expected.alternatives
+    written = sorted(path.name for path in tmp_path.glob("*.csv"))
+    numbers = range(1, 1 + len(expected.alternatives))
+    assert written == sorted(["curve.csv", *(f"curve-{number}.csv" for number in numbers)])
+    assert len({path.read_text() for path in tmp_path.glob("*.csv")}) == len(written)
+    assert len(capsys.readouterr().err.splitlines()) == len(written)
 
 
 BAD_COMMANDS = {

@@ -14,7 +14,7 @@ from nicmm_core.options import Choice, Kind, Option
 from nicmm_core.request import Request
 
 DEFAULTS = {option.name: option.default for option in options.OPTIONS}
-BESIDE = {"alternatives", "progress"}
+BESIDE = {"progress"}
 """Arguments of `design_curve` that are no options of the curve."""
 
 ADDED = (
@@ -30,6 +30,7 @@ ADDED = (
     Option("margin", Kind.LENGTH, 0.0, "Margin", "Distance from stairs", needs="stairs"),
     Option("stairs", Kind.WEIGHTS, None, "Stairs", "Where it is steep"),
     Option("wavy", Kind.SWITCH, False, "Wavy", "Make waves"),
+    Option("turns", Kind.COUNT, 1, "Turns", "How often it winds", limits=(0, 9)),
 )
 
 
@@ -83,6 +84,9 @@ class TestAnOptionThatIsAdded:
             ("wavy", "yes"),
             ("stairs", weights + 2.0),
             ("margin", -1.0),
+            ("turns", 2.5),
+            ("turns", True),
+            ("turns", 10),
             ("margin", 0.1),  # without what it needs
         ]:
             with pytest.raises(nicmm.ArgumentError, match=name):
