@@ -19,13 +19,13 @@ from .hop_graph import CourseGraph
 DIRECTIONS = 64
 """Pairs of directions at both ends of a leg that are compared with those of other legs."""
 
-ALIGNED = 24
+ALIGNED = 16
 """Routes of a leg that fit those of its neighbours best."""
 
-DIFFERENT = 12
+DIFFERENT = 8
 """Further routes of a leg, each along another way."""
 
-ALL_DIRECTIONS, ALL_ROUTES = 320, 180
+ALL_DIRECTIONS, ALL_ROUTES = 320, 120
 """Caps on the sums of these over all legs, except that every leg has a few."""
 
 WORST = 8.0

@@ -176,16 +176,17 @@ def trace_from(
         if folded is not None:
             back = folded[fronts.faces] & outside[index]
         stops = (~back & (left[index] <= step)) | (beyond < 0)
-        ends = index[stops]
-        to_go = np.minimum(left[ends], step[stops])
-        share = (to_go / np.maximum(step[stops], tolerances.TINY))[:, None]
-        leaving = fronts.exit_barycentric()[stops]
-        barycentric[ends] += share * (leaving - barycentric[ends])
-        blocked[ends] = left[ends] > step[stops]
+        here = np.flatnonzero(stops)
+        ends = index[here]
+        to_go = np.minimum(left[ends], step[here])
+        share = (to_go / np.maximum(step[here], tolerances.TINY))[:, None]
+        faces[ends] = fronts.faces[here]
+        if passed > 1:
+            barycentric[ends] = fronts.entry_barycentric(here)
+        barycentric[ends] += share * (fronts.exit_barycentric(here) - barycentric[ends])
+        blocked[ends] = left[ends] > step[here]
         left[index] -= np.where(back, -step, step)
         fronts.enter_next_faces(~stops)
-        faces[fronts.index] = fronts.faces
-        barycentric[fronts.index] = _on_edges(mesh, *fronts.entry())
         fronts.leave_edges(np.ones(len(fronts.index), dtype=bool))
     return SurfacePoints(faces, strictly_inside(barycentric)), blocked, passed
 
@@ -199,7 +200,7 @@ def strictly_inside(barycentric: FloatArray) -> FloatArray:
 _OF_EACH_FRONT = (
     *("index", "faces", "_start", "_origin", "_across", "_position", "_side"),
     *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
-    *("_fraction", "_crossing"),
+    *("_fraction", "_crossing", "_entry_low", "_entry_high", "_entry_fraction"),
 )
 """Arrays of `_Fronts` with one row for each trace."""
 
@@ -226,19 +227,19 @@ class _Fronts:
         self._origin = origin[index]
         self._across = across[index]
         self._position = self._crossing = self._origin
-        self._fraction = np.zeros(len(index))
+        self._fraction = self._entry_fraction = np.zeros(len(index))
         corners = mesh.faces[self.faces]  # (w, 3)
         positions = mesh.vertices[corners]
         offset = positions - self._origin[:, None]
-        height = (offset * self._across[:, None]).sum(axis=2)
+        height = np.einsum("wcd,wd->wc", offset, self._across)
         # Side j lies opposite corner j. Two of them are crossed, one of them ahead.
         above = height >= 0.0
         first, second = [1, 2, 0], [2, 0, 1]
         crossed = above[:, first] != above[:, second]
         rise = height[:, second] - height[:, first]
         share = -height[:, first] / np.where(crossed, rise, 1.0)
-        points = offset[:, first] + share[..., None] * (offset[:, second] - offset[:, first])
-        ahead = (points * forward[index][:, None]).sum(axis=2)
+        along = np.einsum("wcd,wd->wc", offset, forward[index])
+        ahead = along[:, first] + share * (along[:, second] - along[:, first])
         side = np.where(crossed, ahead, -np.inf).argmax(axis=1)
         rows = np.arange(len(index))
         one, other = (side + 1) % 3, (side + 2) % 3
@@ -246,6 +247,7 @@ class _Fronts:
         high, low = np.where(up, one, other), np.where(up, other, one)
         self._side = side
         self._high, self._low = corners[rows, high], corners[rows, low]
+        self._entry_high, self._entry_low = self._high, self._low
         self._high_height, self._low_height = height[rows, high], height[rows, low]
         self._high_position, self._low_position = positions[rows, high], positions[rows, low]
         # Drop traces whose plane does not cross the sides of the face.
@@ -254,15 +256,22 @@ class _Fronts:
 
     def step_lengths(self) -> FloatArray:
         """Distance to the edge ahead, shape (w,)."""
-        return np.linalg.norm(self._crossing - self._position, axis=1)
+        step = self._crossing - self._position
+        return np.sqrt(np.einsum("wd,wd->w", step, step))
 
     def beyond(self) -> IntArray:
         """The face beyond this edge, -1 if no or several faces are there, shape (w,)."""
         return self.mesh.face_neighbours[self.faces, self._side]
 
-    def exit_barycentric(self) -> FloatArray:
-        """Barycentric coordinates at which the traces leave their faces, shape (w, 3)."""
-        return _on_edges(self.mesh, self.faces, self._low, self._high, self._fraction)
+    def exit_barycentric(self, which: IntArray) -> FloatArray:
+        """Barycentric coordinates at which some traces leave their faces, (q, 3)."""
+        low, high, fraction = self._low[which], self._high[which], self._fraction[which]
+        return _on_edges(self.mesh, self.faces[which], low, high, fraction)
+
+    def entry_barycentric(self, which: IntArray) -> FloatArray:
+        """Barycentric coordinates at which some traces entered their faces, (q, 3)."""
+        low, high = self._entry_low[which], self._entry_high[which]
+        return _on_edges(self.mesh, self.faces[which], low, high, self._entry_fraction[which])
 
     def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
         """Entry points: face, low and high end of the edge, and fraction from high to low."""
@@ -280,15 +289,17 @@ class _Fronts:
             beyond = beyond[continues]
         self.faces = beyond
         self._position = self._crossing
+        self._entry_low, self._entry_high = self._low, self._high
+        self._entry_fraction = self._fraction
 
     def leave_edges(self, continues: BoolArray) -> None:
         """Find the next edge of traces that have just entered a face; drop the others."""
         if not continues.all():
             self._keep(continues)
         corners = self.mesh.faces[self.faces]
-        third = corners.sum(axis=1) - self._low - self._high
+        third = corners[:, 0] + corners[:, 1] + corners[:, 2] - self._low - self._high
         position = self.mesh.vertices[third]
-        height = ((position - self._origin) * self._across).sum(axis=1)
+        height = np.einsum("wd,wd->w", position - self._origin, self._across)
         up = height >= 0.0
         left = np.where(up, self._high, self._low)
         self._side = (corners == left[:, None]).argmax(axis=1)
@@ -306,8 +317,9 @@ class _Fronts:
         self._crossing = self._high_position + self._fraction[:, None] * step
 
     def _keep(self, mask: BoolArray) -> None:
+        kept = np.flatnonzero(mask)
         for name in _OF_EACH_FRONT:
-            setattr(self, name, getattr(self, name)[mask])
+            setattr(self, name, getattr(self, name)[kept])
 
 
 def _on_edges(
