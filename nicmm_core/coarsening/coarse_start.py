@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..courses.course_surface import CourseSurface
+from ..courses.course_surface import CourseSurface, edges_crossed
 from ..errors import MeshError, NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
@@ -27,8 +27,11 @@ CELLS = 4_000
 REDUCTION = 2
 """Least number of fine vertices per cell."""
 
-SMALL = 6_000
-"""Number of vertices up to which a mesh needs no coarse mesh."""
+SMALL, LARGE = 3_000, 6_000
+"""Numbers of vertices up to which a mesh needs no coarse mesh, and from which it does."""
+
+CROSSED = 7.0
+"""`edges_crossed` from which a mesh between these sizes needs a coarse mesh: it has needles."""
 
 GROWTH = 4
 """Factor of the number of cells after a coarse mesh on which no curve was found."""
@@ -77,6 +80,7 @@ class CoarseStarts:
         self._mesh, self._fine = surface.mesh, surface
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._sizes: dict[int, int] = {}
+        self._large: dict[int, bool] = {}
 
     def courses(self, request: Request, draw: int = 0) -> Iterator[CoarseStart]:
         """The courses on a coarse mesh that are simple on the fine mesh, the best first.
@@ -118,7 +122,11 @@ class CoarseStarts:
     def is_large(self, request: Request) -> bool:
         """Whether the mesh has a coarse mesh for a request."""
         component = int(self._mesh.face_component[request.points.faces[0]])
-        return self._n_vertices(component) // REDUCTION * REDUCTION > SMALL
+        if component not in self._large:
+            count = self._n_vertices(component)
+            needles = SMALL < count <= LARGE and edges_crossed(self._mesh, component) > CROSSED
+            self._large[component] = count > LARGE or needles
+        return self._large[component]
 
     def _levels(self, request: Request) -> Iterator[_CoarseSurface]:
         """The coarse meshes of the component of a request, the coarsest first."""

@@ -23,7 +23,10 @@ from ..path.via_points import with_via_points
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, unsigned_normals, with_maps
 from ..request import Request, renumbered_request
 from .course_search import find_courses
-from .hop_graph import HopGraph, build_hop_graph
+from .hop_graph import CELLS, HopGraph, build_hop_graph
+
+MOST_CROSSED = 40.0
+"""`edges_crossed` above which no courses are sought: on needles moves pass thousands of faces."""
 
 FEWEST_VERTICES = 1_000
 """Number of vertices below which the mesh is refined."""
@@ -46,6 +49,20 @@ class Course:
     places: SurfacePoints
     control_nodes: IntArray
     visited: IntArray
+
+
+def edges_crossed(mesh: Mesh, component: int) -> float:
+    """Mean number of edges that a line crosses on its way over a cell of the hop graph.
+
+    By Crofton's formula this is 2 / π times the length of all edges per area, times that of the
+    line. It is 5 on a mesh of 4,000 vertices whose faces are about equilateral.
+    """
+    inside = mesh.face_component == component
+    corners = mesh.vertices[mesh.faces[inside]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    area = float(mesh.face_areas[inside].sum())
+    # Every edge is a side of two faces.
+    return float(sides.sum()) / np.pi * np.sqrt(area / CELLS) / area
 
 
 class CourseSurface:
@@ -107,6 +124,8 @@ class CourseSurface:
             points, fixed = waypoints.points, waypoints.is_control
         on_refined = self._refined.in_parts(points)
         component = int(self._refined.mesh.face_component[on_refined.faces[0]])
+        if edges_crossed(self._refined.mesh, component) > MOST_CROSSED:
+            return
         surface = self._with_maps(there, int(on_refined.faces[0]))
         found = find_courses(
             self._graph(component),

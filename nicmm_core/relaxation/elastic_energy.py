@@ -277,6 +277,8 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
         At least one node.
     damping : float or (c,) float array
         Of each curve. Added to its diagonal, relative to the greatest entry of a free node.
+
+    A curve whose linearisation is not finite or zero, as where nodes coincide, does not move.
     """
     may = free.reshape(system.curves, -1)
     both = [may & np.roll(may, -offset, axis=1) for offset in range(3)]
@@ -284,11 +286,19 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
     greatest = np.where(free, system.diagonal, 0.0).reshape(may.shape).max(axis=1)
     bands[0] += np.where(may, (damping * greatest)[:, None], 1.0).ravel()
     right = np.where(free, -system.slope, 0.0)
-    if not len(system.pairs):
-        return _solved(bands, right, system.curves)
     one, other = system.pairs.T
     ends = np.stack([free[one], free[one] & free[other], free[other]])
-    return _solved_with_pairs(bands, system.pairs, np.where(ends, system.pair_entries, 0.0), right)
+    entries = np.where(ends, system.pair_entries, 0.0)
+    sums = bands.sum(axis=0) + right
+    np.add.at(sums, one, entries.sum(axis=0))
+    sound = np.isfinite(sums).reshape(may.shape).all(axis=1) & (greatest > tolerances.TINY)
+    if not sound.all():
+        still = np.repeat(~sound, may.shape[1])
+        bands[:, still], bands[0, still], right[still] = 0.0, 1.0, 0.0
+        entries[:, still[one]] = 0.0
+    if not len(system.pairs):
+        return _solved(bands, right, system.curves)
+    return _solved_with_pairs(bands, system.pairs, entries, right)
 
 
 def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:

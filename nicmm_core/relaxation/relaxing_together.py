@@ -98,7 +98,6 @@ def relax_together(
             before = curve_energies(nodes, weights, contacts)
             system = elastic_system(surface, nodes, weights, contacts)
             move = damped_step(system, ~fixed, damping)
-        move = np.nan_to_num(move, nan=0.0, posinf=0.0, neginf=0.0)
         spacing = nodes.by_curve(nodes.step_lengths).sum(axis=1) / size
         farthest = np.abs(nodes.by_curve(move)).max(axis=1) / np.maximum(spacing, tolerances.TINY)
         share = np.minimum(1.0, config.longest_move / np.maximum(farthest, tolerances.TINY))

@@ -81,5 +81,7 @@ def _clearance(nodes: Nodes) -> FloatArray:
     """The clearance of the curve of each node, (n,)."""
     lengths = nodes.by_curve(nodes.step_lengths)
     steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
-    mean = np.maximum(lengths.sum(axis=1) / steps, tolerances.TINY)
+    # A curve without length has a clearance too.
+    least = max(tolerances.TINY, tolerances.ROUNDED * float(np.abs(nodes.positions).max()))
+    mean = np.maximum(lengths.sum(axis=1) / steps, least)
     return nodes.spread(CLEARANCE * mean)

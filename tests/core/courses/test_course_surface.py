@@ -1,0 +1,51 @@
+"""Where courses are sought: the density of edges, and meshes of needles."""
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.courses.course_surface import MOST_CROSSED, CourseSurface, edges_crossed
+from nicmm_core.courses.hop_graph import CELLS
+from nicmm_core.design import Designer
+from tests.core.checks import assert_valid_design
+
+
+def test_edges_crossed_are_counted_by_random_lines():
+    """Edges of a grid that straight lines in the plane cross, on the average."""
+    n = 40
+    disc = shapes.disc(n)
+    generator = np.random.default_rng(1)
+    length = np.sqrt(disc.face_areas.sum() / CELLS)
+    angle = generator.uniform(0.0, 2.0 * np.pi, 4_000)
+    start = generator.uniform(-0.6, 0.6, (4_000, 2))
+    end = start + length * np.column_stack([np.cos(angle), np.sin(angle)])
+    a, b = disc.vertices[disc.edges][:, :, :2].transpose(1, 0, 2)
+
+    def side(p, q, r):
+        return (q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0]
+
+    p, q = start[:, None], end[:, None]
+    crossed = (side(p, q, a) * side(p, q, b) < 0.0) & (side(a, b, p) * side(a, b, q) < 0.0)
+    assert edges_crossed(disc, 0) == pytest.approx(crossed.sum(axis=1).mean(), rel=0.05)
+
+
+def test_no_courses_are_sought_on_needles():
+    """A prism whose sides are divided into thousands of slivers still gets its curve."""
+    count = 2_500
+    angle = 2.0 * np.pi * np.arange(count) / count
+    low = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
+    ring = np.arange(count)
+    onward = (ring + 1) % count
+    sides = [
+        np.column_stack([ring, onward, onward + count]),
+        np.column_stack([ring, onward + count, ring + count]),
+    ]
+    tube = nicmm.Mesh(np.concatenate([low, low + [0.0, 0.0, 40.0]]), np.concatenate(sides))
+    assert edges_crossed(tube, 0) > MOST_CROSSED
+    designer = Designer(tube)
+    points = [0, count + count // 3, 2 * count // 3]
+    assert_valid_design(tube, designer.design(points, order="shortest"))
+    surface = CourseSurface(tube)
+    request = designer.design(points, order="shortest").resumable.request
+    assert not list(surface.courses(request))
