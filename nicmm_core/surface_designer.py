@@ -57,6 +57,9 @@ Twice that of a circle: such curves wind around thin limbs, where a search misse
 DRAWS = 2
 """Searches with random lengths."""
 
+MOST_TRIED = 10
+"""Courses relaxed for alternatives, besides two for each: many relax to the same curve."""
+
 COLLISIONS = 3
 """Designs for which strands are assumed to collide after a collision."""
 
@@ -158,10 +161,13 @@ class SurfaceDesigner:
             designs = [self._relaxed(request, start, config, max_iterations, started)]
             if max_iterations is None:
                 if by_course and self._bent(designs[0]):
-                    for other in self._drawn_starts(request):
+                    best = (itertools.islice(each, 1) for each in self._drawn_courses(request))
+                    for other in itertools.chain.from_iterable(best):
                         designs.append(self._relaxed(request, other, config, None, started))
                 if request.alternatives:
-                    for other in itertools.islice(courses, 2 * request.alternatives + 2):
+                    others = itertools.chain(courses, *self._drawn_courses(request))
+                    new = (start for start in others if _differs(start, designs))
+                    for other in itertools.islice(new, MOST_TRIED + 2 * request.alternatives):
                         designs.append(self._relaxed(request, other, config, None, started))
             return _fairest(start.surface, designs, request)
 
@@ -171,10 +177,9 @@ class SurfaceDesigner:
         nodes = design.resumable.curve.nodes
         return bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
 
-    def _drawn_starts(self, request: Request) -> Iterator[_Start]:
-        """The best course of each search with random lengths."""
-        for draw in range(1, 1 + DRAWS):
-            yield from itertools.islice(self._course_starts(request, draw), 1)
+    def _drawn_courses(self, request: Request) -> list[Iterator[_Start]]:
+        """The courses of each search with random lengths, each search begun on first use."""
+        return [self._course_starts(request, draw) for draw in range(1, 1 + DRAWS)]
 
     def _course_starts(self, request: Request, draw: int = 0) -> Iterator[_Start]:
         """Courses that are simple on the mesh, the best first; draws above 0 give others."""
@@ -325,6 +330,17 @@ def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> 
             chosen.append(number)
     return replace(
         designs[best], alternatives=[designs[each] for each in chosen[1 : request.alternatives + 1]]
+    )
+
+
+def _differs(start: _Start, designs: list[Design]) -> bool:
+    """Whether a course is apart from the curves of designs, as they are now."""
+    assert isinstance(start.curve, NodedCurve)
+    positions, limit = start.curve.nodes.positions, APART * start.surface.mesh.diagonal
+    return all(
+        farthest_between(positions, design.resumable.curve.nodes.positions) > limit
+        for design in designs
+        if design.resumable is not None
     )
 
 

@@ -49,7 +49,7 @@ def test_curve_is_valid_and_factorises_only_the_coarse_mesh(
 
 @pytest.mark.parametrize("seed", range(6))
 def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns, without_courses):
-    square = grid(79)
+    square = grid(84)
     inner = np.flatnonzero((np.abs(square.vertices[:, :2] - 0.5) < 0.3).all(axis=1))
     points = np.random.default_rng(seed).choice(inner, size=4, replace=False)
     assert_valid_design(square, nicmm.design_curve(square, points, order="shortest"))
@@ -112,7 +112,7 @@ def test_given_order_and_via_points_hold_on_large_meshes():
     short = nicmm.design_curve(ring, at)
     long = nicmm.design_curve(ring, at, via_points={2: [back]})
     assert_valid_design(ring, long)
-    assert long.curves[0].length > 2.0 * short.curves[0].length
+    assert long.curves[0].length > 1.9 * short.curves[0].length
 
 
 @pytest.mark.slow
