@@ -17,6 +17,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
 from nicmm_core.coarsening import coarse_start
+from nicmm_core.courses import course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set import problem, zero_set
@@ -36,6 +37,22 @@ POINTS = 4
 STAGES: dict[str, list[tuple[ModuleType, str]]] = {
     "normals": [(surface_designer, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
+    "copy in its frame": [(course_surface, "renumbered")],
+    "hop graph": [(course_surface, "build_hop_graph")],
+    "order of the points": [(course_surface, "visiting_order")],
+    "least costs, routes": [
+        (course_search, "with_control_points"),
+        (course_search, "routes_of_legs"),
+    ],
+    "combinations": [
+        (course_search, "laid_routes"),
+        (course_search, "crossing_routes"),
+        (course_search, "combined"),
+        (course_search, "course_nodes"),
+    ],
+    "crossings removed": [(course_search, "uncrossed")],
+    "courses relaxed together": [(course_search, "relax_together")],
+    "courses compared": [(course_search, "_best")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
     "network": [(single_pass, "infer_level_set")],
@@ -44,7 +61,10 @@ STAGES: dict[str, list[tuple[ModuleType, str]]] = {
         (zero_set, "keep_topology"),
         (zero_set, "extract_curves"),
     ],
-    "mapping to the fine mesh": [(coarse_start, "curve_on_fine_mesh")],
+    "mapping to the fine mesh": [
+        (coarse_start, "curve_on_fine_mesh"),
+        (coarse_start, "nodes_on_fine_mesh"),
+    ],
     "start from the last curve": [(surface_designer, "moved_start")],
     "relaxation": [(surface_designer, "relax")],
 }
