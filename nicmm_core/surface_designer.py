@@ -159,7 +159,9 @@ class SurfaceDesigner:
                 start = self._start_by_network(request)
         with subrange(STARTED, 1.0):
             designs = [self._relaxed(request, start, config, max_iterations, started)]
-            if max_iterations is None:
+            if max_iterations is not None or designs[0].status is Status.CANCELLED:
+                return designs[0]
+            try:
                 if by_course and self._bent(designs[0]):
                     best = (itertools.islice(each, 1) for each in self._drawn_courses(request))
                     for other in itertools.chain.from_iterable(best):
@@ -169,6 +171,8 @@ class SurfaceDesigner:
                     new = (start for start in others if _differs(start, designs))
                     for other in itertools.islice(new, MOST_TRIED + 2 * request.alternatives):
                         designs.append(self._relaxed(request, other, config, None, started))
+            except CancelledError:
+                return replace(_fairest(start.surface, designs, request), status=Status.CANCELLED)
             return _fairest(start.surface, designs, request)
 
     def _bent(self, design: Design) -> bool:

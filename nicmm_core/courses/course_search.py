@@ -43,10 +43,7 @@ DRAWN = 0.4
 MOST_LEGS = 60
 """Number of legs above which no courses are sought: hardly any combination is simple then."""
 
-STAGES = (
-    (24, TogetherConfig(iterations=12)),
-    (6, TogetherConfig(iterations=14)),
-)
+STAGES = (TogetherConfig(iterations=12), TogetherConfig(iterations=14))
 
 
 def find_courses(
@@ -110,9 +107,9 @@ def find_courses(
     visit[at_points] = np.tile(number, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
     nodes, visit = uncrossed(surface, nodes, visit, any_order)
-    for stage, (most, config) in enumerate(STAGES):
+    for stage, config in enumerate(STAGES):
         if stage:
-            best = np.concatenate(_best(surface, nodes, smoothness))[:most]
+            best = np.concatenate(_best(surface, nodes, smoothness))[:FINALISTS]
             nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
             nodes, visit = _denser(surface, nodes, visit)
         with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import progress, shapes
+from nicmm_core import progress, shapes, surface_designer
 from nicmm_core.progress import CancelledError, checkpoint, placed, subrange, watched
 from tests.oracles.checker import judge_curve
 from tests.oracles.defects import defective_meshes
@@ -120,6 +120,24 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     again = designer.design(points, **arguments)
     assert again.status is whole.status
     np.testing.assert_array_equal(again.curves[0].points, whole.curves[0].points)
+
+
+def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
+    """Where a curve bends strongly, courses are sought again; here always."""
+    monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
+    body = shapes.creature(5, resolution=32, faces=1500)
+    chosen = [20, 250, 600]
+    calls = []
+    whole = nicmm.design_curve(body, chosen, progress=lambda *_: calls.append(None))
+    assert whole.status is nicmm.Status.CONVERGED
+    for share in (0.6, 0.95):
+        left = iter(range(int(share * len(calls))))
+        design = nicmm.design_curve(
+            body, chosen, progress=lambda *_, left=left: next(left, None) is not None
+        )
+        assert design.status is nicmm.Status.CANCELLED
+        (curve,) = design.curves
+        assert not judge_curve(body, curve, closed=True).faults
 
 
 def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
