@@ -161,13 +161,14 @@ class SurfaceDesigner:
             designs = [self._relaxed(request, start, config, max_iterations, started)]
             if max_iterations is not None or designs[0].status is Status.CANCELLED:
                 return designs[0]
+            drawn = self._drawn_courses(request)
             try:
                 if by_course and self._bent(designs[0]):
-                    best = (itertools.islice(each, 1) for each in self._drawn_courses(request))
+                    best = (itertools.islice(each, 1) for each in drawn)
                     for other in itertools.chain.from_iterable(best):
                         designs.append(self._relaxed(request, other, config, None, started))
                 if request.alternatives:
-                    others = itertools.chain(courses, *self._drawn_courses(request))
+                    others = itertools.chain(courses, *drawn)
                     new = (start for start in others if _differs(start, designs))
                     for other in itertools.islice(new, MOST_TRIED + 2 * request.alternatives):
                         designs.append(self._relaxed(request, other, config, None, started))
