@@ -15,8 +15,8 @@ from nicmm_core import shapes
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve, resample
 from nicmm_core.geometry.mesh import Mesh, unique_edges
+from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.io.files import read_mesh
-from nicmm_core.level_set.features import vertex_normals
 
 from . import collections, renders, report
 from .lanes import lane_beside

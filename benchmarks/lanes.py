@@ -14,8 +14,8 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, resample
 from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.noded_curve import shifted
 from tests.oracles.checker import judge

@@ -7,7 +7,7 @@ import numpy as np
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve, geodesic_curvature, resample
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.level_set.features import vertex_normals
+from nicmm_core.geometry.normals import vertex_normals
 
 SAMPLES = 128
 """Evenly spaced points of a curve that curvature is taken at.

@@ -19,7 +19,7 @@ from mathutils.bvhtree import BVHTree
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve, resample
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.level_set.features import vertex_normals
+from nicmm_core.geometry.normals import vertex_normals
 
 from . import plots
 from .polylines import NearestPoints

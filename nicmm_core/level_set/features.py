@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.numbering import principal_frame
-from ..progress import checkpoint
 
 BASE_CHANNELS = 8
 """Position 3, normal 3, φ_p, φ₀."""
@@ -37,14 +35,6 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
     axes = frame.signed_axes()
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return (vertices - frame.centre) @ axes
-
-
-def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Unit normals weighted by corner angle, shape (n, 3); zero where they cancel."""
-    checkpoint()
-    normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
-    checkpoint()
-    return np.nan_to_num(normals)
 
 
 def input_features(

@@ -14,6 +14,7 @@ from scipy.sparse import csgraph
 from ..errors import MeshError
 from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.mesh import Mesh
+from ..geometry.normals import vertex_normals
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import component_unit, feature_map
 from ..path.band_refinement import PIECES
@@ -22,7 +23,7 @@ from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint, subrange
 from ..request import Request
-from .features import control_indicator, in_principal_frame, input_features, vertex_normals
+from .features import control_indicator, in_principal_frame, input_features
 from .finite_elements import FiniteElements, build_finite_elements
 from .sign_bundle import SignBundle, build_sign_bundle
 from .signed_distance import bounding_side, signed_distance

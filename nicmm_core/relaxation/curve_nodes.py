@@ -13,8 +13,8 @@ from scipy import sparse
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
+from ..geometry.normals import vertex_normals
 from ..geometry.surface_points import SurfacePoints
-from ..level_set.features import vertex_normals
 from ..maps.guidance import feature_map
 from ..progress import checkpoint
 

@@ -5,9 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.features import vertex_normals
 from nicmm_core.level_set.problem import build_problem
 from nicmm_core.maps.guidance import BASELINE
 from tests.core.checks import random_surface_points
@@ -72,19 +70,6 @@ def test_map_weights_are_interpolated_at_inserted_points(small_ball):
     where = np.flatnonzero(problem.loop.order == 1)[0]
     at_point = problem.feature_map[problem.loop.control_vertices[where]]
     assert at_point == pytest.approx(problem.feature_map.max())
-
-
-def test_normals_of_a_sphere_point_outwards():
-    for mesh in (shapes.sphere(2), shapes.sphere(3)):
-        normals = vertex_normals(mesh.vertices, mesh.faces)
-        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
-        assert (normals * mesh.vertices).sum(axis=1).min() > 0.99
-
-
-def test_normals_are_finite_where_they_cancel():
-    """Two faces back to back."""
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    assert np.isfinite(vertex_normals(vertices, np.array([[0, 1, 2], [0, 2, 1]]))).all()
 
 
 @pytest.mark.slow
