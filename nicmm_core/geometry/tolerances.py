@@ -46,5 +46,25 @@ of its face."""
 SAME_COST = 1e-9
 """Difference of two costs of paths, relative to the least cost, that is a rounding error."""
 
+CLEAN_CURVE = 1e-4
+"""Greatest distance of a clean version of a curve from the curve, in bounding-box diagonals."""
+
+CLEAN_TUBE = 0.1
+"""That distance in radii, where a tube is drawn around the curve."""
+
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor, where the dividend is zero too."""
+
+
+def of_clean_curve(diagonal: float, radius: float = 0.0) -> float:
+    """Greatest distance of a clean version of a curve from the curve, in mesh units.
+
+    Parameters
+    ----------
+    diagonal : float
+        Diagonal of the bounding box of the mesh.
+    radius : float, default 0
+        Radius of the tube that is drawn around the curve, in mesh units; 0 for none.
+    """
+    of_mesh = CLEAN_CURVE * diagonal
+    return min(of_mesh, CLEAN_TUBE * radius) if radius > 0.0 else of_mesh

@@ -1,0 +1,114 @@
+"""A polyline in the form that both clean versions need: cut at its control points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.tolerances import TINY
+
+CORNER = np.radians(30.0)
+"""Turn at one place from which a polyline has a corner there, in radians."""
+
+
+@dataclass(frozen=True)
+class CutPolyline:
+    """A polyline that starts at a control point, if it has one.
+
+    Attributes
+    ----------
+    points : (n, 3) float array
+        Positions; of a closed polyline the first one is repeated at the end.
+    arc : (n,) float array
+        Arc length from the start.
+    closed : bool
+    vertex : (n,) int array
+        Index of each point among the points given.
+    bounds : (b,) int array
+        Where the legs begin and end, ascending: the control points, the first point and the last.
+    """
+
+    points: FloatArray
+    arc: FloatArray
+    closed: bool
+    vertex: IntArray
+    bounds: IntArray
+
+    def positions(self, at: FloatArray) -> FloatArray:
+        """Positions at arc lengths of any shape (...), shape (..., 3).
+
+        A closed polyline goes round; an open one stays at its ends.
+        """
+        if self.closed:
+            at = np.mod(at, self.arc[-1])
+        axes = [np.interp(at, self.arc, self.points[:, axis]) for axis in range(3)]
+        return np.stack(axes, axis=-1)
+
+    def turns(self, at: FloatArray, reach: FloatArray | float) -> FloatArray:
+        """Angles between the chords from `reach` before each arc length and to `reach` after it.
+
+        Parameters
+        ----------
+        at : (k,) float array
+        reach : (k,) float array or float
+            A length. At a corner the angle does not depend on it; on a smooth curve it is
+            proportional to it.
+
+        Returns
+        -------
+        (k,) float array
+            In radians, 0 … π; 0 at the ends of an open polyline.
+        """
+        here = self.positions(at)
+        before, after = here - self.positions(at - reach), self.positions(at + reach) - here
+        return angles(before, after)
+
+
+def angles(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Angles between pairs of vectors (k, 3), in radians, shape (k,); 0 where one is zero."""
+    sine = np.linalg.norm(np.cross(first, second), axis=1)
+    return np.arctan2(sine, (first * second).sum(axis=1))
+
+
+def cut_polyline(points: FloatArray, closed: bool, control_index: IntArray) -> CutPolyline:
+    """A polyline cut at its control points.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    closed : bool
+        Whether the last point is joined to the first, which is not repeated.
+    control_index : (k,) int array
+        Indices of the control points among the points, in any order; -1 for none. A closed
+        polyline without any is cut at its sharpest corner, or at its first point if it has none.
+    """
+    controls = np.unique(control_index[control_index >= 0])
+    n = len(points)
+    if not closed:
+        vertex = np.arange(n)
+        bounds = np.unique(np.concatenate([controls, [0, n - 1]]))
+    else:
+        if len(controls) == 0:
+            controls = np.array([_sharpest(points)])
+        vertex = (controls[0] + np.arange(n + 1)) % n
+        bounds = np.append(controls - controls[0], n)
+    line = points[vertex]
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    return CutPolyline(line, arc, closed, vertex, bounds)
+
+
+def _sharpest(points: FloatArray) -> int:
+    """The sharpest corner of a closed polyline, or 0 if it has no corner."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turn = angles(before, after)
+    # Between corners that differ by rounding, the first one.
+    return int((turn >= turn.max() - 1e-9).argmax()) if turn.max() > CORNER else 0
+
+
+def distances_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distances of points (k, 3) to line segments, a segment for each point, shape (k,)."""
+    step, offset = end - start, points - start
+    along = (offset * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), TINY)
+    return np.linalg.norm(offset - np.clip(along, 0.0, 1.0)[:, None] * step, axis=1)
