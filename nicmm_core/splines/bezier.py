@@ -1,0 +1,479 @@
+"""Cubic Bézier splines along a polyline, with as few knots as keep it within a tolerance.
+
+Each leg, from one control point to the next, starts as one cubic; cubics too far from the polyline
+are split, and in the end neighbours are merged where one cubic is enough. Cubics are fitted by the
+method of Schneider (1990): tangents at the knots are given, the lengths of the handles solve a
+least-squares problem, and each point of the polyline then moves to a nearer parameter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.tolerances import TINY
+from .polyline import CORNER, CutPolyline, angles, cut_polyline, distances_to_segments
+
+SAMPLES = 16
+"""Points of the polyline that each cubic is fitted to, besides its vertices."""
+
+ROUNDS = 6
+"""How often handles and parameters are solved for in turn."""
+
+LEAST_HANDLE, GREATEST_HANDLE = 0.01, 0.6
+"""Limits of a handle, in arc lengths of its cubic. Those of an arc of a circle are a third; two
+handles of 0.6 on a straight line still give a cubic that runs forward only."""
+
+TANGENT_REACH, TANGENT_REACH_AT_END = 0.4, 0.25
+"""Arc length over which the tangent at a knot is measured, on either side or on one side only, in
+lengths of the shorter cubic there. Less shows the zigzag at mesh edges; one side follows less."""
+
+TANGENT_SAMPLES = 12
+"""Points on either side of a knot to which its tangent is fitted."""
+
+CORNER_REACH = 4.0
+"""A corner turns within this distance on either side, in tolerances."""
+
+ORDER = 6.0
+"""The distance of a fitted cubic from a smooth curve falls with this power of its length."""
+
+MOST_PARTS = 4
+"""Greatest number of parts into which a cubic is split at once."""
+
+
+@dataclass(frozen=True)
+class BezierSpline:
+    """A cubic Bézier spline as Blender has it: knots, each with a handle on either side.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether the last knot is joined to the first, which is not repeated.
+    knots : (m, 3) float array
+        Positions, vertices of the polyline.
+    left, right : (m, 3) float array
+        Positions of the handles towards the previous and the next knot. The handle beyond an end
+        of an open spline mirrors the other one.
+    control_index : (k,) int array
+        The index of each control point among the knots; -1 for one that the curve does not pass.
+    """
+
+    closed: bool
+    knots: FloatArray
+    left: FloatArray
+    right: FloatArray
+    control_index: IntArray
+
+
+def fit_bezier(
+    points: FloatArray, closed: bool, control_index: IntArray, tolerance: float
+) -> BezierSpline:
+    """A Bézier spline along a polyline, with as few knots as keep it within a tolerance.
+
+    Control points, corners and the ends of an open polyline are knots. Both handles and the knot
+    lie on one line, except at corners, where the polyline turns by 30° or more within a few
+    tolerances. Polyline and spline are compared both ways at many places.
+
+    Splitting stops at the vertices of the polyline. A cubic over one segment keeps any tolerance,
+    but with short handles, so the spline bends as sharply there as the polyline.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    closed : bool
+        Whether the last point is joined to the first, which is not repeated.
+    control_index : (k,) int array
+        Indices of the control points among the points, in any order; -1 for none.
+    tolerance : float
+        Greatest distance between the spline and the polyline, in units of the points.
+    """
+    control_index = np.asarray(control_index, dtype=np.int64)
+    given = cut_polyline(points, closed, control_index)
+    line, kept = _without_repeats(given)
+    if len(line.points) < 2:
+        place = points[:1]
+        index = np.where(control_index >= 0, 0, -1)
+        return BezierSpline(closed, place.copy(), place.copy(), place.copy(), index)
+
+    fitter = _Fitter(line, tolerance)
+    knots = _split(fitter)
+    knots, tangents, handles = _merge(fitter, knots)
+
+    count = len(knots) - 1 if closed else len(knots)
+    places = line.points[knots]
+    right = places[:-1] + handles[:, :1] * tangents.after[:-1]
+    left = places[1:] - handles[:, 1:] * tangents.before[1:]
+    if closed:
+        left = np.concatenate([left[-1:], left[:-1]])
+    else:
+        right = np.concatenate([right, 2.0 * places[-1:] - left[-1:]])
+        left = np.concatenate([2.0 * places[:1] - right[:1], left])
+    knot_of = np.full(len(points) + 1, -1)  # the last one for the index -1
+    knot_of[given.vertex[given.bounds]] = np.searchsorted(knots, kept[given.bounds]) % count
+    return BezierSpline(closed, places[:count], left, right, knot_of[control_index])
+
+
+@dataclass(frozen=True)
+class _Tangents:
+    """Unit tangents, forward, at k knots; the two differ at corners only."""
+
+    before: FloatArray
+    after: FloatArray
+
+    def __getitem__(self, index: IntArray | BoolArray) -> _Tangents:
+        return _Tangents(self.before[index], self.after[index])
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """Cubics over s spans of the polyline."""
+
+    handles: FloatArray
+    """(s, 2) lengths of the handles at the start and at the end."""
+    deviation: FloatArray
+    """(s,) greatest distance, infinite where the cubic runs backward."""
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Least squares for the handles of s cubics to n points, each of one span."""
+
+    ends: tuple[FloatArray, FloatArray]
+    """(s, 3) each."""
+    first: FloatArray
+    last: FloatArray
+    """(s, 3) unit tangents at the ends, forward."""
+    length: FloatArray
+    """(s,) arc lengths of the spans."""
+    span: IntArray
+    """(n,) ascending."""
+    first_row: IntArray
+    """(s,) the first point of each span."""
+    weight: FloatArray
+    """(n,)"""
+    target: FloatArray
+    """(n, 3)"""
+
+    def least_squares(self, parameter: FloatArray) -> FloatArray:
+        """Lengths of both handles of each cubic, within limits, (s, 2)."""
+        span, first, last = self.span, self.first, self.last
+        basis = _bernstein(parameter)
+        base = self.target - basis[:, :2].sum(axis=1)[:, None] * self.ends[0][span]
+        base -= basis[:, 2:].sum(axis=1)[:, None] * self.ends[1][span]
+        out, back = basis[:, 1], -basis[:, 2]
+        out_out, back_back = self._sums(out * out), self._sums(back * back)
+        out_back = self._sums(out * back) * (first * last).sum(axis=1)
+        out_target = self._sums(out * (base * first[span]).sum(axis=1))
+        back_target = self._sums(back * (base * last[span]).sum(axis=1))
+
+        low, high = LEAST_HANDLE * self.length, GREATEST_HANDLE * self.length
+        determinant = np.maximum(out_out * back_back - out_back**2, TINY)
+        out = np.clip((back_back * out_target - out_back * back_target) / determinant, low, high)
+        for _ in range(2):  # where one is at its limit, the other one is the best for it
+            back = (back_target - out_back * out) / np.maximum(back_back, TINY)
+            back = np.clip(back, low, high)
+            out = (out_target - out_back * back) / np.maximum(out_out, TINY)
+            out = np.clip(out, low, high)
+        return np.stack([out, back], axis=1)
+
+    def _sums(self, terms: FloatArray) -> FloatArray:
+        return np.add.reduceat(self.weight * terms, self.first_row)
+
+
+class _Fitter:
+    """A polyline and what the fits need of it."""
+
+    def __init__(self, line: CutPolyline, tolerance: float) -> None:
+        self.line = line
+        self.tolerance = tolerance
+        self.turn = line.turns(line.arc, CORNER_REACH * tolerance)
+        self.corner = self._corners()
+        ends = np.array([0, len(line.arc) - 1])
+        self.sharp = self.corner.copy()
+        if not line.closed:
+            self.sharp[ends] = True
+        self.fixed = _union(line.bounds, np.flatnonzero(self.corner))
+        if line.closed and len(self.fixed) == 2:  # one cubic would start where it ends
+            halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
+            self.fixed = _union(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
+
+    def _corners(self) -> BoolArray:
+        """Where the polyline turns sharply: (n,), one vertex at each place."""
+        reach, arc = CORNER_REACH * self.tolerance, self.line.arc
+        corner = self.turn > CORNER
+        found = np.zeros(len(arc), dtype=bool)
+        at = np.flatnonzero(corner)
+        # Vertices close to one another see the same turn; the one with most of it counts.
+        for group in np.split(at, np.flatnonzero(np.diff(arc[at]) > reach) + 1):
+            if len(group):
+                found[group[self.turn[group].argmax()]] = True
+        if self.line.closed:
+            found[[0, -1]] = found[0] | found[-1]
+        return found
+
+    def tangents(self, knots: IntArray) -> _Tangents:
+        """Tangents at knots, measured over a part of the spans next to each."""
+        arc = self.line.arc[knots]
+        spans = np.diff(arc)
+        if self.line.closed:
+            back, ahead = np.append(spans[-1], spans), np.append(spans, spans[0])
+        else:
+            back, ahead = np.append(spans[:1], spans), np.append(spans, spans[-1:])
+        both = self._two_sided(arc, TANGENT_REACH * np.minimum(back, ahead))
+        sharp = self.sharp[knots][:, None]
+        before = np.where(sharp, -self._one_sided(arc, -TANGENT_REACH_AT_END * back), both)
+        after = np.where(sharp, self._one_sided(arc, TANGENT_REACH_AT_END * ahead), both)
+        return _Tangents(_unit(before, after), _unit(after, before))
+
+    def _two_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
+        """Directions of cubics through points at arc lengths, fitted to both sides."""
+        share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
+        weights = np.linalg.pinv(np.stack([share, share**3], axis=1))[0]
+        at, steps = arc[:, None], share * reach[:, None]
+        chords = self.line.positions(at + steps) - self.line.positions(at - steps)
+        return np.einsum("s,ksd->kd", weights, chords)
+
+    def _one_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
+        """Directions of cubics from points at arc lengths, fitted to one side."""
+        share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
+        weights = np.linalg.pinv(np.stack([share, share**2, share**3], axis=1))[0]
+        chords = self.line.positions(arc[:, None] + share * reach[:, None])
+        return np.einsum("s,ksd->kd", weights, chords - self.line.positions(arc)[:, None])
+
+    def fit(self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray) -> _Fits:
+        """Fit cubics over spans of the polyline.
+
+        Parameters
+        ----------
+        start, end : (s,) int array
+            Vertices of the polyline.
+        first, last : (s, 3) float array
+            Unit tangents there, forward.
+        """
+        fits = self._fit(start, end, first, last, None)
+        far = np.flatnonzero(fits.deviation > self.tolerance)
+        if len(far):
+            start, end, first, last = start[far], end[far], first[far], last[far]
+            short = self._short_handles(start, end, first, last)
+            straight = self._fit(start, end, first, last, short)
+            better = straight.deviation < fits.deviation[far]
+            fits.handles[far[better]] = straight.handles[better]
+            fits.deviation[far[better]] = straight.deviation[better]
+        return fits
+
+    def _short_handles(
+        self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray
+    ) -> FloatArray:
+        """Handles (s, 2) with which cubics stay within the tolerance of their chords.
+
+        At a weak corner the tangent is between the directions of both sides. Least squares come
+        only slowly to the short handles that a straight side then needs.
+        """
+        chord = self.line.points[end] - self.line.points[start]
+        length = np.linalg.norm(chord, axis=1)[:, None]
+        turn = np.stack([angles(first, chord), angles(chord, last)], axis=1)
+        # The two handles move a cubic by three quarters of their distance from the chord at most.
+        sine = np.sin(np.minimum(turn, np.pi / 2.0))
+        return np.minimum(length / 3.0, self.tolerance / np.maximum(sine, TINY))
+
+    def _fit(
+        self,
+        start: IntArray,
+        end: IntArray,
+        first: FloatArray,
+        last: FloatArray,
+        handles: FloatArray | None,
+    ) -> _Fits:
+        """Fit cubics with handles of given lengths (s, 2), or by least squares."""
+        span, arc, first_row = self._data(start, end)
+        target = self.line.positions(arc)
+        length = self.line.arc[end] - self.line.arc[start]
+        ends = self.line.points[start], self.line.points[end]
+        parameter = (arc - self.line.arc[start][span]) / length[span]
+        # Of points along the polyline, not of its vertices, which may be close together.
+        problem = _Problem(ends, first, last, length, span, first_row, np.gradient(arc), target)
+        for number in range(ROUNDS):
+            lengths = problem.least_squares(parameter) if handles is None else handles
+            out, back = lengths[:, :1] * first, lengths[:, 1:] * last
+            cubic = np.stack([ends[0], ends[0] + out, ends[1] - back, ends[1]], axis=1)
+            if handles is not None and number == 0:
+                parameter = _parameters_at(cubic, span, parameter)
+            parameter = _nearer(cubic, span, parameter, target)
+        parameter[first_row] = 0.0
+        parameter[np.append(first_row[1:], len(arc)) - 1] = 1.0
+        deviation = _deviations(cubic, span, parameter, target, first_row)
+        # A cubic over one segment cannot be split, and its handles are short if need be.
+        deviation[_turns_back(cubic, first, last) & (end - start > 1)] = np.inf
+        return _Fits(lengths, deviation)
+
+    def _data(self, start: IntArray, end: IntArray) -> tuple[IntArray, FloatArray, IntArray]:
+        """Points on spans: the span and arc length of each, and the first one of each span."""
+        counts = end - start + 1
+        span = np.repeat(np.arange(len(start)), counts)
+        vertex = start[span] + np.arange(len(span)) - (np.cumsum(counts) - counts)[span]
+        share = (np.arange(SAMPLES) + 0.5) / SAMPLES
+        bounds = self.line.arc[start][:, None], self.line.arc[end][:, None]
+        between = (1.0 - share) * bounds[0] + share * bounds[1]
+        span = np.concatenate([span, np.repeat(np.arange(len(start)), SAMPLES)])
+        arc = np.concatenate([self.line.arc[vertex], between.ravel()])
+        order = np.lexsort((arc, span))
+        counts = counts + SAMPLES
+        return span[order], arc[order], np.cumsum(counts) - counts
+
+    def splits(self, start: IntArray, end: IntArray, deviation: FloatArray) -> IntArray:
+        """Vertices at which to split spans (s,) that are too far from the polyline."""
+        arc, tolerance = self.line.arc, self.tolerance
+        length = arc[end] - arc[start]
+        spans = zip(start.tolist(), end.tolist(), strict=True)
+        sharpest = np.array([a + 1 + self.turn[a + 1 : b].argmax() for a, b in spans])
+        turn, reach = self.turn[sharpest], length / 8.0
+        # Most of the turn there is at one vertex, and no smooth cubic passes it.
+        kink = turn > 0.5 * self.line.turns(arc[sharpest], reach)
+        kink &= turn * reach > 0.5 * tolerance
+        parts = np.ceil(np.minimum(deviation / tolerance, MOST_PARTS**ORDER) ** (1.0 / ORDER))
+        found = [sharpest[kink]]
+        for number in range(1, MOST_PARTS):
+            here = ~kink & (number < np.clip(parts, 2, MOST_PARTS))
+            at = arc[start[here]] + number / np.clip(parts[here], 2, MOST_PARTS) * length[here]
+            after = np.searchsorted(arc, at)
+            nearest = after - (at - arc[after - 1] < arc[after] - at)
+            found.append(np.clip(nearest, start[here] + 1, end[here] - 1))
+        return np.concatenate(found)
+
+
+def _split(fitter: _Fitter) -> IntArray:
+    """Knots between which every cubic keeps the tolerance or has no vertex to split at."""
+    knots, count = fitter.fixed, len(fitter.line.arc)
+    # By the start of a cubic that is good: its end, and its tangents, which later knots may change.
+    known_end, known = np.full(count, -1), np.zeros((count, 2, 3))
+    while True:
+        tangents = fitter.tangents(knots)
+        start, end = knots[:-1], knots[1:]
+        both = np.stack([tangents.after[:-1], tangents.before[1:]], axis=1)
+        new = (known_end[start] != end) | (known[start] != both).any(axis=(1, 2))
+        start, end, both = start[new], end[new], both[new]
+        deviation = fitter.fit(start, end, both[:, 0], both[:, 1]).deviation
+        bad = (deviation > fitter.tolerance) & (end - start > 1)
+        if not bad.any():
+            return knots
+        known_end[start], known[start] = np.where(bad, -1, end), both
+        knots = _union(knots, fitter.splits(start[bad], end[bad], deviation[bad]))
+
+
+def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, _Tangents, FloatArray]:
+    """Remove knots where one cubic is enough; the tangents at the others stay."""
+    tangents = fitter.tangents(knots)
+    untested = ~np.isin(knots, fitter.fixed)
+    while untested.any():
+        at = np.flatnonzero(untested)
+        before, after = at - 1, at + 1
+        fits = fitter.fit(
+            knots[before], knots[after], tangents.after[before], tangents.before[after]
+        )
+        deviation = np.full(len(knots), np.inf)
+        deviation[at] = np.where(fits.deviation <= fitter.tolerance, fits.deviation, np.inf)
+        # Of neighbours, only the better one: the other's spans are no longer the same.
+        removed = np.isfinite(deviation)
+        removed[1:] &= deviation[1:] < deviation[:-1]
+        removed[:-1] &= deviation[:-1] <= deviation[1:]
+        untested = np.zeros(len(knots), dtype=bool)
+        untested[:-1] |= removed[1:]
+        untested[1:] |= removed[:-1]
+        untested &= ~np.isin(knots, fitter.fixed)
+        knots, tangents, untested = knots[~removed], tangents[~removed], untested[~removed]
+    fits = fitter.fit(knots[:-1], knots[1:], tangents.after[:-1], tangents.before[1:])
+    return knots, tangents, fits.handles
+
+
+def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
+    """A polyline without steps of length zero, and the index there of each of its points."""
+    moves = np.concatenate([[True], np.diff(line.arc) > 0.0])
+    kept = np.cumsum(moves) - 1
+    points = line.points[moves].copy()
+    if line.closed:
+        points[-1] = points[0]
+    bounds = np.unique(kept[line.bounds])
+    return CutPolyline(points, line.arc[moves], line.closed, line.vertex[moves], bounds), kept
+
+
+def _union(first: IntArray, second: IntArray) -> IntArray:
+    joined: IntArray = np.unique(np.concatenate([first, second]))
+    return joined
+
+
+def _unit(vectors: FloatArray, others: FloatArray) -> FloatArray:
+    """Unit vectors; where a vector is zero, that of the other one or any."""
+    vectors = np.where((vectors == 0.0).all(axis=1, keepdims=True), others, vectors)
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0.0, vectors / np.maximum(length, TINY), [1.0, 0.0, 0.0])
+
+
+def _bernstein(parameter: FloatArray) -> FloatArray:
+    """Cubic Bernstein polynomials at parameters (n,), shape (n, 4)."""
+    t, u = parameter, 1.0 - parameter
+    return np.stack([u**3, 3.0 * u * u * t, 3.0 * u * t * t, t**3], axis=1)
+
+
+def _at(cubic: FloatArray, span: IntArray, parameter: FloatArray) -> FloatArray:
+    """Points of cubics (s, 4, 3), each on one span, shape (n, 3)."""
+    return np.einsum("nb,nbd->nd", _bernstein(parameter), cubic[span])
+
+
+def _parameters_at(cubic: FloatArray, span: IntArray, share: FloatArray) -> FloatArray:
+    """Parameters at which shares of the lengths of cubics are reached, (n,)."""
+    parameter = np.linspace(0.0, 1.0, SAMPLES + 1)
+    places = np.einsum("tb,sbd->std", _bernstein(parameter), cubic)
+    reached = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
+    reached /= np.maximum(reached[:, -1:], TINY)
+    # All in one table: the whole part of a key is the number of the cubic.
+    number = np.arange(len(cubic))[:, None]
+    keys = np.concatenate([number, number + reached], axis=1).ravel()
+    values = (number + parameter).ravel()
+    return np.clip(np.interp(span + share, keys, values) - span, 0.0, 1.0)
+
+
+def _nearer(
+    cubic: FloatArray, span: IntArray, parameter: FloatArray, target: FloatArray
+) -> FloatArray:
+    """Parameters after a step of Newton's method towards the nearest points of the cubics."""
+    t, u = parameter[:, None], 1.0 - parameter[:, None]
+    step = 3.0 * np.diff(cubic, axis=1)[span]
+    slope = u * u * step[:, 0] + 2.0 * u * t * step[:, 1] + t * t * step[:, 2]
+    offset = target - _at(cubic, span, parameter)
+    move = (offset * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), TINY)
+    moved = np.clip(parameter + move, 0.0, 1.0)
+    there = np.linalg.norm(target - _at(cubic, span, moved), axis=1)
+    return np.where(there < np.linalg.norm(offset, axis=1), moved, parameter)
+
+
+def _deviations(
+    cubic: FloatArray,
+    span: IntArray,
+    parameter: FloatArray,
+    target: FloatArray,
+    first_row: IntArray,
+) -> FloatArray:
+    """Greatest distance between each cubic and its part of the polyline, (s,).
+
+    All vertices are among the targets, so the polyline is straight from one to the next. Their
+    parameters begin with 0 and end with 1, so the parts of the cubic between them cover it.
+    """
+    distance = np.linalg.norm(target - _at(cubic, span, parameter), axis=1)
+    middle = _at(cubic, span[:-1], 0.5 * (parameter[:-1] + parameter[1:]))
+    off = distances_to_segments(middle, target[:-1], target[1:])
+    off[first_row[1:] - 1] = 0.0  # from one span to the next
+    distance[:-1] = np.maximum(distance[:-1], off)
+    return np.maximum.reduceat(distance, first_row)
+
+
+def _turns_back(cubic: FloatArray, first: FloatArray, last: FloatArray) -> BoolArray:
+    """Whether no direction leads forward along the whole control polygon, (s,).
+
+    If one does, it leads forward along the whole cubic, which has no loop or cusp then.
+    """
+    middle = _unit(cubic[:, 2] - cubic[:, 1], first)
+    forward = first + middle + last
+    least = [(forward * side).sum(axis=1) for side in (first, middle, last)]
+    return np.min(least, axis=0) <= 0.0
