@@ -1,0 +1,41 @@
+"""Points lifted off the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh
+from ..geometry.normals import vertex_normals
+from ..geometry.surface_points import SurfacePoints
+
+VANISHING = 1e-6
+"""Length of an interpolated normal up to which the normals at the corners cancel."""
+
+
+def lifted(mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float) -> FloatArray:
+    """Positions of points of a mesh, moved along its normals.
+
+    The normals at the vertices, weighted by angle, are interpolated in the face and scaled to unit
+    length. Where they cancel, the normal of the face counts; where the face has no area either,
+    the point stays where it is.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    faces : (n,) int array
+    barycentric : (n, 3) float array
+        Coordinates in these faces.
+    height : float
+        In mesh units; negative towards the inside.
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    at_corners = vertex_normals(mesh.vertices, mesh.faces)[mesh.faces[faces]]
+    normals = np.einsum("nc,ncd->nd", barycentric, at_corners)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    sound = length > VANISHING
+    normals = np.where(sound, normals / np.where(sound, length, 1.0), mesh.face_normals[faces])
+    return SurfacePoints(faces, barycentric).positions(mesh) + height * normals
