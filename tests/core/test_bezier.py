@@ -190,7 +190,7 @@ def test_noise_is_followed_where_the_tolerance_demands_it():
     assert_fits(points, True, np.array([100, 200]), 1e-4)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     seed=st.integers(0, 10_000),
     count=st.integers(4, 150),
