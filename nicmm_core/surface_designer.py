@@ -57,6 +57,9 @@ Twice that of a circle: such curves wind around thin limbs, where a search misse
 DRAWS = 2
 """Searches with random lengths."""
 
+MOST_TRACED = 20_000
+"""Points of a curve times iterations of its relaxation above which no courses are sought again."""
+
 MOST_TRIED = 10
 """Courses relaxed for alternatives, besides two for each: many relax to the same curve."""
 
@@ -163,7 +166,7 @@ class SurfaceDesigner:
                 return designs[0]
             drawn = self._drawn_courses(request)
             try:
-                if by_course and self._bent(designs[0]):
+                if by_course and _repays_another_search(designs[0]):
                     best = (itertools.islice(each, 1) for each in drawn)
                     for other in itertools.chain.from_iterable(best):
                         designs.append(self._relaxed(request, other, config, None, started))
@@ -175,12 +178,6 @@ class SurfaceDesigner:
             except CancelledError:
                 return replace(_fairest(start.surface, designs, request), status=Status.CANCELLED)
             return _fairest(start.surface, designs, request)
-
-    def _bent(self, design: Design) -> bool:
-        """Whether a curve bends so much that the search may have missed a far better one."""
-        assert design.resumable is not None
-        nodes = design.resumable.curve.nodes
-        return bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
 
     def _drawn_courses(self, request: Request) -> list[Iterator[_Start]]:
         """The courses of each search with random lengths, each search begun on first use."""
@@ -313,6 +310,17 @@ class SurfaceDesigner:
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
         return CoarseStarts(self._surface)
+
+
+def _repays_another_search(design: Design) -> bool:
+    """Whether a curve bends so much that the search may have missed a far better one.
+
+    Not where its relaxation took long, as on needles: each further course would take as long.
+    """
+    assert design.resumable is not None
+    nodes = design.resumable.curve.nodes
+    bends = bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
+    return bends and design.iterations * len(design.curves[0].faces) <= MOST_TRACED
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
+from nicmm_core import shapes, surface_designer
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
 from tests.oracles.checker import judge
@@ -74,3 +74,23 @@ def test_forty_points_back_and_forth(monkeypatch):
         orders = 1
     of_paths = simple_path.MOST_SPLITS_TO_TRY + 2 * legs.MOST_PATH_SPLITS
     assert len(splits) <= orders * of_paths + 2 * band_refinement.MOST_SPLITS
+
+
+def test_long_relaxations_are_not_repeated(monkeypatch):
+    """Where the first course took long, courses are not sought again, however much it bends."""
+    searched = []
+    seek = surface_designer.SurfaceDesigner._course_starts
+
+    def counted(self, request, draw=0):
+        searched.append(draw)
+        return seek(self, request, draw)
+
+    monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
+    monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
+    body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
+    nicmm.design_curve(body, chosen)
+    assert sorted(set(searched)) == [0, *range(1, 1 + surface_designer.DRAWS)]
+    searched.clear()
+    monkeypatch.setattr(surface_designer, "MOST_TRACED", 0)
+    nicmm.design_curve(body, chosen)
+    assert searched == [0]

@@ -9,7 +9,7 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.tolerances import CLEAN_CURVE, of_clean_curve
 from nicmm_core.splines.even_spacing import even_curve, even_places
 from tests.core.checks import circle
-from tests.core.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
+from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
 
 NONE = np.zeros(0, dtype=np.int64)
 ROUNDED = 1.0 + 1e-9

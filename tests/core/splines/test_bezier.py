@@ -9,7 +9,7 @@ from nicmm_core.geometry.tolerances import CLEAN_CURVE
 from nicmm_core.splines.bezier import fit_bezier
 from nicmm_core.splines.polyline import angles
 from tests.core.checks import circle
-from tests.core.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
+from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square, strays, subdivided
 
 NONE = np.zeros(0, dtype=np.int64)
 SAMPLES = 3000
