@@ -33,7 +33,7 @@ def drawn(curve):
 
 
 def controls(extension, curve):
-    surface = module(extension, "scene.mesh_data").triangles(bpy.data.objects["Body"])
+    surface = module(extension, "scene.surface").read(bpy.data.objects["Body"], False)
     points, positions = module(extension, "scene.curve_record").recall_controls(curve, surface)
     assert (points.faces >= 0).all()
     return positions
@@ -48,7 +48,7 @@ def test_a_curve_is_recalled_as_it_was_drawn(kept, name):
     record = module(kept, "scene.curve_record")
     body, curve = bpy.data.objects["Body"], bpy.data.objects[name]
     assert record.has_record(curve) and record.mesh_of(curve) == body
-    surface = module(kept, "scene.mesh_data").triangles(body)
+    surface = module(kept, "scene.surface").read(body, False)
     (recalled,) = record.recall(curve, surface)
     np.testing.assert_allclose(drawn(curve), recalled.points, atol=ROUNDING)
     asked = record.asked_of(curve)

@@ -82,8 +82,8 @@ def test_long_relaxations_are_not_repeated(monkeypatch):
     seek = surface_designer.SurfaceDesigner._course_starts
 
     def counted(self, request, draw=0):
-        searched.append(draw)
-        return seek(self, request, draw)
+        searched.append(draw)  # on first use
+        yield from seek(self, request, draw)
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
     monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
