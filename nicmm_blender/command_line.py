@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from . import settings
-from .scene import mesh_data
+from .scene.messages import InputError
 
 COMMAND = "nicmm"
 FAILED = 2
@@ -27,7 +27,7 @@ def main(arguments: list) -> int:
         return 0 if not stopped.code else FAILED
     try:
         run(options)
-    except (mesh_data.InputError, RuntimeError) as error:
+    except (InputError, RuntimeError) as error:
         print(f"{COMMAND}: {str(error).removeprefix('Error: ').strip()}", file=sys.stderr)
         return FAILED
     return 0
@@ -37,11 +37,11 @@ def run(options: argparse.Namespace) -> None:
     """Open the file, design the curve and write the other file."""
     source, target = Path(options.file).absolute(), Path(options.output_file).absolute()
     if not source.is_file():
-        raise mesh_data.InputError(f"--file: there is no file {source}")
+        raise InputError(f"--file: there is no file {source}")
     if not target.parent.is_dir():
-        raise mesh_data.InputError(f"--output-file: there is no folder {target.parent}")
+        raise InputError(f"--output-file: there is no folder {target.parent}")
     if target.exists() and target.samefile(source):
-        raise mesh_data.InputError("--output-file is the file that is read; give another one")
+        raise InputError("--output-file is the file that is read; give another one")
     bpy.ops.wm.open_mainfile(filepath=str(source), load_ui=False)
     activate(options.object)
     chosen = {name: getattr(options, name) for name in settings.PROPERTY_NAMES}
@@ -59,12 +59,12 @@ def activate(name: str | None) -> None:
         chosen = bpy.data.objects.get(name)
         if chosen is None:
             meshes = [found.name for found in bpy.data.objects if found.type == "MESH"]
-            raise mesh_data.InputError(
+            raise InputError(
                 f'--object: there is no object "{name}" in the file. Its meshes are '
                 + ", ".join(f'"{mesh}"' for mesh in meshes)
             )
         if chosen.name not in context.view_layer.objects:
-            raise mesh_data.InputError(
+            raise InputError(
                 f'--object: "{name}" is not in the view layer "{context.view_layer.name}", which '
                 "is the active one of the file"
             )
@@ -72,7 +72,7 @@ def activate(name: str | None) -> None:
             bpy.ops.object.mode_set(mode="OBJECT")
         context.view_layer.objects.active = chosen
     if context.active_object is None:
-        raise mesh_data.InputError("no object is active in the file; name one with --object")
+        raise InputError("no object is active in the file; name one with --object")
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 

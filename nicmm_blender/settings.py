@@ -61,17 +61,30 @@ def _property(option):
     return FloatProperty(**words, **limits, subtype=subtype, default=option.default)
 
 
-class DesignProperties:
-    """The core options, shared by the operator and the scene settings."""
+SURFACE = {
+    "use_modifiers": BoolProperty(
+        name="Use Modifiers",
+        description="Draw on the surface that the viewport shows, with modifiers and shape keys. "
+        "Otherwise on the mesh without them",
+        default=True,
+    )
+}
 
-    __annotations__ = properties_of(OPTIONS)
+
+class DesignProperties:
+    """The options of a new curve, shared by the operator and the scene settings."""
+
+    __annotations__ = properties_of(OPTIONS) | SURFACE
 
 
 class EditingProperties:
     """The options of a curve that is being edited; its points already have an order."""
 
-    __annotations__ = properties_of(
-        option for option in OPTIONS if option.name not in (*curve_record.OF_A_DESIGN, "method")
+    __annotations__ = (
+        properties_of(
+            option for option in OPTIONS if option.name not in (*curve_record.OF_A_DESIGN, "method")
+        )
+        | SURFACE
     )
 
 
@@ -224,6 +237,7 @@ def draw_course(layout, properties) -> None:
     row = layout.row()
     row.active = properties.method == "NICMM"
     row.prop(properties, "alternatives")
+    layout.prop(properties, "use_modifiers")
 
 
 def draw_clearance(layout, properties) -> None:

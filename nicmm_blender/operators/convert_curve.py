@@ -44,7 +44,8 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         original = context.active_object
         name = original.name
         mesh_object = curve_record.present_mesh(context, original)
-        surface = mesh_data.triangles(mesh_object)
+        mesh_data.synchronise(mesh_object)
+        surface = curve_record.surface_of(original, mesh_object)
         curves = curve_record.recall(original, surface)
         asked = curve_record.asked_of(original)
         made = writing.apply(context, mesh_object, surface, curves, self, asked)

@@ -8,7 +8,9 @@ from bpy.props import StringProperty
 
 from .. import settings
 from ..outputs import writing
-from ..scene import curve_record, design_request, mesh_data
+from ..scene import curve_record, design_request, mesh_data, selection
+from ..scene.messages import InputError
+from ..scene.surface import read, shown_beyond_the_cage
 from . import polls
 from .long_solves import LongSolves
 
@@ -57,12 +59,12 @@ class NICMM_OT_design_curve(
     def requests(self, context) -> list:
         mesh_object = mesh_data.mesh_object(context)
         mesh_data.synchronise(mesh_object)
-        surface = mesh_data.triangles(mesh_object)
+        surface = read(mesh_object, self.use_modifiers)
         points, order = self._control_points(mesh_object, surface)
         asked = curve_record.asked_by(self)
         request = design_request.for_points(mesh_object, surface, points, order, asked)
         if self.alternatives and self.output not in writing.SEPARATE:
-            raise mesh_data.InputError(
+            raise InputError(
                 "Alternatives are separate curves. Choose the output Curve or Sticky Curves, or "
                 "set them to 0"
             )
@@ -70,14 +72,16 @@ class NICMM_OT_design_curve(
 
     def _control_points(self, mesh_object, surface):
         if self.points and self.point_group:
-            raise mesh_data.InputError(
+            raise InputError(
                 "points and point_group both define the control points. Give only one of them"
             )
         if self.points:
-            return mesh_data.given_points(surface, self.points, self.order)
+            return selection.given_points(surface, self.points, self.order)
         if self.point_group:
-            return mesh_data.points_of_group(mesh_object, self.point_group, self.order)
-        return mesh_data.selected_points(mesh_object, self.order)
+            vertices, order = selection.points_of_group(mesh_object, self.point_group, self.order)
+        else:
+            vertices, order = selection.selected_points(mesh_object, self.order)
+        return selection.points_at(surface, vertices), order
 
     def finish(self, context, requests: list, answers: list) -> set:
         from ... import nicmm_core as nicmm
@@ -86,7 +90,7 @@ class NICMM_OT_design_curve(
         if isinstance(design, Exception):
             raise design
         if not design.curves:
-            raise mesh_data.InputError(str(design.status))
+            raise InputError(str(design.status))
         mesh_object = request.mesh_object()
         made = [
             writing.apply(context, mesh_object, request.surface, each.curves, self, request.asked)
@@ -94,7 +98,7 @@ class NICMM_OT_design_curve(
         ][-1]
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
-        summary = f"{_summary(mesh_object, design, order)}: {made}"
+        summary = f"{_summary(mesh_object, design, order, request.asked)}: {made}"
         if self.alternatives:
             summary += f"; {len(design.alternatives)} alternatives"
         if design.status == nicmm.Status.CONVERGED:
@@ -104,10 +108,10 @@ class NICMM_OT_design_curve(
         return {"FINISHED"}
 
 
-def _summary(mesh_object, design, order: str) -> str:
+def _summary(mesh_object, design, order: str, asked) -> str:
     curve = design.curves[0]
     summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
-    shown = mesh_data.shown_beyond_the_mesh(mesh_object)
+    shown = "" if asked.use_modifiers else shown_beyond_the_cage(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 

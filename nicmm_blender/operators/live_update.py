@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Updates curves when their mesh or its weights change.
+"""Updates curves when the surface that they lie on, or a weight that they use, changes.
 
-Blender's handlers only record that something has changed. Once the mesh has stayed unchanged for
-the delay set in the preferences, a timer compares the digest that each curve was designed on with
-the present one (`curve_record.digest`) and designs the outdated curves again, in time slices.
-Writing a curve changes no mesh, and undo restores a curve together with its digest, so an update
-never triggers another one.
+Blender's handlers only record that something has changed, in any mode. Once it has stayed unchanged
+for the delay set in the preferences, a timer compares the digest that each curve was designed on
+with the present one (`curve_record.digest`) and designs the outdated curves again, in time slices.
+Reading a surface and writing a curve change no mesh object, and undo restores a curve together with
+its digest, so an update never triggers another one.
 """
 
 import time
+from contextlib import contextmanager
 
 import bpy
 from bpy.app.handlers import persistent
@@ -16,7 +17,9 @@ from bpy.props import BoolProperty
 
 from .. import preferences
 from ..outputs import writing
-from ..scene import curve_record, design_request, mesh_data
+from ..scene import curve_record, design_request
+from ..scene.messages import InputError
+from ..scene.surface import read
 from . import turns
 from .long_solves import TURN, answer_all
 
@@ -35,17 +38,18 @@ class _Updates:
 
     def reset(self) -> None:
         """Forget all changes and work."""
-        self.changed: set = set()  # of meshes, by their session_uid
+        self.changed: set = set()  # of mesh objects, by their session_uid
         self.everything = False
         self.last_change = 0.0
         self.work = None
         self.requests: list = []
         self.curves: list = []  # by their session_uid, one for each request
         self.failed: dict = {}  # from a curve's session_uid to the digest and the message
+        self.is_reading = False
 
-    def note(self, meshes: set, everything: bool = False) -> None:
+    def note(self, objects: set, everything: bool = False) -> None:
         """Record a change and start the timer."""
-        self.changed |= meshes
+        self.changed |= objects
         self.everything |= everything
         self.last_change = time.monotonic()
         if not bpy.app.timers.is_registered(tick):
@@ -95,25 +99,38 @@ def _begin() -> None:
     changed, everything = _updates.changed, _updates.everything
     _updates.changed, _updates.everything = set(), False
     surfaces: dict = {}
-    for designed in _live_curves():
-        mesh_object = curve_record.mesh_of(designed)
-        if not everything and mesh_object.data.session_uid not in changed:
-            continue
-        if mesh_object not in surfaces:
-            mesh_data.synchronise(mesh_object)
-            surfaces[mesh_object] = mesh_data.triangles(mesh_object)
-        _ask(designed, mesh_object, surfaces[mesh_object])
+    with _unnoticed():
+        for designed in _live_curves():
+            mesh_object = curve_record.mesh_of(designed)
+            if everything or mesh_object.session_uid in changed:
+                _ask(designed, mesh_object, surfaces)
     if _updates.requests:
         requests = _updates.requests
         _updates.work = turns.Work(lambda progress: answer_all(requests, progress))
 
 
-def _ask(designed, mesh_object, surface) -> None:
-    """Add a request for a curve if it is outdated."""
+@contextmanager
+def _unnoticed():
+    """Read surfaces without noticing that temporary objects come and go in the file."""
+    bpy.context.view_layer.update()  # what the user has changed is noticed
+    _updates.is_reading = True
+    try:
+        yield
+        bpy.context.view_layer.update()
+    finally:
+        _updates.is_reading = False
+
+
+def _ask(designed, mesh_object, surfaces: dict) -> None:
+    """Add a request for a curve if it is outdated; `surfaces` holds those read before."""
     asked = curve_record.asked_of(designed)
     uid = designed.session_uid
     now = ""
+    key = mesh_object, asked.use_modifiers
     try:
+        if key not in surfaces:
+            surfaces[key] = read(mesh_object, asked.use_modifiers, traced=False)
+        surface = surfaces[key]
         now = curve_record.digest(mesh_object, surface, asked)
         if curve_record.is_current(designed, now):
             _updates.failed.pop(uid, None)
@@ -121,8 +138,9 @@ def _ask(designed, mesh_object, surface) -> None:
         if _updates.failed.get(uid, ("",))[0] == now:
             return
         writing.check_replaceable(designed)
-        request = design_request.for_curve(designed, mesh_object, surface, asked)
-    except mesh_data.InputError as error:
+        traced = read(mesh_object, asked.use_modifiers)
+        request = design_request.for_curve(designed, mesh_object, traced, asked)
+    except InputError as error:
         _updates.failed[uid] = now, f"{designed.name}: {error}"
         return
     _updates.requests.append(request)
@@ -144,18 +162,25 @@ def _write() -> None:
             writing.check_replaceable(designed)
             request.check_unchanged()
             writing.replace(designed, request, answer)
-        except mesh_data.InputError as error:
+        except InputError as error:
             _updates.failed[uid] = now, f"{designed.name}: {error}"
 
 
 def _has_to_wait() -> bool:
-    """Whether Blender is rendering, or a modal operator of the extension is running."""
+    """Whether Blender renders or plays, or a modal operator of the extension is running."""
+    if _plays() and not any(scene.nicmm_live_playback for scene in _live_scenes()):
+        return True
     running = (
         operator.bl_idname
         for window in bpy.context.window_manager.windows
         for operator in window.modal_operators
     )
     return bpy.app.is_job_running("RENDER") or any(name.startswith("NICMM") for name in running)
+
+
+def _plays() -> bool:
+    """Whether an animation is played in a window."""
+    return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
 
 
 def _live_scenes() -> list:
@@ -171,16 +196,30 @@ def _live_curves() -> list:
 
 @persistent
 def note_changes(scene, depsgraph) -> None:
-    """Record changed meshes after an update of the dependency graph."""
-    if not scene.nicmm_live_update:
+    """Record changed mesh objects after an update of the dependency graph.
+
+    Strokes in Sculpt Mode are reported as changes of the object's shading only.
+    """
+    if not scene.nicmm_live_update or _updates.is_reading:
         return
-    meshes = {
+    objects = {
         update.id.original.session_uid
         for update in depsgraph.updates
-        if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
+        if isinstance(update.id, bpy.types.Object)
+        and update.id.type == "MESH"
+        and (
+            update.is_updated_geometry or (update.is_updated_shading and update.id.mode == "SCULPT")
+        )
     }
-    if meshes:
-        _updates.note(meshes)
+    if objects:
+        _updates.note(objects)
+
+
+@persistent
+def note_frame(scene, _depsgraph=None) -> None:
+    """Check all curves after a change of the frame, but not while Blender renders."""
+    if scene.nicmm_live_update and not bpy.app.is_job_running("RENDER"):
+        _updates.note(set(), everything=True)
 
 
 @persistent
@@ -204,6 +243,7 @@ def _switched(_scene, _context) -> None:
 
 HANDLERS = (
     ("depsgraph_update_post", note_changes),
+    ("frame_change_post", note_frame),
     ("undo_post", note_other_state),
     ("redo_post", note_other_state),
     ("load_pre", forget),
@@ -214,8 +254,15 @@ HANDLERS = (
 def register() -> None:
     bpy.types.Scene.nicmm_live_update = BoolProperty(
         name="Live Update",
-        description="Design the curves of this scene again whenever their mesh or the weights "
-        "that they use change",
+        description="Design the curves of this scene again whenever the surface that they lie on, "
+        "or a weight that they use, has changed, in any mode and after a change of the frame",
+        default=False,
+        update=_switched,
+    )
+    bpy.types.Scene.nicmm_live_playback = BoolProperty(
+        name="During Playback",
+        description="Also update curves while an animation is played. Otherwise they are updated "
+        "when it stops",
         default=False,
         update=_switched,
     )
@@ -229,4 +276,5 @@ def unregister() -> None:
         bpy.app.timers.unregister(tick)
     for name, function in HANDLERS:
         getattr(bpy.app.handlers, name).remove(function)
+    del bpy.types.Scene.nicmm_live_playback
     del bpy.types.Scene.nicmm_live_update

@@ -13,7 +13,8 @@ from contextlib import contextmanager
 import bpy
 
 from .. import preferences
-from ..scene import design_request, mesh_data
+from ..scene import design_request
+from ..scene.messages import InputError
 from . import turns
 from .partial_curve import PartialCurve
 from .viewports import NAVIGATION
@@ -136,7 +137,7 @@ def answer_all(requests: list, progress) -> list:
                     ),
                 )
             )
-        except (mesh_data.InputError, nicmm.NicmmError) as error:
+        except (InputError, nicmm.NicmmError) as error:
             answers.append(error)
         else:
             if answers[-1].status == nicmm.Status.CANCELLED:
@@ -169,7 +170,7 @@ def reporting(operator, work):
             f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves built with "
             "--with-torch contains PyTorch",
         )
-    except (mesh_data.InputError, nicmm.NicmmError) as error:
+    except (InputError, nicmm.NicmmError) as error:
         return _cancelled(operator, str(error))
 
 

@@ -6,6 +6,9 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..scene import mesh_data
+from ..scene.messages import InputError
+from ..scene.selection import selected_vertices
+from ..scene.surface import read, vertex_group
 from . import polls
 from .long_solves import reporting
 
@@ -119,11 +122,11 @@ class NICMM_OT_paint_map(bpy.types.Operator):
             _enter(context, mesh_object, "OBJECT")
             return {"FINISHED"}
         if not name:
-            raise mesh_data.InputError(
+            raise InputError(
                 f"No vertex group is chosen for {NAMES[self.role]}. Choose one, or make a new map"
             )
         mesh_data.check_local(mesh_object, "its weights cannot be changed")
-        group = mesh_data.vertex_group(mesh_object, name)
+        group = vertex_group(mesh_object, name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT")
         return {"FINISHED"}
@@ -148,9 +151,9 @@ def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
     if source == "PAINT":
         return weights
     if source == "SELECTION":
-        weights[mesh_data.selected_vertices(mesh_object)] = 1.0
+        weights[selected_vertices(mesh_object)] = 1.0
         return weights
-    surface = mesh_data.triangles(mesh_object)
+    surface = read(mesh_object, use_modifiers=False)
     mesh = nicmm.Mesh(surface.solved, surface.faces)
     if source == "CURVATURE":
         return nicmm.curvature_map(mesh)
@@ -159,7 +162,7 @@ def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
     attribute, words = ATTRIBUTES[source]
     edges = mesh_data.marked_edges(mesh_object, attribute)
     if len(edges) == 0:
-        raise mesh_data.InputError(
+        raise InputError(
             f'No edge of "{mesh_object.name}" is {words}. Mark edges in Edit Mode '
             "(Edge menu), or choose another source for the map"
         )

@@ -6,6 +6,8 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data
+from ..scene.messages import InputError
+from ..scene.surface import read
 from .long_solves import LongSolves
 
 
@@ -50,7 +52,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         mesh_object = curve_record.mesh_of_context(context)
         curves = curve_record.designed_on(mesh_object)
         if not curves:
-            raise mesh_data.InputError(
+            raise InputError(
                 f'No curve was designed on "{mesh_object.name}". Select vertices and run '
                 "Design Curve on Surface"
             )
@@ -61,10 +63,10 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:
                 writing.replace(named(name), request, answer)
-            except mesh_data.InputError as error:
+            except InputError as error:
                 failed.append(f'"{name}": {error}')
         if len(failed) == len(requests):
-            raise mesh_data.InputError("; ".join(failed))
+            raise InputError("; ".join(failed))
         done = f"{len(requests) - len(failed)} of {len(requests)} curves updated"
         moved = sum(request.moved for request in requests)
         if moved:
@@ -80,23 +82,16 @@ def named(name: str):
     """Return the designed curve with this name."""
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
-        raise mesh_data.InputError(
-            f'There is no designed curve "{name}". Choose one in the list of curves'
-        )
+        raise InputError(f'There is no designed curve "{name}". Choose one in the list of curves')
     return found
 
 
 def request_again(designed, chosen=None):
     """A request to design a curve again, with its own settings or others."""
-    mesh_object = curve_record.mesh_of(designed)
-    if mesh_object is None:
-        raise mesh_data.InputError(
-            f'The mesh that "{designed.name}" was designed on no longer exists. '
-            "Draw the curve again"
-        )
+    mesh_object = curve_record.existing_mesh(designed)
     mesh_data.synchronise(mesh_object)
-    surface = mesh_data.triangles(mesh_object)
     asked = curve_record.asked_of(designed) if chosen is None else chosen
+    surface = read(mesh_object, asked.use_modifiers)
     return design_request.for_curve(designed, mesh_object, surface, asked)
 
 

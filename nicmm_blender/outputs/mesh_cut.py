@@ -12,7 +12,7 @@ import numpy as np
 
 import bmesh
 
-from ..scene.mesh_data import InputError
+from ..scene.messages import InputError
 
 
 @contextmanager
@@ -110,7 +110,7 @@ def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
     """Cut a BMesh; return its vertices, and its faces: unchanged ones, then the new ones.
 
     Vertices are numbered as in the core's cut. Parameters: the BMesh, the mesh that it was read
-    from, the `mesh_data.Triangles` that the core was given, its `CutMesh`, the `CutPolygons` made
+    from, the `surface.Surface` that the core was given, its `CutMesh`, the `CutPolygons` made
     from that, and the weights of the cut's corners.
     """
     for sequence in (edited.verts, edited.edges, edited.faces):

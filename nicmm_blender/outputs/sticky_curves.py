@@ -32,7 +32,7 @@ def add(mesh_object, surface, curves, radius: float, tube: bool):
     return curves_object
 
 
-def write(data, surface, curves, radius: float | None = None) -> None:
+def write(data, surface, curves, radius: float | None = None, offset: float = 0.0) -> None:
     """Replace the curves of a hair curves data-block; without a `radius`, keep the present one."""
     if radius is None:
         before = data.attributes.get("radius")
@@ -47,9 +47,39 @@ def write(data, surface, curves, radius: float | None = None) -> None:
     _set(data, "radius", "FLOAT", "POINT", np.full(len(faces), radius))
     _set(data, "cyclic", "BOOLEAN", "CURVE", np.array([curve.closed for curve in curves]))
     _set(data, "face", "INT", "POINT", surface.polygons[faces])
-    for corner, attribute in enumerate(sticky_nodes.CORNERS):
-        _set(data, attribute, "INT", "POINT", surface.faces[faces, corner])
-    _set(data, "barycentric", "FLOAT_VECTOR", "POINT", barycentric)
+    vertices = np.full(len(faces), len(surface.local))
+    _set(data, sticky_nodes.VERTICES, "INT", "POINT", vertices)
+    _set(data, sticky_nodes.BARYCENTRIC, "FLOAT_VECTOR", "POINT", barycentric)
+    _set(data, sticky_nodes.OFFSET, "FLOAT", "POINT", np.full(len(faces), offset))
+    cage_corners, cage_offset = on_cage(surface, faces, barycentric)
+    _set(data, sticky_nodes.CAGE_OFFSET, "FLOAT_VECTOR", "POINT", cage_offset)
+    for corner in range(3):
+        _set(data, sticky_nodes.CORNERS[corner], "INT", "POINT", surface.faces[faces, corner])
+        _set(data, sticky_nodes.CAGE_CORNERS[corner], "INT", "POINT", cage_corners[:, corner])
+
+
+def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:
+    """Three vertices of the mesh without modifiers near each point, and the place relative to them.
+
+    Vertices, (n, 3), are -1 where modifiers do not keep them in front of the others. Places,
+    (n, 3), are amounts of two sides and of the normal, which has the length of the first side.
+    """
+    if surface.cage is None:
+        flat = np.zeros(len(faces))
+        return surface.faces[faces], np.stack([*barycentric.T[1:], flat], axis=1)
+    cage = surface.cage
+    polygons = cage.faces[faces]
+    corners = np.where(polygons[:, None] >= 0, cage.corners[polygons], -1)
+    in_front = (cage.vertices[corners] == corners).all(axis=1) & (polygons >= 0)
+    first, second, last = np.moveaxis(surface.local[np.where(in_front[:, None], corners, 0)], 1, 0)
+    along, across = second - first, last - first
+    normal = np.cross(along, across)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal *= np.linalg.norm(along, axis=1, keepdims=True) / np.where(length > 0.0, length, 1.0)
+    axes = np.stack([along, across, normal], axis=2)
+    away = surface.points(faces, barycentric) - first
+    places = np.einsum("nij,nj->ni", np.linalg.pinv(axes), away)
+    return np.where(in_front[:, None], corners, -1), places
 
 
 def _set(data, name: str, data_type: str, domain: str, values: np.ndarray) -> None:

@@ -1,15 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group that keeps points on their triangles, and can give the strands a tube.
+"""The Geometry Nodes group that keeps points on their surface, and can give the strands a tube.
 
-A file keeps the group that it was saved with. A group without a tube is extended when it is used
-again.
+A point is at the same place of the same triangle as long as the surface has as many vertices as
+when the curve was drawn. Otherwise, for example at another level of subdivision, its place is
+estimated from a face of the mesh without modifiers, whose vertices most modifiers keep in front,
+and is the nearest point of the surface.
+
+A file keeps the group that it was saved with.
 """
 
 import bpy
 
-GROUP_NAME = "NICMM Sticky Curve"
+GROUP_NAME = "NICMM Surface Curve"
+
 CORNERS = ("vertex_1", "vertex_2", "vertex_3")
 """Attributes of a point: the vertices of its triangle."""
+
+CAGE_CORNERS = ("cage_1", "cage_2", "cage_3")
+"""Three vertices of its face in the mesh without modifiers; -1 where they are unknown."""
+
+BARYCENTRIC, CAGE_OFFSET = "barycentric", "cage_offset"
+"""Its place in the triangle; and relative to the three vertices, along two sides and the normal."""
+
+VERTICES, OFFSET = "surface_vertices", "offset"
+"""The number of vertices of the surface, and the distance from it."""
 
 SURFACE, TUBE = "Surface", "Tube"
 """Inputs of the group: the mesh object, and whether to make a tube."""
@@ -28,79 +42,115 @@ def add_modifier(curves_object, mesh_object, tube: bool) -> None:
 def node_group():
     """The group of the file, created if it is missing or incomplete."""
     group = bpy.data.node_groups.get((GROUP_NAME, None))  # not one that is linked
-    if group is None or not _is_whole(group):
-        group = _new_group()
-    if _interface_input(group, TUBE) is None:
-        _add_tube(group)
-    return group
+    return group if group is not None and _is_whole(group) else _new_group()
 
 
 def _new_group():
-    """The group without the tube."""
     group = bpy.data.node_groups.new(GROUP_NAME, "GeometryNodeTree")
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket(SURFACE, in_out="INPUT", socket_type="NodeSocketObject")
+    socket = group.interface.new_socket(TUBE, in_out="INPUT", socket_type="NodeSocketBool")
+    socket.description = "Show the strands as a mesh with their radius"
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     column = _Column(group)
     inputs = column.node("NodeGroupInput", 0)
-    surface = column.node("GeometryNodeObjectInfo", 1)
-    surface.transform_space = "RELATIVE"
-    column.link(_output(inputs, SURFACE), surface.inputs["Object"])
-    position = column.node("GeometryNodeInputPosition", 1)
-    corners = []
-    for attribute in CORNERS:
-        index = column.named_attribute(attribute, "INT")
-        sample = column.node("GeometryNodeSampleIndex", 2)
-        sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
-        column.link(_output(surface, "Geometry"), _input(sample, "Geometry"))
-        column.link(_output(position, "Position"), _input(sample, "Value"))
-        column.link(index, _input(sample, "Index"))
-        corners.append(_output(sample, "Value"))
-    weights = column.node("ShaderNodeSeparateXYZ", 2)
-    column.link(column.named_attribute("barycentric", "FLOAT_VECTOR"), weights.inputs[0])
-    # Relative to the last corner, so that rounding in the sum of the weights has no effect.
-    place = corners[2]
-    for corner, weight in zip(corners[:2], weights.outputs, strict=False):
-        place = column.moved_towards(place, corner, corners[2], weight)
-    target = column.node("GeometryNodeSetPosition", 5)
+    info = column.node("GeometryNodeObjectInfo", 1)
+    info.transform_space = "RELATIVE"
+    column.link(_output(inputs, SURFACE), info.inputs["Object"])
+    surface = _output(info, "Geometry")
+    place, normal = _in_triangle(column, surface)
+    place = column.choose(_is_unchanged(column, surface), _nearest(column, surface), place)
+    lifted = column.vectors("NORMALIZE", normal)
+    lifted = column.scaled(lifted, column.attribute(OFFSET, "FLOAT"))
+    target = column.node("GeometryNodeSetPosition", 7)
     # Hair curves are Catmull-Rom splines; only nodes change the type reliably.
-    straight = column.node("GeometryNodeCurveSplineType", 4)
+    straight = column.node("GeometryNodeCurveSplineType", 6)
     straight.spline_type = "POLY"
     column.link(_output(inputs, "Geometry"), straight.inputs["Curve"])
     column.link(_output(straight, "Curve"), target.inputs["Geometry"])
     column.link(place, target.inputs["Position"])
-    outputs = column.node("NodeGroupOutput", 6)
-    column.link(_output(target, "Geometry"), outputs.inputs[0])
+    column.link(lifted, target.inputs["Offset"])
+    outputs = column.node("NodeGroupOutput", 11)
+    column.link(_with_tube(column, _output(target, "Geometry"), inputs), outputs.inputs[0])
     return group
 
 
-def _add_tube(group) -> None:
-    """Insert a tube, and the switch for it, before the output of a group."""
-    socket = group.interface.new_socket(TUBE, in_out="INPUT", socket_type="NodeSocketBool")
-    socket.description = "Show the strands as a mesh with their radius"
-    curves = _made(group)
-    column = _Column(group)
-    radius = _output(column.node("GeometryNodeInputRadius", 6), "Radius")
-    widest = column.node("GeometryNodeAttributeStatistic", 6)
+def _in_triangle(column, surface) -> tuple:
+    """The place and the normal of a point in its triangle."""
+    position = column.node("GeometryNodeInputPosition", 1)
+    normal = column.node("GeometryNodeInputNormal", 1)
+    corners = [column.attribute(name, "INT") for name in CORNERS]
+    weights = column.node("ShaderNodeSeparateXYZ", 2)
+    column.link(column.attribute(BARYCENTRIC, "FLOAT_VECTOR"), weights.inputs[0])
+    found = []
+    for field in (_output(position, "Position"), _output(normal, "Normal")):
+        first, second, last = (column.sample(surface, field, corner) for corner in corners)
+        # Relative to the last corner, so that rounding in the sum of the weights has no effect.
+        value = last
+        for corner, weight in zip((first, second), weights.outputs, strict=False):
+            value = column.added(value, column.vectors("SUBTRACT", corner, last), weight)
+        found.append(value)
+    return tuple(found)
+
+
+def _is_unchanged(column, surface):
+    """Whether the surface has as many vertices as when the curve was drawn."""
+    size = column.node("GeometryNodeAttributeDomainSize", 2)
+    column.link(surface, size.inputs["Geometry"])
+    same = column.node("FunctionNodeCompare", 3)
+    same.data_type, same.operation = "INT", "EQUAL"
+    column.link(size.outputs["Point Count"], _input(same, "A"))
+    column.link(column.attribute(VERTICES, "INT"), _input(same, "B"))
+    return same.outputs["Result"]
+
+
+def _nearest(column, surface):
+    """The point of the surface nearest to the place estimated from a face without modifiers."""
+    position = _output(column.node("GeometryNodeInputPosition", 1), "Position")
+    corners = [column.attribute(name, "INT") for name in CAGE_CORNERS]
+    first, second, last = (column.sample(surface, position, corner) for corner in corners)
+    along = column.vectors("SUBTRACT", second, first)
+    across = column.vectors("SUBTRACT", last, first)
+    normal = column.vectors("NORMALIZE", column.vectors("CROSS_PRODUCT", along, across))
+    length = column.node("ShaderNodeVectorMath", 4)
+    length.operation = "LENGTH"
+    column.link(along, length.inputs[0])
+    normal = column.scaled(normal, length.outputs["Value"])
+    amounts = column.node("ShaderNodeSeparateXYZ", 2)
+    column.link(column.attribute(CAGE_OFFSET, "FLOAT_VECTOR"), amounts.inputs[0])
+    estimate = first
+    for axis, amount in zip((along, across, normal), amounts.outputs, strict=True):
+        estimate = column.added(estimate, axis, amount)
+    known = column.node("FunctionNodeCompare", 3)
+    known.data_type, known.operation = "INT", "GREATER_EQUAL"
+    column.link(corners[0], _input(known, "A"))
+    estimate = column.choose(known.outputs["Result"], position, estimate)
+    nearest = column.node("GeometryNodeProximity", 6)
+    nearest.target_element = "FACES"
+    column.link(surface, nearest.inputs[0])
+    column.link(estimate, nearest.inputs["Sample Position"])
+    return nearest.outputs["Position"]
+
+
+def _with_tube(column, curves, inputs):
+    """The curves, or a tube round them."""
+    radius = _output(column.node("GeometryNodeInputRadius", 8), "Radius")
+    widest = column.node("GeometryNodeAttributeStatistic", 8)
     widest.data_type, widest.domain = "FLOAT", "POINT"
     column.link(curves, widest.inputs["Geometry"])
     column.link(radius, _input(widest, "Attribute"))
-    circle = column.node("GeometryNodeCurvePrimitiveCircle", 6)
+    circle = column.node("GeometryNodeCurvePrimitiveCircle", 8)
     circle.inputs["Resolution"].default_value = SIDES
     # Strands without a radius are lines; without a profile, the tube consists of edges only.
-    profile = column.switch(7, _output(widest, "Max"), None, _output(circle, "Curve"))
-    mesh = column.node("GeometryNodeCurveToMesh", 8)
+    profile = column.switch(8, _output(widest, "Max"), None, _output(circle, "Curve"))
+    mesh = column.node("GeometryNodeCurveToMesh", 9)
     mesh.inputs["Fill Caps"].default_value = True
     column.link(curves, mesh.inputs["Curve"])
     column.link(profile, mesh.inputs["Profile Curve"])
     if "Scale" in mesh.inputs:  # Blender 4.3 always scales the profile by the radius of the curve
         column.link(radius, mesh.inputs["Scale"])
-    inputs = column.node("NodeGroupInput", 8)
-    chosen = column.switch(9, _output(inputs, TUBE), curves, _output(mesh, "Mesh"))
-    outputs = _group_output(group)
-    outputs.location.x = column.x(10)
-    column.link(chosen, outputs.inputs[0])
+    return column.switch(10, _output(inputs, TUBE), curves, _output(mesh, "Mesh"))
 
 
 def _is_whole(group) -> bool:
@@ -144,36 +194,53 @@ class _Column:
     def link(self, source, target) -> None:
         self.group.links.new(source, target)
 
-    def named_attribute(self, name: str, data_type: str):
+    def attribute(self, name: str, data_type: str):
         node = self.node("GeometryNodeInputNamedAttribute", 1)
         node.data_type = data_type
         node.inputs["Name"].default_value = name
         return _output(node, "Attribute")
 
-    def switch(self, column: int, condition, if_false, if_true):
-        """Switch between two geometries, of which either may be None (empty)."""
+    def sample(self, geometry, field, index):
+        """A vector field at a vertex of a geometry."""
+        node = self.node("GeometryNodeSampleIndex", 2)
+        node.data_type, node.domain = "FLOAT_VECTOR", "POINT"
+        self.link(geometry, _input(node, "Geometry"))
+        self.link(field, _input(node, "Value"))
+        self.link(index, _input(node, "Index"))
+        return _output(node, "Value")
+
+    def switch(self, column: int, condition, if_false, if_true, kind: str = "GEOMETRY"):
+        """Switch between two values, of which either may be None (empty)."""
         node = self.node("GeometryNodeSwitch", column)
-        node.input_type = "GEOMETRY"
+        node.input_type = kind
         for name, source in (("Switch", condition), ("False", if_false), ("True", if_true)):
             if source is not None:
                 self.link(source, _input(node, name))
         return _output(node, "Output")
 
-    def moved_towards(self, place, corner, base, weight):
-        """Add weight · (corner - base) to a position."""
-        step = self._vector("SUBTRACT", 3, corner, base)
-        scaled = self.node("ShaderNodeVectorMath", 4)
-        scaled.operation = "SCALE"
-        self.link(step, scaled.inputs[0])
-        self.link(weight, scaled.inputs["Scale"])
-        return self._vector("ADD", 4, place, scaled.outputs[0])
+    def choose(self, condition, if_false, if_true):
+        """Switch between two vectors."""
+        return self.switch(5, condition, if_false, if_true, "VECTOR")
 
-    def _vector(self, operation: str, column: int, one, other):
-        node = self.node("ShaderNodeVectorMath", column)
+    def vectors(self, operation: str, *operands):
+        """The vector that an operation makes of others."""
+        node = self.node("ShaderNodeVectorMath", 3)
         node.operation = operation
-        self.link(one, node.inputs[0])
-        self.link(other, node.inputs[1])
+        for operand, socket in zip(operands, node.inputs, strict=False):
+            self.link(operand, socket)
         return node.outputs[0]
+
+    def scaled(self, vector, factor):
+        """A vector times a factor."""
+        node = self.node("ShaderNodeVectorMath", 4)
+        node.operation = "SCALE"
+        self.link(vector, node.inputs[0])
+        self.link(factor, node.inputs["Scale"])
+        return node.outputs[0]
+
+    def added(self, vector, other, factor):
+        """A vector plus a multiple of another one."""
+        return self.vectors("ADD", vector, self.scaled(other, factor))
 
 
 def _output(node, name: str):

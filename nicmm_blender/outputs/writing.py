@@ -8,7 +8,7 @@ import numpy as np
 import bmesh
 
 from ..scene import curve_record
-from ..scene.mesh_data import InputError
+from ..scene.messages import InputError
 from . import curve_object, mesh_cut, sticky_curves
 
 SEPARATE = ("CURVE", "STICKY")
@@ -46,6 +46,12 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
         raise InputError(
             f"There are {len(curves)} curves, and only one can be cut. Choose the output Curve to "
             "see them"
+        )
+    if surface.cage is not None:
+        raise InputError(
+            f'The modifiers of "{mesh_object.name}" add or remove faces, so its mesh cannot be cut '
+            "along a curve on the shown surface. Apply them, or turn Use Modifiers off to draw on "
+            "the mesh without them"
         )
     changes_mesh = {"EDGES": _cut_edges, "REGION": _region, "PARTS": _parts}
     mesh_cut.check_editable(mesh_object, cuts=settings.output != "REGION" or settings.region_cut)

@@ -3,7 +3,9 @@
 
 Each point is stored by the three vertices of its triangle and its barycentric coordinates: vertices
 keep their indices when the mesh is moved or deformed, and when the file is opened again. Control
-points are stored in the same form, together with the settings, so that the curve can be edited.
+points are stored in the same form, together with the settings, so that the curve can be edited. On
+a surface that modifiers generate they are also stored by the face of the mesh that they come from:
+it stays the same when the level of a subdivision changes.
 """
 
 import hashlib
@@ -13,12 +15,15 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import OPTIONS, Kind
-from . import mesh_data
-from .mesh_data import InputError
+from . import designers, mesh_data
+from .cage_trace import CagePlaces, places_of, points_at, with_own_cage
+from .messages import InputError
+from .surface import group_weights, read
 
 KEY = "nicmm_curve"
-VERSION = 1
-"""Version of the record's format. Records of release 0.1.0 have none and count as 0."""
+VERSION = 2
+"""Version of the record's format. Records of release 0.1.0 have none and count as 0; those of
+version 1 know nothing of modifiers."""
 DESIGNED_ON = "nicmm_designed_on"
 
 
@@ -41,6 +46,8 @@ def _default(option):
     return option.default
 
 
+WITHOUT_MODIFIERS = ", use_modifiers=False"
+
 OF_A_DESIGN = ("order", "alternatives")
 """Options that matter once: control points are stored in the order visited."""
 
@@ -56,7 +63,8 @@ Asked = make_dataclass(
     [
         (property_name(option), type(_default(option)), field(default=_default(option)))
         for option in RECORDED
-    ],
+    ]
+    + [("use_modifiers", bool, field(default=True))],
     frozen=True,
     namespace={"__doc__": "The settings of a curve, besides its control points."},
 )
@@ -101,9 +109,16 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
         control_barycentric = np.concatenate([curve.barycentric[index] for curve, index in pairs])
     else:
         control_faces, control_barycentric = controls.faces, controls.barycentric
+    known = {"positions": surface.points(control_faces, control_barycentric)}
+    if surface.cage is not None:
+        places = places_of(surface, control_faces, control_barycentric)
+        known |= {"cage_faces": places.faces, "cage_places": places.places}
+        known["cage_copies"] = places.copies
     curve_object[KEY] = {
         "version": VERSION,
         "mesh": mesh_object,
+        "cage": [] if surface.cage is None else list(surface.cage.sizes),
+        "faces": _fingerprint(surface),
         "vertices": len(surface.local),
         "counts": [len(curve.faces) for curve in curves],
         "closed": [int(curve.closed) for curve in curves],
@@ -113,7 +128,7 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
         "control_index": np.concatenate([c.control_index for c in curves]).tolist(),
         "control_corners": surface.faces[control_faces].ravel().tolist(),
         "control_barycentric": control_barycentric.ravel().tolist(),
-        "control_positions": surface.points(control_faces, control_barycentric).ravel().tolist(),
+        **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
         "asked": asdict(asked),
     }
     # Stored in the same data-block as the points, so that undo restores both together.
@@ -122,13 +137,20 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
 
 def digest(mesh_object, surface, asked: Asked) -> str:
     """A hash of everything that a curve depends on."""
-    found = hashlib.blake2b(repr(asked).encode(), digest_size=16)
+    words = repr(asked).replace(WITHOUT_MODIFIERS, "")  # as in records of version 1
+    found = hashlib.blake2b(words.encode(), digest_size=16)
     found.update(surface.solved.tobytes())
     found.update(surface.faces.tobytes())
     for name in groups_of(asked):
         if name in mesh_object.vertex_groups:
-            found.update(mesh_data.group_weights(mesh_object, name).tobytes())
+            weights = group_weights(mesh_object, name, surface.with_modifiers)
+            found.update(weights.tobytes())
     return found.hexdigest()
+
+
+def _fingerprint(surface) -> str:
+    """A hash of the faces of a surface."""
+    return hashlib.blake2b(surface.faces.tobytes(), digest_size=16).hexdigest()
 
 
 def is_current(curve_object, now: str) -> bool:
@@ -162,11 +184,23 @@ def present_mesh(context, curve_object):
     """The mesh object that a curve was designed on, or an error if it is not in the scene."""
     found = mesh_of(curve_object)
     if found is None or found.name not in context.view_layer.objects:
-        raise InputError(
-            f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
-            "Bring it back, or draw the curve again"
-        )
+        raise _absent(curve_object)
     return found
+
+
+def existing_mesh(curve_object):
+    """The mesh object that a curve was designed on, or an error if it is in no scene."""
+    found = mesh_of(curve_object)
+    if found is None or not found.users_scene:
+        raise _absent(curve_object)
+    return found
+
+
+def _absent(curve_object) -> InputError:
+    return InputError(
+        f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
+        "Bring it back, or draw the curve again"
+    )
 
 
 def mesh_of_context(context):
@@ -222,8 +256,19 @@ def asked_of(curve_object) -> Asked:
     """The settings of a curve."""
     stored = curve_object[KEY].get("asked")
     if stored is None:  # from a version that did not record them
-        return Asked(closed=bool(curve_object[KEY]["closed"][0]))
-    return Asked(**{field.name: field.type(stored[field.name]) for field in fields(Asked)})
+        return Asked(closed=bool(curve_object[KEY]["closed"][0]), use_modifiers=False)
+    before = {"use_modifiers": False}  # what versions did that did not record a setting
+    return Asked(
+        **{
+            field.name: field.type(stored.get(field.name, before.get(field.name, field.default)))
+            for field in fields(Asked)
+        }
+    )
+
+
+def surface_of(curve_object, mesh_object):
+    """The surface that a curve lies on, as it is now."""
+    return read(mesh_object, asked_of(curve_object).use_modifiers)
 
 
 def recall(curve_object, surface) -> list:
@@ -270,24 +315,54 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
 
 
-def controls_now(curve_object, surface, mesh=None) -> tuple[object, int]:
-    """The control points of a curve on the present mesh, and how many of them were moved.
+def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
+    """The control points of a curve on the present surface, and how many of them were moved.
 
-    A point whose triangle no longer exists moves to the nearest point of the surface. `mesh` is the
-    core's mesh of the surface, if it exists already.
+    A point whose triangle no longer exists is found by the face of the mesh that it came from, or
+    else moves to the nearest point of the surface.
     """
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
 
     points, positions = recall_controls(curve_object, surface)
-    lost = points.faces < 0
-    if not lost.any():
-        return points, 0
-    mesh = nicmm.Mesh(surface.solved, surface.faces) if mesh is None else mesh
-    nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
-    faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
+    lost = faces < 0
+    if lost.any():
+        traced = with_own_cage(surface) if surface.cage is None else surface
+        places = _cage_places(curve_object, mesh_object, traced.cage.sizes)
+        if places is not None:
+            there, weights = points_at(traced, places)
+            faces[lost], barycentric[lost] = there[lost], weights[lost]
+    lost = faces < 0
+    if lost.any():
+        mesh = designers.designer_for(surface.solved, surface.faces).mesh
+        nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
+        faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
     return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
+
+
+def _cage_places(curve_object, mesh_object, sizes: tuple) -> CagePlaces | None:
+    """The control points of a curve in faces of the mesh without modifiers; None if unknown.
+
+    `sizes` are the present ones of that mesh.
+    """
+    record = curve_object[KEY]
+    if record.get("cage"):
+        if tuple(record["cage"]) != sizes:
+            return None
+        return CagePlaces(
+            np.array(record["control_cage_faces"], dtype=np.int64),
+            np.array(record["control_cage_places"], dtype=np.float64).reshape(-1, 2),
+            np.array(record["control_cage_copies"], dtype=np.int64),
+        )
+    cage = read(mesh_object, use_modifiers=False)
+    points, _ = recall_controls(curve_object, cage)
+    there = points.faces >= 0
+    if not there.any():
+        return None
+    found = places_of(with_own_cage(cage), points.faces, points.barycentric)
+    found.faces[~there] = -1
+    return found
 
 
 def _recalled(record, corners_name: str, weights_name: str, surface):
@@ -295,8 +370,10 @@ def _recalled(record, corners_name: str, weights_name: str, surface):
     corners = np.array(record[corners_name], dtype=np.int64).reshape(-1, 3)
     barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
     faces, order = _find_triangles(surface.faces, corners)
-    if record["vertices"] > len(surface.local):
-        # Vertices were deleted, so the indices of the others may have changed.
+    generated = bool(record.get("cage")) or surface.cage is not None
+    changed = record["vertices"] > len(surface.local)
+    if changed or (generated and record.get("faces") != _fingerprint(surface)):
+        # The indices of vertices may have changed.
         faces = np.full(len(corners), -1, dtype=np.int64)
     return faces, np.take_along_axis(barycentric, order, axis=1)
 

@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from . import curve_record, designers, mesh_data
+from . import curve_record, designers
 from .curve_record import Asked
+from .messages import InputError, in_words
+from .surface import Surface, group_weights, read
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,7 @@ class DesignRequest:
 
     mesh_name: str
     mesh_uid: int
-    surface: mesh_data.Triangles
-    placement: np.ndarray
+    surface: Surface
     points: object
     order: str
     asked: Asked
@@ -42,19 +43,20 @@ class DesignRequest:
     def check_unchanged(self) -> None:
         """Raise an error if the mesh has changed since it was read."""
         found = self.mesh_object()
-        now = None if found is None else mesh_data.triangles(found)
-        if now is None or not (
+        now = found and read(found, self.surface.with_modifiers, traced=False)
+        if not now or not (
             np.array_equal(now.solved, self.surface.solved)
             and np.array_equal(now.faces, self.surface.faces)
         ):
-            raise mesh_data.InputError(
+            raise InputError(
                 f'"{self.mesh_name}" has changed while the curve was computed. Draw the curve again'
             )
 
     def in_world(self, solved: np.ndarray) -> np.ndarray:
         """World positions of points in the space that the core works in."""
         local = solved @ np.linalg.inv(self.surface.linear).T
-        return local @ self.placement[:3, :3].T + self.placement[:3, 3]
+        placement = self.surface.placement
+        return local @ placement[:3, :3].T + placement[:3, 3]
 
 
 def for_points(mesh_object, surface, points, order: str, asked: Asked) -> DesignRequest:
@@ -63,19 +65,18 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
         mesh_name=mesh_object.name,
         mesh_uid=mesh_object.session_uid,
         surface=surface,
-        placement=np.array(mesh_object.matrix_world, dtype=np.float64),
         points=points,
         order=order,
         asked=asked,
         options=curve_record.arguments_of(
-            asked, lambda name: mesh_data.group_weights(mesh_object, name)
+            asked, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
         ),
     )
 
 
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
     """A request to design a curve again, on the present mesh."""
-    points, moved = curve_record.controls_now(curve_object, surface)
+    points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
     return replace(for_points(mesh_object, surface, points, "given", asked), moved=moved)
 
 
@@ -94,6 +95,4 @@ def answer(request: DesignRequest, progress):
         except nicmm.NicmmError as error:
             vertices = request.points if isinstance(request.points, np.ndarray) else None
             at = vertices if vertices is not None and vertices.ndim == 1 else None
-            raise mesh_data.InputError(
-                mesh_data.in_words(error, asked.obstacle_group, at)
-            ) from error
+            raise InputError(in_words(error, asked.obstacle_group, at)) from error

@@ -13,6 +13,8 @@ from ..operators.long_solves import reporting
 from ..operators.viewports import NAVIGATION, WHEEL
 from ..scene import curve_record, designers, mesh_data
 from ..scene.curve_record import Asked
+from ..scene.messages import InputError
+from ..scene.surface import read
 from .edit_overlay import Overlay
 from .edit_view import view_of
 from .edited_curve import chosen, keep, open_session
@@ -136,7 +138,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         if len(self.points):
             session.set_points(np.array([point.position[:] for point in self.points]))
         elif edited is None:
-            raise mesh_data.InputError(
+            raise InputError(
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
                 "z)}, …], or draw with the mouse in the 3D viewport"
             )
@@ -178,7 +180,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             edited = clicked[0]
         self._opened = opened = open_session(context, edited, self._asked_for(context, edited))
         self._edited_name = "" if edited is None else edited.name
-        self._hidden = _Hidden(opened.mesh_object, edited)
+        self._hidden = _Hidden(opened, edited)
         self._overlay = Overlay(opened.mesh_object, opened.session)
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
@@ -194,15 +196,18 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         None if the mouse is neither on the mesh nor on a curve.
         """
         mesh_object = mesh_data.mesh_object(context)
-        mesh_data.synchronise(mesh_object)
-        surface = mesh_data.triangles(mesh_object)
+        surface = read(mesh_object, context.scene.nicmm_curves.use_modifiers)
         mesh = designers.designer_for(surface.solved, surface.faces).mesh
         view, pixel = self._view_on(context, event, mesh_object, surface, mesh)
         if view is None:
             return None
         scale = context.preferences.system.ui_scale
         for drawn in curve_record.curves_on(context, mesh_object):
-            points, line = curve_record.places(drawn, surface)
+            asked = curve_record.asked_of(drawn)
+            on = surface
+            if asked.use_modifiers != surface.with_modifiers:
+                on = read(mesh_object, asked.use_modifiers)
+            points, line = curve_record.places(drawn, on)
             if (
                 view.nearest_point(pixel, points, POINT_REACH * scale) is not None
                 or view.nearest_on_line(pixel, line, CURVE_REACH * scale) is not None
@@ -371,7 +376,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         session = opened.session
         missing = session.what_is_missing()
         if missing:
-            raise mesh_data.InputError(missing)
+            raise InputError(missing)
         made = keep(context, opened, edited, self)
         for name in settings.EditingProperties.__annotations__:
             setattr(self, name, getattr(session.asked, name))
@@ -427,10 +432,11 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
 
 class _Hidden:
-    """Hides the old curve and the modifiers of the mesh while editing."""
+    """Hides the old curve while editing, and modifiers that the curve is drawn without."""
 
-    def __init__(self, mesh_object, edited) -> None:
-        self._modifiers = [each for each in mesh_object.modifiers if each.show_viewport]
+    def __init__(self, opened, edited) -> None:
+        modifiers = () if opened.session.asked.use_modifiers else opened.mesh_object.modifiers
+        self._modifiers = [each for each in modifiers if each.show_viewport]
         for modifier in self._modifiers:
             modifier.show_viewport = False
         self._edited = edited if edited is not None and not edited.hide_get() else None

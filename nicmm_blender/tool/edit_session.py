@@ -16,7 +16,7 @@ import numpy as np
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
 from ..scene import curve_record
 from ..scene.curve_record import Asked
-from ..scene.mesh_data import InputError, in_words
+from ..scene.messages import InputError, in_words
 
 ITERATIONS = 3
 """Iterations in a step, which take one or two frames."""
@@ -52,7 +52,7 @@ class EditSession:
 
     Parameters
     ----------
-    surface : mesh_data.Triangles
+    surface : surface.Surface
     designer : nicmm_core.Designer
         Of the same triangles.
     weights : callable

@@ -17,7 +17,7 @@ class View:
     """A mesh in a viewport's region.
 
     `perspective` is the (4, 4) matrix from the object's local space to clip space, `size` the
-    region's width and height in pixels; `surface` is the `mesh_data.Triangles` and `mesh` the
+    region's width and height in pixels; `surface` is the `surface.Surface` and `mesh` the
     core's mesh of them.
     """
 

@@ -8,7 +8,8 @@ import numpy as np
 from ..outputs import curve_object, writing
 from ..scene import curve_record, designers, mesh_data
 from ..scene.curve_record import Asked
-from ..scene.mesh_data import InputError
+from ..scene.messages import InputError
+from ..scene.surface import group_weights, read, shown_beyond_the_cage
 from .edit_session import EditSession
 
 
@@ -44,13 +45,13 @@ def open_session(context, edited, asked: Asked) -> Opened:
     else:
         mesh_object = curve_record.present_mesh(context, edited)
         _check_editable(edited)
-    mesh_data.synchronise(mesh_object)
-    surface = mesh_data.triangles(mesh_object)
+    surface = read(mesh_object, asked.use_modifiers)
     if not len(surface.faces):
         raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
     designer = designers.designer_for(surface.solved, surface.faces)
     remarks = []
-    if shown := mesh_data.shown_beyond_the_mesh(mesh_object):
+    shown = shown_beyond_the_cage(mesh_object)
+    if shown and not asked.use_modifiers:
         remarks.append(f"on the mesh without its {shown}")
     for name in ("obstacle_group", "alignment_group"):
         group = getattr(asked, name)
@@ -59,14 +60,14 @@ def open_session(context, edited, asked: Asked) -> Opened:
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     points = curve = None
     if edited is not None:
-        points, moved = curve_record.controls_now(edited, surface, designer.mesh)
+        points, moved = curve_record.controls_now(edited, mesh_object, surface)
         if moved:
             remarks.append(f"the mesh has changed: {moved} points moved to the nearest positions")
         elif asked == replace(curve_record.asked_of(edited), method=asked.method):
             curve = _curve_of(edited, surface)
 
     def weights(name: str) -> np.ndarray | None:
-        return mesh_data.group_weights(mesh_object, name)
+        return group_weights(mesh_object, name, asked.use_modifiers)
 
     session = EditSession(surface, designer, weights, asked, points, curve)
     return Opened(mesh_object, session, "".join(f"; {remark}" for remark in remarks))

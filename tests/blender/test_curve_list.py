@@ -170,7 +170,7 @@ def test_update_says_what_is_missing(sphere):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects.remove(sphere)
     scenes.sphere()
-    assert "no longer exists" in refusal(curve=curve.name)
+    assert "is not in this scene" in refusal(curve=curve.name)
 
 
 def test_update_is_one_undo_step(sphere):

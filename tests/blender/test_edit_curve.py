@@ -273,7 +273,7 @@ def test_a_deleted_group_is_left_out(sphere, places, capfd):
 
 def test_modifiers_are_mentioned(sphere, places, capfd):
     sphere.modifiers.new("Subdivision", "SUBSURF")
-    edit(points=as_points(places))
+    edit(points=as_points(places), use_modifiers=False)
     assert "without its modifiers" in capfd.readouterr().out
 
 

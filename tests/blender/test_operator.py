@@ -390,5 +390,5 @@ def test_modifiers_are_mentioned(empty_scene, capfd):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     sphere.modifiers.new("Subdivision", "SUBSURF")
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(use_modifiers=False)
     assert "without its modifiers" in capfd.readouterr().out

@@ -273,39 +273,6 @@ def test_editing_tool_makes_a_tube(monkey):
 # Node groups of other files
 
 
-def input_of(modifier, name):
-    tree = modifier.node_group.interface.items_tree
-    (socket,) = [item for item in tree if item.name == name and item.in_out == "INPUT"]
-    if hasattr(modifier, "properties"):
-        return getattr(modifier.properties.inputs, socket.identifier).value
-    return modifier[socket.identifier]
-
-
-def test_group_of_before_the_tube_gets_one(monkey, extension, tmp_path):
-    nodes = module(extension, "outputs.sticky_nodes")
-    old = sticky(monkey)
-    bpy.data.node_groups.remove(old.modifiers[0].node_group)
-    modifier = old.modifiers[0]
-    modifier.node_group = nodes._new_group()
-    nodes._set_input(modifier, nodes.SURFACE, monkey)
-    name, of_mesh, before = old.name, monkey.name, evaluated_points(old)
-    file = str(tmp_path / "old.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=file)
-    bpy.ops.wm.open_mainfile(filepath=file)
-
-    old, monkey = bpy.data.objects[name], bpy.data.objects[of_mesh]
-    new = sticky(monkey, tube=True)
-    (group,) = [found for found in bpy.data.node_groups if found.name.startswith(nodes.GROUP_NAME)]
-    assert old.modifiers[0].node_group == new.modifiers[0].node_group == group
-    assert len(rings(new)) == len(before)
-    assert shown_mesh(old) is None and not input_of(old.modifiers[0], "Tube")
-    assert input_of(old.modifiers[0], "Surface") == monkey
-    np.testing.assert_array_equal(evaluated_points(old), before)
-    nodes._set_input(old.modifiers[0], nodes.TUBE, True)
-    old.update_tag()
-    np.testing.assert_array_equal(rings(old), rings(new))
-
-
 def test_nodes_that_somebody_put_into_the_group_stay(monkey, extension):
     nodes = module(extension, "outputs.sticky_nodes")
     group = nodes._new_group()

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the vertices and faces of a cage are in the surface that modifiers generate from it.
+
+A temporary copy of the object gets attributes with the identity of its vertices and faces, and the
+modifiers carry them to the surface. The user's mesh is never written to: that would report a change
+of it, and is impossible where the mesh is linked from another file.
+"""
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+VERTEX, FACE, PLACE = "nicmm_vertex", "nicmm_face", "nicmm_place"
+"""Attributes of the copy."""
+
+INSIDE = -1e-4
+"""Least barycentric coordinate of a place inside a triangle: attributes have single precision."""
+
+SAME_PLACE = 1e-5
+"""Greatest distance of two triangles that hold the same place, in diagonals of the surface."""
+
+
+@dataclass(frozen=True)
+class CageTrace:
+    """The cage of a generated surface.
+
+    Attributes
+    ----------
+    positions : (n, 3) float array
+        Of the vertices of the cage, in the object's local space.
+    vertices : (n,) int array
+        The vertex of the surface that each vertex of the cage became; -1 where it no longer exists.
+    sizes : tuple of int
+        Numbers of vertices, faces and corners of the cage.
+    corners : (P, 3) int array
+        The first three vertices of each face of the cage.
+    faces : (F,) int array
+        The face of the cage that each triangle of the surface comes from; -1 where unknown.
+    places : (F, 3, 2) float array
+        Coordinates of the triangles' corners in that face, whose corners are those of a regular
+        polygon round the origin.
+    """
+
+    positions: np.ndarray
+    vertices: np.ndarray
+    sizes: tuple
+    corners: np.ndarray
+    faces: np.ndarray
+    places: np.ndarray
+
+
+@dataclass(frozen=True)
+class CagePlaces:
+    """Points in faces of the cage.
+
+    Attributes
+    ----------
+    faces : (k,) int array
+        -1 where unknown.
+    places : (k, 2) float array
+    copies : (k,) int array
+        Which of the copies that modifiers make of the face, in the order of the surface's faces.
+    """
+
+    faces: np.ndarray
+    places: np.ndarray
+    copies: np.ndarray
+
+
+def trace(mesh_object, shown, cage_mesh) -> CageTrace | None:
+    """Find the cage in the shown mesh of an object; None where it has the cage's faces.
+
+    Parameters
+    ----------
+    mesh_object : bpy.types.Object
+    shown : bpy.types.Mesh
+        With modifiers.
+    cage_mesh : callable
+        Gives a context with the mesh without modifiers.
+    """
+    if not any(modifier.show_viewport for modifier in mesh_object.modifiers):
+        return None
+    with cage_mesh(mesh_object) as cage:
+        if _sizes(cage) == _sizes(shown) and np.array_equal(_corners(cage), _corners(shown)):
+            return None
+        return _Copy(mesh_object, cage).trace(shown)
+
+
+def with_own_cage(surface):
+    """The surface of a cage, as one that modifiers generate from itself."""
+    polygons, loops = surface.polygons, surface.loops
+    totals = np.bincount(polygons) + 2
+    starts = np.full(len(totals), np.iinfo(np.int64).max)
+    np.minimum.at(starts, polygons, loops.min(axis=1))
+    number = loops - starts[polygons][:, None]
+    own = CageTrace(
+        positions=surface.local,
+        vertices=np.arange(len(surface.local)),
+        sizes=(len(surface.local), len(totals), int(loops.max()) + 1),
+        corners=surface.faces[np.unique(polygons, return_index=True)[1]],
+        faces=polygons,
+        places=_on_circle(number, totals[polygons][:, None]),
+    )
+    return replace(surface, cage=own)
+
+
+def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """Coordinates of corners of a face, by their number and that of all its corners."""
+    angle = 2.0 * np.pi * number / total
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces:
+    """Points of a generated surface, by triangle and barycentrics, in faces of the cage."""
+    cage = surface.cage
+    places = np.einsum("nj,njk->nk", barycentric, cage.places[faces])
+    found = CagePlaces(cage.faces[faces], places, np.zeros(len(faces), dtype=np.int64))
+    triangles = _TrianglesOf(surface)
+    for number, position in enumerate(surface.points(faces, barycentric)):
+        copies = triangles.at(int(found.faces[number]), places[number])
+        away = [np.linalg.norm(surface.points(*copy)[0] - position) for copy in copies]
+        if not copies or min(away) > SAME_PLACE * surface.diagonal:
+            found.faces[number] = -1
+        else:
+            found.copies[number] = int(np.argmin(away))
+    return found
+
+
+def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles, (k,), -1 where there is none, and barycentrics, (k, 3), of points in the cage."""
+    faces, barycentric = np.full(len(places.faces), -1), np.zeros((len(places.faces), 3))
+    triangles = _TrianglesOf(surface)
+    for number, (face, copy) in enumerate(zip(places.faces, places.copies, strict=True)):
+        copies = triangles.at(int(face), places.places[number])
+        if copy < len(copies):
+            (faces[number],), (barycentric[number],) = copies[copy]
+    return faces, barycentric
+
+
+class _TrianglesOf:
+    """The triangles of a surface by the face of the cage that they come from."""
+
+    def __init__(self, surface) -> None:
+        self.surface = surface
+        self.order = np.argsort(surface.cage.faces, kind="stable")
+        self.sorted = surface.cage.faces[self.order]
+
+    def at(self, face: int, place: np.ndarray) -> list:
+        """The copies of a place, as pairs of triangle, (1,), and barycentrics, (1, 3)."""
+        if face < 0:
+            return []
+        first, last = np.searchsorted(self.sorted, [face, face + 1])
+        triangles = self.order[first:last]
+        barycentric = _barycentric(self.surface.cage.places[triangles], place)
+        inside = np.flatnonzero(barycentric.min(axis=1, initial=1.0) >= INSIDE)
+        weights = np.clip(barycentric[inside], 0.0, None)
+        weights /= weights.sum(axis=1, keepdims=True)
+        positions = self.surface.points(triangles[inside], weights)
+        copies: list = []
+        where: list = []
+        for triangle, weight, position in zip(triangles[inside], weights, positions, strict=True):
+            near = SAME_PLACE * self.surface.diagonal
+            if all(np.linalg.norm(position - other) > near for other in where):
+                where.append(position)
+                copies.append((np.array([triangle]), weight[None]))
+        return copies
+
+
+def _barycentric(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates, (n, 3), of a place in triangles, (n, 3, 2); -1 in flat ones."""
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    to = place - triangles[:, 0]
+    area = _cross(first, second)
+    flat = np.abs(area) <= np.finfo(np.float32).eps
+    area = np.where(flat, 1.0, area)
+    u, v = _cross(to, second) / area, _cross(first, to) / area
+    return np.where(flat[:, None], -1.0, np.stack([1.0 - u - v, u, v], axis=1))
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+
+
+class _Copy:
+    """A copy of an object in a scene of its own, whose mesh has the attributes."""
+
+    def __init__(self, mesh_object, cage) -> None:
+        self.mesh_object, self.cage = mesh_object, cage
+        self.identities = np.random.default_rng(0).random((len(cage.vertices), 3), np.float32)
+
+    def trace(self, shown) -> CageTrace:
+        """Evaluate the copy and read its attributes."""
+        data, copy = self.cage.copy(), self.mesh_object.copy()
+        scene = bpy.data.scenes.new("NICMM cage")
+        try:
+            copy.data = data
+            self._write(data)
+            scene.collection.objects.link(copy)
+            now = bpy.context.scene
+            scene.frame_current, scene.frame_subframe = now.frame_current, now.frame_subframe
+            layer = scene.view_layers[0]
+            layer.update()
+            evaluated = copy.evaluated_get(layer.depsgraph)
+            try:
+                return self._read(evaluated.to_mesh(), shown)
+            finally:
+                evaluated.to_mesh_clear()
+        finally:
+            bpy.data.scenes.remove(scene)
+            bpy.data.objects.remove(copy)
+            bpy.data.meshes.remove(data)
+
+    def _write(self, data) -> None:
+        starts, totals = (
+            _get(data.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total")
+        )
+        places = np.zeros((len(data.loops), 3), dtype=np.float32)
+        number = np.arange(len(places)) - np.repeat(starts, totals)
+        places[:, :2] = _on_circle(number, np.repeat(totals, totals))
+        faces = np.arange(len(data.polygons), dtype=np.int32)
+        for name, kind, domain, field, values in (
+            (VERTEX, "FLOAT_VECTOR", "POINT", "vector", self.identities),
+            (FACE, "INT", "FACE", "value", faces),
+            (PLACE, "FLOAT_VECTOR", "CORNER", "vector", places),
+        ):
+            data.attributes.new(name, kind, domain).data.foreach_set(field, values.ravel())
+
+    def _read(self, mesh, shown) -> CageTrace:
+        positions = _get(self.cage.vertices, "co", 3, np.float32).astype(np.float64)
+        vertices = np.full(len(positions), -1)
+        mesh.calc_loop_triangles()
+        count = len(shown.loop_triangles)
+        faces, places = np.full(count, -1), np.zeros((count, 3, 2))
+        domains = {VERTEX: "POINT", FACE: "FACE", PLACE: "CORNER"}
+        # A simulation may differ in the copy, and nodes may remove or move attributes.
+        if _sizes(mesh) == _sizes(shown) and np.array_equal(_corners(mesh), _corners(shown)):
+            kept = {
+                name: attribute
+                for name, domain in domains.items()
+                if (attribute := mesh.attributes.get(name)) is not None
+                and attribute.domain == domain
+            }
+            if VERTEX in kept:
+                vertices = _first_equal(
+                    self.identities, _get(kept[VERTEX].data, "vector", 3, np.float32)
+                )
+            if FACE in kept and PLACE in kept:
+                polygons = _get(shown.loop_triangles, "polygon_index", 1, np.int32)
+                loops = _get(shown.loop_triangles, "loops", 3, np.int32)
+                faces = _get(kept[FACE].data, "value", 1, np.int32)[polygons].astype(np.int64)
+                places = _get(kept[PLACE].data, "vector", 3, np.float32)[loops, :2]
+        starts = _get(self.cage.polygons, "loop_start", 1, np.int32)
+        corners = _corners(self.cage)[starts[:, None] + np.arange(3)]
+        sizes = _sizes(self.cage)
+        return CageTrace(positions, vertices, sizes, corners, faces, places.astype(np.float64))
+
+
+def _first_equal(wanted: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """The first row of `among` with the same bytes as each row of `wanted`, or -1."""
+    whole = np.dtype((np.void, wanted.dtype.itemsize * wanted.shape[1]))
+    keys = np.ascontiguousarray(among).view(whole).ravel()
+    known, first = np.unique(keys, return_index=True)
+    searched = np.ascontiguousarray(wanted).view(whole).ravel()
+    if not len(known):
+        return np.full(len(searched), -1)
+    at = np.minimum(np.searchsorted(known, searched), len(known) - 1)
+    return np.where(known[at] == searched, first[at], -1)
+
+
+def _sizes(mesh) -> tuple:
+    return len(mesh.vertices), len(mesh.polygons), len(mesh.loops)
+
+
+def _corners(mesh) -> np.ndarray:
+    return _get(mesh.loops, "vertex_index", 1, np.int32)
+
+
+def _get(sequence, name: str, width: int, kind) -> np.ndarray:
+    values = np.empty((len(sequence), width), dtype=kind)
+    sequence.foreach_get(name, values.ravel())
+    return values if width > 1 else values[:, 0]

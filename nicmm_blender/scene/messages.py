@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Errors for the user, and the core's messages in words that fit Blender."""
+
+
+class InputError(Exception):
+    """The Blender data cannot be used; the message says what to change."""
+
+
+def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
+    """The core's message for the user: points are counted from one, and the map is named.
+
+    `vertices` are the vertices of the control points, or None if they are not at vertices.
+    """
+    text = str(error)
+    for point in getattr(error, "points", ()):
+        if point.argument == "control_points":
+            at = "" if vertices is None else f" (vertex {vertices[point.index]})"
+            text = text.replace(str(point), f"point {point.index + 1}{at}")
+    text = text.replace("control_points has", "there are").replace("control_points", "the points")
+    if type(error).__name__ == "UnreachableError" and obstacle_group:
+        text += f' (obstacles: the vertex group "{obstacle_group}")'
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Control points from the selection, a vertex group or a script."""
+
+import numpy as np
+
+import bmesh
+
+from . import designers
+from .messages import InputError
+from .surface import Surface, group_weights
+
+
+def selected_vertices(mesh_object) -> np.ndarray:
+    """Indices of the selected vertices, ascending."""
+    mesh = mesh_object.data
+    selected = np.empty(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("select", selected)
+    return np.flatnonzero(selected)
+
+
+def selection_history(mesh_object) -> np.ndarray:
+    """Indices of the vertices in Blender's selection history, oldest first."""
+    mesh = mesh_object.data
+    if mesh_object.mode == "EDIT":
+        return _history(bmesh.from_edit_mesh(mesh))
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(mesh)
+        return _history(edited)
+    finally:
+        edited.free()
+
+
+def _history(edited) -> np.ndarray:
+    # list() first: in some Blender versions a generator expression fails on this iterator.
+    elements = list(edited.select_history)
+    vertices = [found.index for found in elements if isinstance(found, bmesh.types.BMVert)]
+    return np.array(vertices, dtype=np.int64)
+
+
+def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
+    """Return the selected vertices and the core's order for them, "given" or "shortest".
+
+    Box, circle and lasso selection are not recorded and old entries stay in the history, so it is
+    used only if it holds exactly the selected vertices.
+    """
+    selected = selected_vertices(mesh_object)
+    if len(selected) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" is selected. Select the vertices that the curve '
+            "should pass through in Edit Mode"
+        )
+    if order == "SHORTEST":
+        return selected, "shortest"
+    history = selection_history(mesh_object)
+    if np.array_equal(np.sort(history), selected):
+        return history, "given"
+    if order == "GIVEN":
+        raise InputError(
+            f"Blender has recorded the order of {np.isin(selected, history).sum()} of the "
+            f"{len(selected)} selected vertices. Select them one by one with Shift-click, "
+            "or set Order to Automatic or Shortest"
+        )
+    return selected, "shortest"
+
+
+def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str]:
+    """Return the vertices of a vertex group, and the core's order for them."""
+    vertices = np.flatnonzero(group_weights(mesh_object, name, use_modifiers=False) > 0.0)
+    if order == "GIVEN":
+        raise InputError(
+            f'The vertices of the group "{name}" have no order. Set Order to Automatic or Shortest'
+        )
+    if len(vertices) == 0:
+        raise InputError(
+            f'No vertex of "{mesh_object.name}" has a weight in the group "{name}". Assign the '
+            "vertices that the curve should pass through"
+        )
+    return vertices, "shortest"
+
+
+def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
+    """Return the control points of a script for the core, and their order.
+
+    The text holds vertex indices of the mesh or positions in the object's local space, "12, 80,
+    0.5 0 1".
+    """
+    core_order = "shortest" if order == "SHORTEST" else "given"
+    count = len(surface.local) if surface.cage is None else len(surface.cage.vertices)
+    given = [_given_point(word, count) for word in text.split(",")]
+    if all(isinstance(point, int) for point in given):
+        return points_at(surface, np.array(given, dtype=np.int64)), core_order
+    places = [
+        positions_at(surface, np.array([point]))[0]
+        if isinstance(point, int)
+        else surface.linear @ point
+        for point in given
+    ]
+    return np.array(places), core_order
+
+
+def points_at(surface: Surface, vertices: np.ndarray):
+    """Points for the core at vertices of the mesh, (k,): vertices of the surface or places on it.
+
+    A vertex that modifiers remove is replaced by the nearest place.
+    """
+    if surface.cage is None:
+        return vertices
+    found = surface.cage.vertices[vertices]
+    return found if (found >= 0).all() else _nearest(surface, vertices)
+
+
+def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
+    """Positions of vertices of the mesh on the surface, (k, 3), in the core's space."""
+    points = points_at(surface, vertices)
+    if isinstance(points, np.ndarray):
+        return surface.solved[points]
+    corners = surface.solved[surface.faces[points.faces]]
+    return np.einsum("nj,njk->nk", points.barycentric, corners)
+
+
+def _nearest(surface: Surface, vertices: np.ndarray):
+    """The places nearest to vertices of the mesh, as SurfacePoints of the core."""
+    from ...nicmm_core.geometry.surface_points import nearest_points
+
+    found = surface.cage.vertices[vertices]
+    before = surface.cage.positions[vertices] @ surface.linear.T
+    wanted = np.where(found[:, None] >= 0, surface.solved[found], before)
+    mesh = designers.designer_for(surface.solved, surface.faces).mesh
+    return nearest_points(mesh, wanted)[0]
+
+
+def _given_point(word: str, count: int) -> int | np.ndarray:
+    """A vertex index, or a position in the object's local space, (3,)."""
+    numbers = word.split()
+    try:
+        point = int(word) if len(numbers) == 1 else np.array(numbers, dtype=np.float64)
+    except ValueError:
+        point = np.zeros(0)
+    if isinstance(point, np.ndarray) and point.shape != (3,):
+        raise InputError(
+            f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Separate '
+            'points by commas and coordinates by spaces, such as "12, 80, 0.5 0 1"'
+        )
+    if isinstance(point, int) and not 0 <= point < count:
+        raise InputError(
+            f"Vertex {point} is out of range; the mesh has {count} vertices, 0 to {count - 1}"
+        )
+    return point

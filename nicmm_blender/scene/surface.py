@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface that curves lie on, as arrays: the shown one with modifiers, or the mesh itself.
+
+The mesh without its modifiers is called the cage, also in Edit Mode, where Blender keeps a separate
+copy of it.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+import bmesh
+
+from .cage_trace import CageTrace, trace
+from .messages import InputError
+
+FLAT = 1e-6
+"""Least scale along an axis relative to the largest one, limited by single precision."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangulated surface for the core.
+
+    Attributes
+    ----------
+    local, solved : (V, 3) float array
+        Positions in the object's local space, and in a space with the lengths of the scene.
+    faces : (F, 3) int array
+        Vertex indices.
+    loops : (F, 3) int array
+        Indices of the corners of the mesh.
+    polygons : (F,) int array
+        The face of the mesh that each triangle is a part of.
+    linear : (3, 3) float array
+        The map from the local space to the other.
+    placement : (4, 4) float array
+        The map from the local space to the world.
+    with_modifiers : bool
+    cage : CageTrace or None
+        Where the cage is in a surface that modifiers generate; None if vertices and faces are those
+        of the cage.
+    """
+
+    local: np.ndarray
+    solved: np.ndarray
+    faces: np.ndarray
+    loops: np.ndarray
+    polygons: np.ndarray
+    linear: np.ndarray
+    placement: np.ndarray
+    with_modifiers: bool
+    cage: CageTrace | None
+
+    def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Positions in the object's local space of points given by face and barycentrics."""
+        return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
+
+    def normals(self, faces: np.ndarray) -> np.ndarray:
+        """Normals of faces, (n, 3), in the object's local space; zero where a face is flat."""
+        corners = self.local[self.faces[faces]]
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal in the object's local space."""
+        return float(np.linalg.norm(np.ptp(self.local, axis=0)))
+
+
+def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
+    """Read the surface of a mesh object, without `cage` unless it is `traced`.
+
+    Quads and larger faces are triangulated as Blender draws them.
+    """
+    with shown_mesh(mesh_object, use_modifiers) as (mesh, matrix):
+        local = _array(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+        mesh.calc_loop_triangles()
+        triangles = mesh.loop_triangles
+        faces = _array(triangles, "vertices", 3, np.int32).astype(np.int64)
+        loops = _array(triangles, "loops", 3, np.int32).astype(np.int64)
+        polygons = _array(triangles, "polygon_index", 1, np.int32).astype(np.int64)
+        cage = trace(mesh_object, mesh, cage_mesh) if use_modifiers and traced else None
+    linear = np.array(matrix.to_3x3(), dtype=np.float64)
+    stretches = np.linalg.svd(linear, compute_uv=False)
+    if stretches[-1] <= FLAT * stretches[0]:
+        raise InputError(
+            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Reset it '
+            "(Object > Clear > Scale)"
+        )
+    if _keeps_proportions(linear):
+        linear = np.eye(3)
+    placement = np.array(matrix, dtype=np.float64)
+    return Surface(
+        local,
+        local @ linear.T,
+        faces,
+        loops,
+        polygons,
+        linear,
+        placement,
+        use_modifiers,
+        cage,
+    )
+
+
+@contextmanager
+def shown_mesh(mesh_object, use_modifiers: bool):
+    """Yield the mesh with its modifiers and shape keys, or the cage, and the matrix to the world.
+
+    The mesh is valid inside the block only.
+    """
+    if not use_modifiers or _is_sculpted_without_modifiers(mesh_object):
+        with cage_mesh(mesh_object) as mesh:
+            yield mesh, mesh_object.matrix_world.copy()
+        return
+    depsgraph = _depsgraph_of(mesh_object)
+    evaluated = mesh_object.evaluated_get(depsgraph)
+    try:
+        yield evaluated.to_mesh(), evaluated.matrix_world.copy()
+    finally:
+        evaluated.to_mesh_clear()
+
+
+@contextmanager
+def cage_mesh(mesh_object):
+    """Yield the mesh without modifiers, valid inside the block only.
+
+    In Edit Mode it is a copy: writing the edited mesh back would report a change of it.
+    """
+    if mesh_object.mode != "EDIT":
+        yield mesh_object.data
+        return
+    copy = bpy.data.meshes.new("NICMM cage")
+    try:
+        bmesh.from_edit_mesh(mesh_object.data).to_mesh(copy)
+        yield copy
+    finally:
+        bpy.data.meshes.remove(copy)
+
+
+def shown_beyond_the_cage(mesh_object) -> str:
+    """Name the modifiers and shape keys that the viewport shows; may be empty."""
+    shown = []
+    if any(modifier.show_viewport for modifier in mesh_object.modifiers):
+        shown.append("modifiers")
+    keys = mesh_object.data.shape_keys
+    others = [] if keys is None else keys.key_blocks[1:]
+    if any(key.value != 0.0 and not key.mute for key in others):
+        shown.append("shape keys")
+    return " and ".join(shown)
+
+
+def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | None:
+    """Weight of every vertex of the surface in a vertex group; None for an empty name."""
+    if not name:
+        return None
+    index = vertex_group(mesh_object, name).index
+    with shown_mesh(mesh_object, use_modifiers) as (mesh, _):
+        weights = np.zeros(len(mesh.vertices))
+        for number, vertex in enumerate(mesh.vertices):
+            for membership in vertex.groups:
+                if membership.group == index:
+                    weights[number] = membership.weight
+    return weights
+
+
+def vertex_group(mesh_object, name: str):
+    """Return the vertex group with this name."""
+    group = mesh_object.vertex_groups.get(name)
+    if group is None:
+        groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)
+        raise InputError(
+            f'"{mesh_object.name}" has no vertex group "{name}". '
+            + (f"Choose one of {groups}, or leave" if groups else "Add the group, or leave")
+            + " the field empty"
+        )
+    return group
+
+
+def _is_sculpted_without_modifiers(mesh_object) -> bool:
+    """Whether strokes change the mesh only: Blender evaluates it again when the mode is left."""
+    if mesh_object.mode != "SCULPT":
+        return False
+    if mesh_object.use_dynamic_topology_sculpting:
+        raise InputError(
+            f'"{mesh_object.name}" is sculpted with dynamic topology, whose faces Blender does not '
+            "show to extensions. Turn Dyntopo off, or leave Sculpt Mode"
+        )
+    return not shown_beyond_the_cage(mesh_object)
+
+
+def _depsgraph_of(mesh_object):
+    """The dependency graph in which the object is evaluated: that of the window, if it is there."""
+    context = bpy.context
+    if mesh_object.name in context.view_layer.objects:
+        return context.evaluated_depsgraph_get()
+    for scene in mesh_object.users_scene:
+        for layer in scene.view_layers:
+            layer.update()
+            if mesh_object.name in layer.objects:
+                return layer.depsgraph
+    raise InputError(
+        f'"{mesh_object.name}" is in no view layer, so its modifiers are not computed. Bring it '
+        "back to the scene, or turn Use Modifiers off"
+    )
+
+
+def _array(sequence, name: str, width: int, kind) -> np.ndarray:
+    """An attribute of all elements, (n,) or (n, width)."""
+    values = np.empty((len(sequence), width), dtype=kind)
+    sequence.foreach_get(name, values.ravel())
+    return values if width > 1 else values[:, 0]
+
+
+def _keeps_proportions(linear: np.ndarray) -> bool:
+    """Whether a transform is a rotation, mirror image or uniform scale, up to rounding.
+
+    Then the core works in the object's local space, so that rotating the object does not change the
+    curve by rounding.
+    """
+    gram = linear.T @ linear
+    return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))

@@ -1,0 +1,362 @@
+"""Curves lie on the surface that the viewport shows: with modifiers, pose and frame."""
+
+from importlib import import_module
+
+import bpy
+import igl
+import numpy as np
+import pytest
+
+from mathutils import Euler
+
+from tests.blender import scenes
+
+EXACT = 1e-6
+"""Distance from the shown surface, in diagonals."""
+
+
+def module(extension, name):
+    return import_module(f"{extension.name}.nicmm_blender.{name}")
+
+
+def shown(mesh_object):
+    """World positions and triangles of a mesh as the viewport shows it."""
+    evaluated = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    mesh.calc_loop_triangles()
+    positions = scenes.get(mesh.vertices, "co", 3).astype(float)
+    faces = scenes.get(mesh.loop_triangles, "vertices", 3, np.int32).astype(np.int64)
+    world = np.array(evaluated.matrix_world)
+    evaluated.to_mesh_clear()
+    return positions @ world[:3, :3].T + world[:3, 3], faces
+
+
+def in_world(curve):
+    """World positions of the points of either type of object, after its modifiers."""
+    bpy.context.view_layer.update()
+    if curve.type == "CURVES":
+        local = scenes.evaluated_points(curve)
+    else:
+        local = scenes.points(curve).astype(float)
+    world = np.array(curve.matrix_world)
+    return local @ world[:3, :3].T + world[:3, 3]
+
+
+def away(curve, mesh_object):
+    """Greatest distance of a curve's points from the shown surface, in diagonals."""
+    vertices, faces = shown(mesh_object)
+    squared, *_ = igl.point_mesh_squared_distance(in_world(curve), vertices, faces)
+    return float(np.sqrt(squared.max()) / np.linalg.norm(np.ptp(vertices, axis=0)))
+
+
+CHOSEN = (73, 365, 74, 366)
+
+
+def faces_at(faces, vertex):
+    """A triangle with a vertex."""
+    return int((faces == vertex).any(axis=1).argmax())
+
+
+def draw(mesh_object, vertices=CHOSEN, **settings):
+    bpy.context.view_layer.objects.active = mesh_object
+    text = ", ".join(map(str, vertices))
+    assert bpy.ops.nicmm.design_curve(points=text, **settings) == {"FINISHED"}
+    return bpy.context.active_object
+
+
+@pytest.fixture
+def monkey(empty_scene):
+    return scenes.monkey()
+
+
+def subdivision(mesh_object):
+    mesh_object.modifiers.new("Subdivision", "SUBSURF").levels = 1
+
+
+def mirror(mesh_object):
+    mesh_object.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
+
+
+def bevel(mesh_object):
+    mesh_object.modifiers.new("Bevel", "BEVEL").width = 0.01
+
+
+def array(mesh_object):
+    mesh_object.modifiers.new("Array", "ARRAY").count = 3
+
+
+def solidify(mesh_object):
+    mesh_object.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.02
+
+
+def shrinkwrap(mesh_object):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=2.0)
+    modifier = mesh_object.modifiers.new("Shrinkwrap", "SHRINKWRAP")
+    modifier.target, modifier.wrap_mode, modifier.offset = bpy.context.object, "OUTSIDE", 0.1
+
+
+def simple_deform(mesh_object):
+    mesh_object.modifiers.new("Twist", "SIMPLE_DEFORM").angle = 1.0
+
+
+def multires(mesh_object):
+    modifier = mesh_object.modifiers.new("Multires", "MULTIRES")
+    bpy.context.view_layer.objects.active = mesh_object
+    bpy.ops.object.multires_subdivide(modifier=modifier.name, mode="CATMULL_CLARK")
+
+
+def nodes(mesh_object):
+    """Geometry Nodes that subdivide and displace."""
+    group = bpy.data.node_groups.new("Waves", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    made = {
+        kind: group.nodes.new(kind)
+        for kind in (
+            "NodeGroupInput",
+            "GeometryNodeSubdivideMesh",
+            "GeometryNodeSetPosition",
+            "GeometryNodeInputPosition",
+            "ShaderNodeVectorMath",
+            "NodeGroupOutput",
+        )
+    }
+    first, divided, moved, place, sine, last = made.values()
+    sine.operation = "SINE"
+    group.links.new(first.outputs[0], divided.inputs[0])
+    group.links.new(divided.outputs[0], moved.inputs["Geometry"])
+    group.links.new(place.outputs[0], sine.inputs[0])
+    group.links.new(sine.outputs[0], moved.inputs["Offset"])
+    group.links.new(moved.outputs[0], last.inputs[0])
+    mesh_object.modifiers.new("Waves", "NODES").node_group = group
+
+
+def armature(mesh_object):
+    """A bone through the head that an action bends from frame 1 to 20."""
+    bpy.ops.object.armature_add()
+    rig = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones[0]
+    bone.head, bone.tail = (0, 0, -1), (0, 0, 0)
+    upper = rig.data.edit_bones.new("Upper")
+    upper.head, upper.tail, upper.parent = (0, 0, 0), (0, 0, 1), bone
+    names = bone.name, upper.name
+    bpy.ops.object.mode_set(mode="OBJECT")
+    height = scenes.positions(mesh_object)[:, 2]
+    for name, weights in zip(names, (height < 0.1, height >= 0.1), strict=True):
+        group = mesh_object.vertex_groups.new(name=name)
+        group.add(np.flatnonzero(weights).tolist(), 1.0, "REPLACE")
+    mesh_object.modifiers.new("Armature", "ARMATURE").object = rig
+    posed = rig.pose.bones["Upper"]
+    posed.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (20, 0.8)):
+        posed.rotation_euler = (angle, 0.3 * angle, 0.0)
+        posed.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(20)
+    return rig
+
+
+def armature_and_subdivision(mesh_object):
+    armature(mesh_object)
+    subdivision(mesh_object)
+
+
+def scaled_under_a_rotated_parent(mesh_object):
+    bpy.ops.object.empty_add(rotation=(0.4, 0.2, 0.9))
+    mesh_object.parent = bpy.context.object
+    mesh_object.scale = (1.0, 0.3, 2.0)
+    mesh_object.rotation_euler = Euler((0.5, 0.1, 0.7))
+    subdivision(mesh_object)
+
+
+WAYS = (
+    subdivision,
+    mirror,
+    bevel,
+    armature,
+    armature_and_subdivision,
+    array,
+    solidify,
+    shrinkwrap,
+    simple_deform,
+    nodes,
+    multires,
+    scaled_under_a_rotated_parent,
+)
+
+
+@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+@pytest.mark.parametrize("change", WAYS, ids=lambda way: way.__name__)
+def test_curves_lie_on_the_shown_surface(monkey, change, output):
+    change(monkey)
+    before = scenes.positions(monkey), len(monkey.data.attributes)
+    curve = draw(monkey, output=output)
+    assert away(curve, monkey) < EXACT
+    np.testing.assert_array_equal(scenes.positions(monkey), before[0])
+    assert len(monkey.data.attributes) == before[1]
+    assert not bpy.data.scenes.get("NICMM cage") and len(bpy.data.scenes) == 1
+    assert all(modifier.show_viewport for modifier in monkey.modifiers)
+
+
+@pytest.mark.parametrize("change", [subdivision, armature_and_subdivision, mirror])
+def test_points_are_the_selected_vertices_where_they_are_shown(monkey, change):
+    change(monkey)
+    chosen = list(CHOSEN)
+    curve = draw(monkey, chosen)
+    vertices, _ = shown(monkey)  # these modifiers keep vertices in front
+    assert scenes.distances_to(vertices[chosen], in_world(curve)).max() < 1e-6
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT", "WEIGHT_PAINT"])
+def test_every_mode_shows_the_same_surface(monkey, empty_scene, mode):
+    subdivision(monkey)
+    surface = module(empty_scene, "scene.surface")
+    before = surface.read(monkey, True)
+    bpy.ops.object.mode_set(mode=mode)
+    now = surface.read(monkey, True)
+    for name in ("local", "faces", "loops", "polygons"):
+        np.testing.assert_array_equal(getattr(now, name), getattr(before, name))
+    np.testing.assert_array_equal(now.cage.vertices, before.cage.vertices)
+
+
+def test_weights_are_those_that_modifiers_interpolate(monkey, empty_scene):
+    group = monkey.vertex_groups.new(name="Wall")
+    group.add(list(range(200)), 0.7, "REPLACE")
+    surface = module(empty_scene, "scene.surface")
+    cage = surface.group_weights(monkey, "Wall", False)
+    subdivision(monkey)
+    weights = surface.group_weights(monkey, "Wall", True)
+    assert len(weights) > len(cage) == len(monkey.data.vertices)
+    np.testing.assert_allclose(weights[: len(cage)], cage)
+    between = (weights > 0.01) & (weights < 0.69)
+    assert between.any()
+
+
+def test_a_wall_keeps_the_curve_away_on_the_shown_surface(monkey):
+    group = monkey.vertex_groups.new(name="Wall")
+    monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    free = in_world(draw(monkey))
+    place = free[len(free) // 8]
+    near = np.linalg.norm(scenes.positions(monkey) - place, axis=1) < 0.25
+    near[list(CHOSEN)] = False
+    group.add(np.flatnonzero(near).tolist(), 1.0, "REPLACE")
+    curve = draw(monkey, obstacle_group="Wall")
+    assert away(curve, monkey) < EXACT
+    assert np.linalg.norm(in_world(curve) - place, axis=1).min() > 0.05
+
+
+@pytest.mark.parametrize("levels", [(1, 2), (2, 1), (1, 0)])
+def test_points_survive_a_change_of_level(monkey, levels):
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = levels[0]
+    vertices, faces = shown(monkey)
+    places = vertices[faces[[faces_at(faces, vertex) for vertex in CHOSEN]]].mean(axis=1)
+    points = [{"name": "", "position": tuple(place)} for place in places]
+    bpy.context.view_layer.objects.active = monkey
+    assert bpy.ops.nicmm.edit_curve(points=points, closed=False) == {"FINISHED"}
+    curve = bpy.context.active_object
+    modifier.levels = levels[1]
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
+    ends = in_world(curve)[[0, -1]]
+    # A level changes the shape itself.
+    assert scenes.distances_to(places[[0, -1]], ends).max() < 0.02 * diagonal
+    assert away(curve, monkey) < 1e-4
+
+
+def test_points_stay_in_their_half_of_a_mirror(monkey):
+    mirror(monkey)
+    monkey.modifiers["Mirror"].use_mirror_merge = False
+    monkey.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    vertices, faces = shown(monkey)
+    places = vertices[faces[[faces_at(faces, vertex) for vertex in CHOSEN]]].mean(axis=1)
+    places *= [1, 1, -1]
+    points = [{"name": "", "position": tuple(place)} for place in places]
+    assert bpy.ops.nicmm.edit_curve(points=points, closed=False) == {"FINISHED"}
+    curve = bpy.context.active_object
+    monkey.modifiers["Subdivision"].levels = 2
+    monkey.modifiers["Mirror"].use_axis = (False, True, False)  # another mirror image
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    expected = places * [1, 1, -1] * [1, -1, 1]
+    ends = in_world(curve)[[0, -1]]
+    assert scenes.distances_to(ends, expected).max() < 0.05
+
+
+def test_a_curve_on_the_cage_moves_to_the_shown_surface(monkey):
+    curve = draw(monkey, use_modifiers=False)
+    subdivision(monkey)
+    bpy.context.scene.nicmm_curves.use_modifiers = True
+    assert bpy.ops.nicmm.update_curves(use_panel=True) == {"FINISHED"}
+    vertices, _ = shown(monkey)
+    assert scenes.distances_to(vertices[list(CHOSEN)], in_world(curve)).max() < 2e-3
+
+
+def test_the_pose_is_followed(monkey):
+    armature_and_subdivision(monkey)
+    curve = draw(monkey)
+    for frame in (1, 7, 13, 20):
+        bpy.context.scene.frame_set(frame)
+        assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+        assert away(curve, monkey) < 1e-4
+
+
+def test_sticky_curves_follow_an_animated_pose(monkey):
+    armature_and_subdivision(monkey)
+    curve = draw(monkey, output="STICKY")
+    for frame in range(1, 21):
+        bpy.context.scene.frame_set(frame)
+        assert away(curve, monkey) < EXACT
+
+
+@pytest.mark.parametrize("level", [0, 2, 3])
+def test_sticky_curves_follow_another_level(monkey, level):
+    """As a render with more levels shows them."""
+    armature_and_subdivision(monkey)
+    curve = draw(monkey, output="STICKY")
+    before = in_world(curve)
+    monkey.modifiers["Subdivision"].levels = level
+    for frame in (20, 5):
+        bpy.context.scene.frame_set(frame)
+        assert away(curve, monkey) < EXACT
+    bpy.context.scene.frame_set(20)
+    # Suzanne without the modifier is larger.
+    assert scenes.distances_to(before, in_world(curve)).max() < (0.05 if level else 0.15)
+
+
+@pytest.mark.parametrize("change", [armature, simple_deform, shrinkwrap])
+def test_cuts_are_exact_where_modifiers_only_deform(monkey, change):
+    change(monkey)
+    bpy.context.view_layer.objects.active = monkey
+    curve = draw(monkey)
+    line = in_world(curve)
+    bpy.ops.nicmm.convert_curve(output="EDGES", cut_faces="TRIANGLES", simplify=0.0)
+    chain = [edge for edge in monkey.data.edges if edge.use_seam]
+    vertices, _ = shown(monkey)
+    on = vertices[sorted({v for edge in chain for v in edge.vertices})]
+    if change is armature:  # the weights of new vertices are those of the edges that they divide
+        assert scenes.distances_to(line, on).max() < 0.05
+    assert len(chain) > 20
+
+
+@pytest.mark.parametrize("output", ["EDGES", "REGION", "PARTS"])
+def test_cuts_are_refused_where_modifiers_generate_faces(monkey, output):
+    subdivision(monkey)
+    count = len(monkey.data.vertices)
+    with pytest.raises(RuntimeError, match="Apply them, or turn Use Modifiers off"):
+        draw(monkey, output=output)
+    assert len(monkey.data.vertices) == count
+    draw(monkey, output=output, use_modifiers=False)
+
+
+def test_a_linked_mesh_is_not_written_to(monkey, tmp_path):
+    subdivision(monkey)
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {monkey})
+    name = monkey.name
+    bpy.data.objects.remove(monkey)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = [name]
+    (linked,) = wanted.objects
+    bpy.context.scene.collection.objects.link(linked)
+    curve = draw(linked)
+    assert away(curve, linked) < EXACT
