@@ -117,9 +117,46 @@ class OutputProperties:
         ),
         default="CURVE",
     )
+    spline: EnumProperty(
+        name="Spline",
+        description="The points of the curve object",
+        items=(
+            (
+                "EVEN",
+                "Even",
+                "Evenly spaced from control point to control point, within a ten-thousandth of the "
+                "size of the mesh and a tenth of the radius",
+            ),
+            ("EXACT", "Exact", "Every crossing with an edge of the mesh: exactly on its faces"),
+            (
+                "BEZIER",
+                "Bézier",
+                "Few knots with handles, the control points among them. Sticky curves are spaced "
+                "evenly instead",
+            ),
+        ),
+        default="EVEN",
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="Radius of the curve. Zero: a share of the size of the mesh, Thickness",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        subtype="DISTANCE",
+    )
+    offset: FloatProperty(
+        name="Offset",
+        description="Distance of the curve from the surface along its normals",
+        default=0.0,
+        soft_min=-1.0,
+        soft_max=1.0,
+        subtype="DISTANCE",
+    )
     thickness: FloatProperty(
         name="Thickness",
-        description="Radius of the curve relative to the size of the mesh. Zero gives a line",
+        description="Radius of the curve relative to the size of the mesh, if Radius is zero. Zero "
+        "gives a line",
         default=0.004,
         min=0.0,
         soft_max=0.05,
@@ -255,7 +292,10 @@ def draw_output(layout, properties) -> None:
     output = properties.output
     cuts = output in {"EDGES", "PARTS"} or (output == "REGION" and properties.region_cut)
     shown = {
-        "thickness": output in writing.SEPARATE,
+        "spline": output in writing.SEPARATE,
+        "radius": output in writing.SEPARATE,
+        "thickness": output in writing.SEPARATE and not properties.radius,
+        "offset": output in writing.SEPARATE,
         "tube": output == "STICKY",
         "region_as": output == "REGION",
         "region_cut": output == "REGION",

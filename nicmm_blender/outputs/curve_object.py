@@ -1,43 +1,147 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a polyline on a mesh as a Blender curve object, and links new objects to the scene."""
+"""Writes splines as a Blender curve object, and links new objects to the scene.
+
+A curve object is a child of its mesh object. Where that is scaled differently along its axes, the
+child has a space of its own without scale: a tube would be flat in that of the mesh.
+"""
 
 import bpy
 import numpy as np
 
+from mathutils import Matrix
 
-def polyline_object(mesh_object, polylines, thickness: float):
-    """Make a curve object with one POLY spline for each (points, closed) pair.
+from .clean_curves import Knots
 
-    POLY splines lie on the surface; NURBS and Bézier splines would not. The points are in the
-    mesh's local space.
-    """
+
+def new_object(mesh_object, surface, splines, radius: float):
+    """Make a curve object from splines of `clean_curves`; the radius is in scene units."""
     name = f"{mesh_object.name} Curve"
     curve = bpy.data.curves.new(name, "CURVE")
     curve.dimensions = "3D"
-    curve.bevel_depth = thickness
     curve.use_fill_caps = True
-    write_polylines(curve, polylines)
-    return bpy.data.objects.new(name, curve)
+    made = bpy.data.objects.new(name, curve)
+    adopt(made, mesh_object, surface)
+    curve.bevel_depth = radius / scale_of(made, surface)
+    write_splines(made, splines)
+    return made
 
 
-def write_polylines(curve, polylines) -> None:
-    """Replace the splines of a curve, with one for each (points, closed) pair."""
-    materials = [spline.material_index for spline in curve.splines]
+def adopt(made, mesh_object, surface) -> None:
+    """Make an object a child of the mesh, in the mesh's local space or in one without scale."""
+    made.parent = mesh_object
+    if surface.keeps_proportions:
+        made.matrix_parent_inverse = Matrix()
+        return
+    to_world = surface.placement
+    left, _, right = np.linalg.svd(to_world[:3, :3])
+    rigid = np.eye(4)
+    rigid[:3, :3] = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    rigid[:3, 3] = to_world[:3, 3]
+    made.matrix_parent_inverse = Matrix((np.linalg.inv(to_world) @ rigid).tolist())
+
+
+def scale_of(made, surface) -> float:
+    """Length in the scene of a unit of a child's space."""
+    inverse = np.array(made.matrix_parent_inverse)[:3, :3]
+    return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
+
+
+def in_its_space(made, points: np.ndarray) -> np.ndarray:
+    """Points in the mesh's local space, (n, 3), in the space of a child."""
+    if made.parent is None or made.matrix_parent_inverse == Matrix():
+        return points
+    to_child = np.linalg.inv(np.array(made.matrix_parent_inverse))
+    return points @ to_child[:3, :3].T + to_child[:3, 3]
+
+
+def write_splines(made, splines) -> None:
+    """Replace the splines of a curve object; materials, radii and tilts of its points stay."""
+    curve = made.data
+    before = [_Profile(spline) for spline in curve.splines]
     curve.splines.clear()
-    for number, (points, closed) in enumerate(polylines):
-        spline = curve.splines.new("POLY")
-        spline.points.add(len(points) - 1)
-        homogeneous = np.ones((len(points), 4), dtype=np.float32)
-        homogeneous[:, :3] = points
-        spline.points.foreach_set("co", homogeneous.ravel())
-        spline.use_cyclic_u = closed
-        if number < len(materials):
-            spline.material_index = materials[number]
+    for number, given in enumerate(splines):
+        if isinstance(given, Knots):
+            spline = _bezier_spline(made, given)
+        else:
+            spline = _poly_spline(made, given)
+        spline.use_cyclic_u = given.closed
+        if number < len(before):
+            before[number].give_to(spline)
+
+
+def _poly_spline(made, polyline):
+    spline = made.data.splines.new("POLY")
+    spline.points.add(len(polyline.points) - 1)
+    homogeneous = np.ones((len(polyline.points), 4), dtype=np.float32)
+    homogeneous[:, :3] = in_its_space(made, polyline.points)
+    spline.points.foreach_set("co", homogeneous.ravel())
+    return spline
+
+
+def _bezier_spline(made, knots: Knots):
+    spline = made.data.splines.new("BEZIER")
+    spline.bezier_points.add(len(knots.points) - 1)
+    for point, smooth in zip(spline.bezier_points, knots.smooth.tolist(), strict=True):
+        kind = "ALIGNED" if smooth else "FREE"
+        point.handle_left_type = point.handle_right_type = kind
+    for name, values in (
+        ("co", knots.points),
+        ("handle_left", knots.left),
+        ("handle_right", knots.right),
+    ):
+        values = in_its_space(made, values).astype(np.float32)
+        spline.bezier_points.foreach_set(name, values.ravel())
+    return spline
+
+
+class _Profile:
+    """Material of a spline, and radii and tilts along it."""
+
+    NEUTRAL = (("radius", 1.0), ("tilt", 0.0))
+
+    def __init__(self, spline) -> None:
+        self.material = spline.material_index
+        self.along = _along(spline)
+        self.values = {name: _get(_points_of(spline), name) for name, _ in self.NEUTRAL}
+        self.cyclic = spline.use_cyclic_u
+
+    def give_to(self, spline) -> None:
+        """Interpolate radii and tilts by the share of the length."""
+        spline.material_index = self.material
+        for name, neutral in self.NEUTRAL:
+            values = self.values[name]
+            if len(values) and (values != neutral).any():
+                along, values = self.along[: len(values)], values
+                if self.cyclic:
+                    along, values = np.append(along, 1.0), np.append(values, values[0])
+                found = np.interp(_along(spline)[: len(_points_of(spline))], along, values)
+                _points_of(spline).foreach_set(name, found.astype(np.float32))
+
+
+def _points_of(spline):
+    return spline.bezier_points if spline.type == "BEZIER" else spline.points
+
+
+def _along(spline) -> np.ndarray:
+    """The share of the length before each point; of a cyclic spline, 1 is the first again."""
+    points = _points_of(spline)
+    width = 3 if spline.type == "BEZIER" else 4
+    places = np.empty((len(points), width), dtype=np.float32)
+    points.foreach_get("co", places.ravel())
+    if spline.use_cyclic_u:
+        places = np.concatenate([places, places[:1]])
+    lengths = np.linalg.norm(np.diff(places[:, :3], axis=0), axis=1)
+    return np.append(0.0, np.cumsum(lengths)) / max(float(lengths.sum()), 1e-30)
+
+
+def _get(points, name: str) -> np.ndarray:
+    values = np.empty(len(points), dtype=np.float32)
+    points.foreach_get(name, values)
+    return values
 
 
 def place(context, mesh_object, curve_object) -> None:
-    """Link a new curve to the scene as a child of the mesh object, so that it moves with it."""
-    curve_object.parent = mesh_object
+    """Link a new curve to the scene, and select it."""
     link(context, mesh_object, curve_object)
     _select(context, curve_object)
 

@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 
 from . import sticky_nodes
+from .clean_curves import on_surface
+from .curve_object import adopt, in_its_space, scale_of
 
 
 def are_drawn_with_all_points() -> bool:
@@ -22,40 +24,59 @@ def are_drawn_with_all_points() -> bool:
     return "CYLINDER" in shapes
 
 
-def add(mesh_object, surface, curves, radius: float, tube: bool):
+def add(mesh_object, surface, curves, drawing, tube: bool):
     """Create the object without linking it to a collection."""
     name = f"{mesh_object.name} Curve"
-    data = bpy.data.hair_curves.new(name)
-    write(data, surface, curves, radius)
-    curves_object = bpy.data.objects.new(name, data)
-    sticky_nodes.add_modifier(curves_object, mesh_object, tube)
-    return curves_object
+    made = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
+    adopt(made, mesh_object, surface)
+    write(made, surface, curves, drawing)
+    radius = np.full(len(made.data.points), drawing.radius / scale_of(made, surface))
+    _set(made.data, "radius", "FLOAT", "POINT", radius)
+    sticky_nodes.add_modifier(made, mesh_object, tube)
+    return made
 
 
-def write(data, surface, curves, radius: float | None = None, offset: float = 0.0) -> None:
-    """Replace the curves of a hair curves data-block; without a `radius`, keep the present one."""
-    if radius is None:
-        before = data.attributes.get("radius")
-        radius = before.data[0].value if before is not None and len(before.data) else 0.0
+def write(made, surface, curves, drawing) -> None:
+    """Replace the curves of a hair curves object; radii of its points stay."""
+    data = made.data
+    radii = _radii(data)
+    curves = on_surface(surface, curves, drawing)
     if len(data.curves):
         data.remove_curves()
     data.add_curves([len(curve.faces) for curve in curves])
     faces = np.concatenate([curve.faces for curve in curves])
     barycentric = np.concatenate([curve.barycentric for curve in curves])
-    points = surface.points(faces, barycentric)
+    points = in_its_space(made, surface.points(faces, barycentric))
     data.points.foreach_set("position", points.astype(np.float32).ravel())
-    _set(data, "radius", "FLOAT", "POINT", np.full(len(faces), radius))
+    shares = (np.arange(len(faces)) + 0.5) / len(faces)
+    _set(data, "radius", "FLOAT", "POINT", np.interp(shares, *radii))
     _set(data, "cyclic", "BOOLEAN", "CURVE", np.array([curve.closed for curve in curves]))
     _set(data, "face", "INT", "POINT", surface.polygons[faces])
     vertices = np.full(len(faces), len(surface.local))
     _set(data, sticky_nodes.VERTICES, "INT", "POINT", vertices)
     _set(data, sticky_nodes.BARYCENTRIC, "FLOAT_VECTOR", "POINT", barycentric)
-    _set(data, sticky_nodes.OFFSET, "FLOAT", "POINT", np.full(len(faces), offset))
+    offset = np.full(len(faces), drawing.offset / scale_of(made, surface))
+    _set(data, sticky_nodes.OFFSET, "FLOAT", "POINT", offset)
     cage_corners, cage_offset = on_cage(surface, faces, barycentric)
     _set(data, sticky_nodes.CAGE_OFFSET, "FLOAT_VECTOR", "POINT", cage_offset)
     for corner in range(3):
         _set(data, sticky_nodes.CORNERS[corner], "INT", "POINT", surface.faces[faces, corner])
         _set(data, sticky_nodes.CAGE_CORNERS[corner], "INT", "POINT", cage_corners[:, corner])
+
+
+def radius_of(data) -> float:
+    """The greatest radius of the points."""
+    return float(_radii(data)[1].max())
+
+
+def _radii(data) -> tuple[np.ndarray, np.ndarray]:
+    """Radii along all curves: shares of the points, and values; zero without points."""
+    attribute = data.attributes.get("radius")
+    if attribute is None or not len(attribute.data):
+        return np.zeros(1), np.zeros(1)
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return (np.arange(len(values)) + 0.5) / len(values), values
 
 
 def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ import bmesh
 from ..scene import curve_record
 from ..scene.messages import InputError
 from . import curve_object, mesh_cut, sticky_curves
+from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
 SEPARATE = ("CURVE", "STICKY")
 """Outputs that are objects of their own."""
@@ -39,7 +40,7 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
     """
     if settings.output in SEPARATE:
         made = as_object(mesh_object, surface, curves, settings)
-        curve_record.remember(made, mesh_object, surface, curves, asked)
+        curve_record.remember(made, mesh_object, surface, curves, asked, drawn_as(settings))
         curve_object.place(context, mesh_object, made)
         return f"{sum(len(curve.faces) for curve in curves)} points"
     if len(curves) != 1:
@@ -60,18 +61,32 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
 
 def as_object(mesh_object, surface, curves, settings):
     """Create a curve object without linking it to a collection."""
-    thickness = settings.thickness * surface.diagonal
+    radius = automatic_radius(surface, settings.radius, settings.thickness)
+    drawing = Drawing(settings.spline, radius, settings.offset)
     if settings.output == "STICKY":
-        return sticky_curves.add(mesh_object, surface, curves, thickness, settings.tube)
-    return curve_object.polyline_object(mesh_object, _polylines(surface, curves), thickness)
+        return sticky_curves.add(mesh_object, surface, curves, drawing, settings.tube)
+    return curve_object.new_object(mesh_object, surface, splines(surface, curves, drawing), radius)
 
 
 def redraw(drawn, surface, curves) -> None:
-    """Replace the curves in a curve object; its thickness, materials and modifiers stay."""
+    """Replace the curves in a curve object; its radius, materials and modifiers stay."""
+    kind = curve_record.drawn_as(drawn)
+    if kind is None:  # of a version before, in the space of its mesh
+        kind = {"spline": EXACT, "offset": 0.0}
+    elif drawn.parent is not None and drawn.parent == curve_record.mesh_of(drawn):
+        curve_object.adopt(drawn, drawn.parent, surface)
+    scale = curve_object.scale_of(drawn, surface)
     if drawn.type == "CURVES":
-        sticky_curves.write(drawn.data, surface, curves)
+        radius = sticky_curves.radius_of(drawn.data)
+        sticky_curves.write(drawn, surface, curves, Drawing(radius=radius * scale, **kind))
     else:
-        curve_object.write_polylines(drawn.data, _polylines(surface, curves))
+        drawing = Drawing(radius=drawn.data.bevel_depth * scale, **kind)
+        curve_object.write_splines(drawn, splines(surface, curves, drawing))
+
+
+def drawn_as(settings) -> dict:
+    """The settings of a drawing that a record holds."""
+    return {"spline": settings.spline, "offset": settings.offset}
 
 
 def check_replaceable(designed) -> None:
@@ -94,12 +109,13 @@ def replace(designed, request, answer) -> None:
         raise InputError(str(answer.status))
     redraw(designed, request.surface, answer.curves)
     curve_record.remember(
-        designed, request.mesh_object(), request.surface, answer.curves, request.asked
+        designed,
+        request.mesh_object(),
+        request.surface,
+        answer.curves,
+        request.asked,
+        curve_record.drawn_as(designed),
     )
-
-
-def _polylines(surface, curves) -> list:
-    return [(surface.points(curve.faces, curve.barycentric), curve.closed) for curve in curves]
 
 
 def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cutting:

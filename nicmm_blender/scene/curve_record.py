@@ -97,10 +97,13 @@ def asked_by(properties) -> Asked:
     return Asked(**{field.name: getattr(properties, field.name) for field in fields(Asked)})
 
 
-def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=None) -> None:
-    """Store the positions of curves on the mesh, and their settings.
+def remember(
+    curve_object, mesh_object, surface, curves, asked: Asked, drawn: dict | None, controls=None
+) -> None:
+    """Store the positions of curves on the mesh, their settings and how they are drawn.
 
-    `controls` are the control points as SurfacePoints of the core; by default those of the curves.
+    `drawn` is None for an object of a version that drew all points. `controls` are the control
+    points as SurfacePoints of the core; by default those of the curves.
     """
     if controls is None:
         found = [curve.control_index[curve.control_index >= 0] for curve in curves]
@@ -130,6 +133,7 @@ def remember(curve_object, mesh_object, surface, curves, asked: Asked, controls=
         "control_barycentric": control_barycentric.ravel().tolist(),
         **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
         "asked": asdict(asked),
+        **({} if drawn is None else {"drawn": drawn}),
     }
     # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DESIGNED_ON] = digest(mesh_object, surface, asked)
@@ -264,6 +268,12 @@ def asked_of(curve_object) -> Asked:
             for field in fields(Asked)
         }
     )
+
+
+def drawn_as(curve_object) -> dict | None:
+    """How a curve is drawn; None if a version made it that drew all points."""
+    found = curve_object[KEY].get("drawn")
+    return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
 
 
 def surface_of(curve_object, mesh_object):

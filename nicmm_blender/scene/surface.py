@@ -58,15 +58,25 @@ class Surface:
         """Positions in the object's local space of points given by face and barycentrics."""
         return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
 
-    def normals(self, faces: np.ndarray) -> np.ndarray:
-        """Normals of faces, (n, 3), in the object's local space; zero where a face is flat."""
-        corners = self.local[self.faces[faces]]
-        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal in the object's local space."""
         return float(np.linalg.norm(np.ptp(self.local, axis=0)))
+
+    @property
+    def scale(self) -> float:
+        """Length in the scene of a unit of the object's local space, on average."""
+        return float(np.cbrt(abs(np.linalg.det(self.placement[:3, :3]))))
+
+    @property
+    def unit(self) -> float:
+        """Length in the scene of a unit of the core's space."""
+        return self.scale if self.keeps_proportions else 1.0
+
+    @property
+    def keeps_proportions(self) -> bool:
+        """Whether the object is not scaled differently along its axes."""
+        return bool((self.linear == np.eye(3)).all())
 
 
 def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:

@@ -84,6 +84,9 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         ),
         default="CURVE",
     )
+    spline: _OUTPUT["spline"]
+    radius: _OUTPUT["radius"]
+    offset: _OUTPUT["offset"]
     thickness: _OUTPUT["thickness"]
     tube: _OUTPUT["tube"]
     curve: bpy.props.StringProperty(
@@ -115,14 +118,15 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         mesh_object = mesh_data.mesh_object(context)
-        for name in ("closed", "smoothness"):
+        for name in ("closed", "smoothness", "use_modifiers"):
             layout.prop(self, name)
         for name in ("obstacle_group", "alignment_group"):
             layout.prop_search(self, name, mesh_object, "vertex_groups")
         layout.prop(self, "clearance")
         if not self.curve:
-            layout.prop(self, "output")
-            layout.prop(self, "thickness")
+            for name in ("output", "spline", "radius", "thickness", "offset"):
+                if name != "thickness" or not self.radius:
+                    layout.prop(self, name)
             if self.output == "STICKY":
                 layout.prop(self, "tube")
 

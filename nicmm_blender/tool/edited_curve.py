@@ -76,7 +76,7 @@ def open_session(context, edited, asked: Asked) -> Opened:
 def keep(context, opened: Opened, edited, settings):
     """Write a session's curve into the edited object, or a new one; return the object.
 
-    `settings` holds the `output`, `thickness` and `tube` of a new one.
+    `settings` holds the output settings of a new one.
     """
     session, mesh_object = opened.session, opened.mesh_object
     surface, curves = session.surface, [session.curve]
@@ -85,7 +85,8 @@ def keep(context, opened: Opened, edited, settings):
         made = writing.as_object(mesh_object, surface, curves, settings)
     else:
         writing.redraw(edited, surface, curves)
-    curve_record.remember(made, mesh_object, surface, curves, session.asked, session.points)
+    drawn = writing.drawn_as(settings) if edited is None else curve_record.drawn_as(edited)
+    curve_record.remember(made, mesh_object, surface, curves, session.asked, drawn, session.points)
     if edited is None:
         curve_object.place(context, mesh_object, made)
     return made

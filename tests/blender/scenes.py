@@ -75,8 +75,11 @@ def curves():
 
 
 def points(curve_object, spline=0):
-    """Positions of a curve's points in its local space."""
-    return np.array([point.co[:3] for point in curve_object.data.splines[spline].points])
+    """Positions of a curve's points in the local space of its parent."""
+    points = curve_object.data.splines[spline].points
+    own = get(points, "co", 4).astype(float)[:, :3]
+    inverse = np.array(curve_object.matrix_parent_inverse)
+    return own @ inverse[:3, :3].T + inverse[:3, 3]
 
 
 def distances_to(targets, polyline):

@@ -27,13 +27,13 @@ def as_points(positions):
 
 
 def edit(**arguments):
-    assert bpy.ops.nicmm.edit_curve(**arguments) == {"FINISHED"}
+    assert bpy.ops.nicmm.edit_curve(spline="EXACT", **arguments) == {"FINISHED"}
     return bpy.context.active_object
 
 
 def refusal(**arguments):
     with pytest.raises(RuntimeError) as caught:
-        bpy.ops.nicmm.edit_curve(**arguments)
+        bpy.ops.nicmm.edit_curve(spline="EXACT", **arguments)
     return str(caught.value)
 
 
@@ -194,7 +194,7 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
 def test_a_curve_through_vertices_can_be_edited(empty_scene, sphere):
     vertices = scenes.ring(sphere, 5, height=0.2)
     scenes.select(sphere, vertices)
-    bpy.ops.nicmm.design_curve(smoothness=3.0)
+    bpy.ops.nicmm.design_curve(spline="EXACT", smoothness=3.0)
     curve = bpy.context.active_object
     np.testing.assert_allclose(controls(curve), scenes.positions(sphere)[vertices], atol=ROUNDING)
     before = scenes.points(curve)
@@ -224,7 +224,7 @@ def test_sticky_curves_are_edited_in_place(sphere, places):
 @pytest.mark.slow
 def test_converted_curves_can_be_edited(sphere, places):
     edit(points=as_points(places), smoothness=2.0)
-    bpy.ops.nicmm.convert_curve(output="STICKY")
+    bpy.ops.nicmm.convert_curve(spline="EXACT", output="STICKY")
     sticky = bpy.context.active_object
     np.testing.assert_allclose(controls(sticky), places, atol=ROUNDING)
     assert sticky["nicmm_curve"]["asked"]["smoothness"] == 2.0
@@ -258,7 +258,7 @@ def test_on_a_changed_mesh_points_move_to_the_nearest_position(sphere, places, c
     edit()
     assert "the mesh has changed: 5 points" in capfd.readouterr().out
     np.testing.assert_allclose(controls(curve), places, atol=1e-5)
-    bpy.ops.nicmm.convert_curve(output="CURVE")
+    bpy.ops.nicmm.convert_curve(spline="EXACT", output="CURVE")
 
 
 def test_a_deleted_group_is_left_out(sphere, places, capfd):

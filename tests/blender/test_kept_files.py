@@ -103,7 +103,9 @@ def test_a_curve_is_converted(kept, name, output):
     curve = bpy.data.objects[name]
     scenes.activate(curve)
     before = drawn(curve)
-    assert bpy.ops.nicmm.convert_curve(output=output, keep_original=True) == {"FINISHED"}
+    assert bpy.ops.nicmm.convert_curve(output=output, keep_original=True, spline="EXACT") == {
+        "FINISHED"
+    }
     np.testing.assert_allclose(drawn(bpy.context.active_object), before, atol=ROUNDING)
 
 

@@ -23,7 +23,7 @@ def reported_error(**arguments):
     before = [(found.name, found.select_get()) for found in bpy.data.objects]
     active = bpy.context.active_object
     with pytest.raises(RuntimeError) as caught:
-        bpy.ops.nicmm.design_curve(**arguments)
+        bpy.ops.nicmm.design_curve(spline="EXACT", **arguments)
     assert [(found.name, found.select_get()) for found in bpy.data.objects] == before
     assert bpy.context.active_object == active
     assert not bpy.data.curves
@@ -38,7 +38,7 @@ def test_equals_the_core(empty_scene, mode):
     expected = design(empty_scene.core, sphere, vertices)
     bpy.ops.object.mode_set(mode=mode)
 
-    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
 
     (curve,) = scenes.curves()
     (spline,) = curve.data.splines
@@ -54,7 +54,7 @@ def test_alternatives_become_curves_of_their_own(empty_scene):
     scenes.select(torus, vertices)
     expected = design(empty_scene.core, torus, vertices, alternatives=2)
     assert expected.alternatives
-    assert bpy.ops.nicmm.design_curve(alternatives=2) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", alternatives=2) == {"FINISHED"}
     made = scenes.curves()
     every = [expected, *expected.alternatives]
     assert len(made) == len(every)
@@ -90,7 +90,7 @@ def test_settings_reach_the_core(empty_scene, settings, arguments):
     scenes.select(sphere, vertices)
     expected = design(empty_scene.core, sphere, vertices, **arguments)
 
-    bpy.ops.nicmm.design_curve(**settings)
+    bpy.ops.nicmm.design_curve(spline="EXACT", **settings)
 
     (curve,) = scenes.curves()
     np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
@@ -113,7 +113,7 @@ def test_vertex_groups_are_maps(empty_scene):
     )
     plain = design(empty_scene.core, sphere, vertices)
 
-    bpy.ops.nicmm.design_curve(obstacle_group="Walls", alignment_group="Rails")
+    bpy.ops.nicmm.design_curve(spline="EXACT", obstacle_group="Walls", alignment_group="Rails")
 
     points = scenes.points(scenes.curves()[0])
     np.testing.assert_allclose(points, expected.curves[0].points, atol=ROUNDING)
@@ -124,7 +124,7 @@ def test_complete_history_gives_the_order(empty_scene):
     sphere = scenes.sphere()
     vertices = scenes.ring(sphere, 5)[::-1]
     scenes.select(sphere, vertices)
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     expected = design(empty_scene.core, sphere, vertices, order="given").curves[0]
     points = scenes.points(bpy.context.active_object)
     np.testing.assert_allclose(points, expected.points, atol=ROUNDING)
@@ -139,7 +139,7 @@ def test_incomplete_history_leaves_the_shortest_order(empty_scene, remembered):
     sphere = scenes.sphere()
     vertices = sorted(scenes.ring(sphere, 5))
     scenes.select(sphere, vertices, history=vertices[:remembered])
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     expected = design(empty_scene.core, sphere, vertices, order="shortest").curves[0]
     points = scenes.points(bpy.context.active_object)
     np.testing.assert_allclose(points, expected.points, atol=ROUNDING)
@@ -160,7 +160,7 @@ def test_report_says_which_order_was_used(empty_scene, capfd):
         bpy.context.view_layer.objects.active = sphere
         scenes.select(sphere, scenes.ring(sphere, 4), history)
         capfd.readouterr()
-        bpy.ops.nicmm.design_curve()
+        bpy.ops.nicmm.design_curve(spline="EXACT")
         assert words in capfd.readouterr().out
 
 
@@ -175,7 +175,7 @@ def test_curve_object_belongs_to_the_mesh(empty_scene):
     sphere.rotation_euler = (0.3, 0.2, 1.0)
     scenes.select(sphere, scenes.ring(sphere, 3))
 
-    bpy.ops.nicmm.design_curve(thickness=0.01)
+    bpy.ops.nicmm.design_curve(spline="EXACT", thickness=0.01)
 
     curve = bpy.context.active_object
     bpy.context.view_layer.update()
@@ -193,10 +193,10 @@ def test_runs_again_while_the_new_curve_is_active(empty_scene):
     """As Blender's redo panel needs it."""
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 3))
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     assert bpy.context.active_object.type == "CURVE"
     assert bpy.ops.nicmm.design_curve.poll()
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     assert [curve.parent for curve in scenes.curves()] == [sphere, sphere]
 
 
@@ -204,7 +204,7 @@ def test_edit_mode_stays(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 3))
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     assert bpy.context.mode == "EDIT_MESH"
     assert bpy.context.active_object == sphere
     assert scenes.curves()[0].select_get()
@@ -233,11 +233,11 @@ def test_lengths_are_those_of_the_scaled_object(empty_scene):
     expected = design(empty_scene.core, sphere, vertices, scale=(1, 1, 3))
     unscaled = design(empty_scene.core, sphere, vertices)
 
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
 
     curve = bpy.context.active_object
     bpy.context.view_layer.update()
-    world = scenes.points(curve) @ np.array(curve.matrix_world.to_3x3()).T
+    world = scenes.points(curve) @ np.array(sphere.matrix_world.to_3x3()).T
     np.testing.assert_allclose(world, expected.curves[0].points, atol=1e-5)
     assert scenes.distances_to(scenes.points(curve), unscaled.curves[0].points).max() > 1e-3
 
@@ -251,7 +251,7 @@ def test_turning_the_object_does_not_change_the_curve(empty_scene):
         bpy.context.view_layer.update()
         bpy.context.view_layer.objects.active = sphere
         scenes.select(sphere, vertices)
-        bpy.ops.nicmm.design_curve()
+        bpy.ops.nicmm.design_curve(spline="EXACT")
         drawn.append(scenes.points(bpy.context.active_object))
     np.testing.assert_array_equal(*drawn)
 
@@ -261,7 +261,7 @@ def test_quads_are_cut_into_triangles(empty_scene):
     torus = bpy.context.active_object
     patch = scenes.nearest_vertices(torus, [(1.0, 0, 0.25), (1.1, 0.6, 0), (1.1, -0.6, 0)])
     scenes.select(torus, patch)
-    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
     points = scenes.points(scenes.curves()[0])
     assert scenes.distances_to(scenes.positions(torus)[patch], points).max() < ROUNDING
 
@@ -278,7 +278,7 @@ def test_unfinished_editing_is_used(empty_scene):
     scenes.select(sphere, vertices)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.transform.translate(value=(0, 0, 0.1))  # not yet in the mesh outside Edit Mode
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     bpy.ops.object.mode_set(mode="OBJECT")
     points = scenes.points(scenes.curves()[0])
     assert scenes.distances_to(scenes.positions(sphere)[vertices], points).max() < ROUNDING
@@ -287,7 +287,7 @@ def test_unfinished_editing_is_used(empty_scene):
 def test_poll_gives_reasons(empty_scene):
     def refusal():
         with pytest.raises(RuntimeError) as caught:
-            bpy.ops.nicmm.design_curve()
+            bpy.ops.nicmm.design_curve(spline="EXACT")
         return str(caught.value)
 
     assert "Make a mesh object active" in refusal()
@@ -342,7 +342,7 @@ def test_open_curve_is_not_cyclic(empty_scene):
         scenes.select(sphere, vertices)
         expected = design(empty_scene.core, sphere, vertices, closed=False)
 
-        bpy.ops.nicmm.design_curve(closed=False)
+        bpy.ops.nicmm.design_curve(spline="EXACT", closed=False)
 
         curve = bpy.context.active_object
         assert not curve.data.splines[0].use_cyclic_u
@@ -379,7 +379,7 @@ def test_the_same_mesh_is_factorised_once(empty_scene):
     for smoothness in (1.0, 2.0):
         bpy.context.view_layer.objects.active = sphere
         scenes.select(sphere, scenes.ring(sphere, 4))
-        bpy.ops.nicmm.design_curve(smoothness=smoothness)
+        bpy.ops.nicmm.design_curve(spline="EXACT", smoothness=smoothness)
         kept.append(dict(designers._designers))
     assert kept[0] == kept[1]
     assert len(kept[0]) == 1
@@ -390,5 +390,5 @@ def test_modifiers_are_mentioned(empty_scene, capfd):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     sphere.modifiers.new("Subdivision", "SUBSURF")
-    bpy.ops.nicmm.design_curve(use_modifiers=False)
+    bpy.ops.nicmm.design_curve(spline="EXACT", use_modifiers=False)
     assert "without its modifiers" in capfd.readouterr().out

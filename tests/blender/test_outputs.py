@@ -29,7 +29,7 @@ def design(mode, **settings):
 
 def drawn(mesh_object):
     """A designed curve object on the mesh, active."""
-    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
     curve = bpy.context.active_object
     assert curve is not mesh_object
     return curve
@@ -436,7 +436,7 @@ def test_curve_follows_the_mesh_that_was_moved_before_converting(monkey):
     place = scenes.positions(monkey) * [1.0, 2.0, 0.5]
     monkey.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
     before = scenes.points(scenes.curves()[0])
-    bpy.ops.nicmm.convert_curve(output="CURVE")
+    bpy.ops.nicmm.convert_curve(output="CURVE", spline="EXACT")
     after = scenes.points(bpy.context.active_object)
     np.testing.assert_allclose(after, before * [1.0, 2.0, 0.5], atol=ROUNDING)
 

@@ -18,7 +18,7 @@ def refusal(**arguments):
     """The report of the operator, which must leave the file unchanged."""
     before = [(found.name, found.data) for found in bpy.data.objects], bpy.context.mode
     with pytest.raises(RuntimeError) as caught:
-        bpy.ops.nicmm.design_curve(**arguments)
+        bpy.ops.nicmm.design_curve(spline="EXACT", **arguments)
     assert before == ([(found.name, found.data) for found in bpy.data.objects], bpy.context.mode)
     return str(caught.value)
 
@@ -87,7 +87,7 @@ def test_hidden_objects(empty_scene, hide):
     if bpy.context.active_object is None:
         assert "Make a mesh object active" in refusal()
     else:
-        assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+        assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
         assert_on_surface(empty_scene.core, scenes.curves()[0], sphere)
 
 
@@ -101,7 +101,7 @@ def test_hidden_faces_are_part_of_the_surface(empty_scene, output):
         face.hide_set(face.calc_center_median().z > 0.5)
     bmesh.update_edit_mesh(sphere.data)
     points = ", ".join(map(str, vertices))
-    assert bpy.ops.nicmm.design_curve(output=output, points=points) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", output=output, points=points) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not sphere.data.validate()
     hidden = [face.center.z for face in sphere.data.polygons if face.hide]
@@ -119,7 +119,7 @@ def test_several_objects_in_edit_mode(empty_scene, output):
     bpy.ops.object.mode_set(mode="EDIT")
     assert set(bpy.context.objects_in_mode) == {other, sphere}
     other_faces = len(other.data.polygons)
-    assert bpy.ops.nicmm.design_curve(output=output) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", output=output) == {"FINISHED"}
     assert bpy.context.active_object == sphere
     assert {sphere, other} <= set(bpy.context.objects_in_mode)
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -138,7 +138,7 @@ def test_shape_keys(empty_scene, mode, capfd):
         point.co *= 2.0
     key.value = 1.0
     bpy.ops.object.mode_set(mode=mode)
-    assert bpy.ops.nicmm.design_curve(use_modifiers=False) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", use_modifiers=False) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     assert_on_surface(empty_scene.core, scenes.curves()[0], sphere)
     assert "without its shape keys" in capfd.readouterr().out
@@ -159,7 +159,7 @@ def test_object_of_another_file(empty_scene, tmp_path):
     bpy.context.view_layer.objects.active = linked
     for output in ("EDGES", "PARTS"):
         assert "is linked from" in refusal(output=output, point_group="Cut")
-    assert bpy.ops.nicmm.design_curve(point_group="Cut") == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", point_group="Cut") == {"FINISHED"}
     (curve,) = scenes.curves()
     assert curve.parent == linked and curve.library is None
     assert_on_surface(empty_scene.core, curve, linked)
@@ -180,7 +180,7 @@ def test_override_of_another_file(empty_scene, tmp_path):
     made = wanted.objects[0].override_create()
     bpy.context.scene.collection.objects.link(made)
     bpy.context.view_layer.objects.active = made
-    assert bpy.ops.nicmm.design_curve(point_group="Cut") == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", point_group="Cut") == {"FINISHED"}
     assert_on_surface(empty_scene.core, scenes.curves()[0], made)
 
 
@@ -192,7 +192,7 @@ def test_modifiers_that_change_the_mesh(empty_scene):
     sphere.modifiers.new("Mirror", "MIRROR")
     decimate = sphere.modifiers.new("Decimate", "DECIMATE")
     decimate.ratio = 0.2
-    assert bpy.ops.nicmm.design_curve(use_modifiers=False) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", use_modifiers=False) == {"FINISHED"}
     assert_on_surface(empty_scene.core, scenes.curves()[0], sphere)
 
 
@@ -204,7 +204,7 @@ def test_instances(empty_scene):
     twin.location = (5, 0, 0)
     twin.scale = (1, 1, 2)
     scenes.activate(twin)
-    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
     (curve,) = scenes.curves()
     assert curve.parent == twin
     assert_on_surface(empty_scene.core, curve, twin)
@@ -240,14 +240,14 @@ def test_transforms(empty_scene, matrix, output):
     scenes.select(sphere, vertices)
     place = scenes.positions(sphere) @ np.array(sphere.matrix_world.to_3x3()).T
     expected = core.design_curve(core.Mesh(place, scenes.triangles(sphere)), vertices)
-    assert bpy.ops.nicmm.design_curve(output=output) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", output=output) == {"FINISHED"}
     if output == "EDGES":
         assert not sphere.data.validate()
         return
     curve = scenes.curves()[0]
     bpy.context.view_layer.update()
     assert_on_surface(core, curve, sphere)
-    found = scenes.points(curve) @ np.array(curve.matrix_world.to_3x3()).T
+    found = scenes.points(curve) @ np.array(sphere.matrix_world.to_3x3()).T
     size = np.linalg.norm(np.ptp(place, axis=0))
     assert scenes.distances_to(expected.curves[0].points, found).max() < 5e-3 * size
 
@@ -278,7 +278,9 @@ def test_large_and_bent_faces(empty_scene, output):
     faces = [tuple(range(15, -1, -1)), *sides, tuple(range(32, 48))]
     star = new_mesh("Stern", np.concatenate(rings).tolist(), faces)
     scenes.select(star, [36, 20, 12, 28])
-    assert bpy.ops.nicmm.design_curve(output=output, order="SHORTEST") == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", output=output, order="SHORTEST") == {
+        "FINISHED"
+    }
     assert not star.data.validate()
     if output == "CURVE":
         assert_on_surface(empty_scene.core, scenes.curves()[0], star)
@@ -293,7 +295,7 @@ def test_names_in_other_scripts(empty_scene, tmp_path):
         np.flatnonzero(scenes.positions(sphere)[:, 2] < -0.7).tolist(), 1.0, "REPLACE"
     )
     scenes.select(sphere, points)
-    assert bpy.ops.nicmm.design_curve(obstacle_group=group) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", obstacle_group=group) == {"FINISHED"}
     curve = bpy.data.objects[f"{name} Curve"]
     path = str(tmp_path / "日本.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -309,7 +311,7 @@ def test_saved_and_reopened(empty_scene, tmp_path, mode, output):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4, height=0.3))
     bpy.ops.object.mode_set(mode=mode)
-    bpy.ops.nicmm.design_curve(output=output, smoothness=3.0)
+    bpy.ops.nicmm.design_curve(spline="EXACT", output=output, smoothness=3.0)
     name = f"{sphere.name} Curve"
     path = str(tmp_path / "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -318,7 +320,7 @@ def test_saved_and_reopened(empty_scene, tmp_path, mode, output):
         bpy.ops.object.mode_set(mode="OBJECT")
     scenes.activate(bpy.data.objects[name])
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
-    assert bpy.ops.nicmm.convert_curve(output="EDGES") == {"FINISHED"}
+    assert bpy.ops.nicmm.convert_curve(spline="EXACT", output="EDGES") == {"FINISHED"}
     assert name not in bpy.data.objects
     assert not bpy.context.active_object.data.validate()
 
@@ -326,7 +328,7 @@ def test_saved_and_reopened(empty_scene, tmp_path, mode, output):
 def test_curve_whose_mesh_is_elsewhere(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
-    bpy.ops.nicmm.design_curve()
+    bpy.ops.nicmm.design_curve(spline="EXACT")
     curve = bpy.context.active_object
     other = bpy.data.scenes.new("Other")
     for collection in sphere.users_collection:
@@ -334,7 +336,7 @@ def test_curve_whose_mesh_is_elsewhere(empty_scene):
     other.collection.objects.link(sphere)
     scenes.activate(curve)
     with pytest.raises(RuntimeError, match="is not in this scene"):
-        bpy.ops.nicmm.convert_curve(output="EDGES")
+        bpy.ops.nicmm.convert_curve(spline="EXACT", output="EDGES")
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
 
 
@@ -343,7 +345,7 @@ def test_deleted_mesh_stays_in_the_file_as_long_as_a_curve_on_it(empty_scene, tm
     sphere = scenes.sphere()
     sphere.location = (1.0, 2.0, 3.0)
     scenes.select(sphere, scenes.ring(sphere, 4))
-    bpy.ops.nicmm.design_curve(output=output)
+    bpy.ops.nicmm.design_curve(spline="EXACT", output=output)
     names = sphere.name, bpy.context.active_object.name
     place = bpy.context.active_object.matrix_world.copy()
     scenes.activate(sphere)

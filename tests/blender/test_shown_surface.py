@@ -37,7 +37,7 @@ def in_world(curve):
     if curve.type == "CURVES":
         local = scenes.evaluated_points(curve)
     else:
-        local = scenes.points(curve).astype(float)
+        local = scenes.get(curve.data.splines[0].points, "co", 4)[:, :3].astype(float)
     world = np.array(curve.matrix_world)
     return local @ world[:3, :3].T + world[:3, 3]
 
@@ -60,7 +60,7 @@ def faces_at(faces, vertex):
 def draw(mesh_object, vertices=CHOSEN, **settings):
     bpy.context.view_layer.objects.active = mesh_object
     text = ", ".join(map(str, vertices))
-    assert bpy.ops.nicmm.design_curve(points=text, **settings) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(points=text, spline="EXACT", **settings) == {"FINISHED"}
     return bpy.context.active_object
 
 

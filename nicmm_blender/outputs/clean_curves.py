@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What objects show of a curve: evenly spaced points, every crossing of an edge, or Bézier knots.
+
+Fitting is done by the core, in the lengths of the scene. The record of an object always holds the
+exact curve.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene import designers
+
+EVEN, EXACT, BEZIER = "EVEN", "EXACT", "BEZIER"
+
+COLLINEAR = 1e-4
+"""Sine of the angle up to which the handles of a knot are on one line."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How curves are drawn: the kind of spline, and radius and offset in scene units."""
+
+    spline: str
+    radius: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """Points of a spline in the mesh's local space, (n, 3)."""
+
+    closed: bool
+    points: np.ndarray
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Bézier knots of a spline in the mesh's local space, each (n, 3), and which are smooth."""
+
+    closed: bool
+    points: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    smooth: np.ndarray
+
+
+def splines(surface, curves, drawing: Drawing) -> list:
+    """The splines of curves, as `Polyline` or `Knots`."""
+    if drawing.spline == BEZIER:
+        return [_knots(surface, curve, drawing) for curve in curves]
+    return [
+        Polyline(curve.closed, _lifted(surface, curve, drawing.offset))
+        for curve in on_surface(surface, curves, drawing)
+    ]
+
+
+def on_surface(surface, curves, drawing: Drawing) -> list:
+    """Curves with faces and barycentrics at the points of the polyline that is drawn."""
+    if drawing.spline == EXACT:
+        return curves
+    from ...nicmm_core.splines.even_spacing import even_curve
+
+    mesh = _core_mesh(surface)
+    return [even_curve(mesh, curve, _tolerance(surface, mesh, drawing)) for curve in curves]
+
+
+def automatic_radius(surface, radius: float, thickness: float) -> float:
+    """A radius in scene units: the given one, or a share of the size of the surface."""
+    return radius or thickness * surface.diagonal * surface.scale
+
+
+def _knots(surface, curve, drawing: Drawing) -> Knots:
+    from ...nicmm_core.splines.bezier import fit_bezier
+
+    mesh = _core_mesh(surface)
+    points = _lifted(surface, curve, drawing.offset) @ surface.linear.T
+    tolerance = _tolerance(surface, mesh, drawing)
+    fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance)
+    back = np.linalg.inv(surface.linear).T
+    left, right = fitted.left - fitted.knots, fitted.right - fitted.knots
+    across = np.linalg.norm(np.cross(left, right), axis=1)
+    sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=1)
+    smooth = (across <= COLLINEAR * sizes) & (np.einsum("nj,nj->n", left, right) < 0.0)
+    return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
+
+
+def _lifted(surface, curve, offset: float) -> np.ndarray:
+    """Points of a curve in the mesh's local space, lifted off the surface."""
+    if not offset:
+        return surface.points(curve.faces, curve.barycentric)
+    from ...nicmm_core.splines.offset import lifted
+
+    height = offset / surface.unit
+    points = lifted(_core_mesh(surface), curve.faces, curve.barycentric, height)
+    return points @ np.linalg.inv(surface.linear).T
+
+
+def _tolerance(surface, mesh, drawing: Drawing) -> float:
+    from ...nicmm_core.geometry.tolerances import of_clean_curve
+
+    return of_clean_curve(mesh.diagonal, drawing.radius / surface.unit)
+
+
+def _core_mesh(surface):
+    return designers.designer_for(surface.solved, surface.faces).mesh
