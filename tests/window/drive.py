@@ -180,7 +180,7 @@ def grab(blender: Blender, number: int):
     return start
 
 
-def drive(blender: Blender, archive: Path) -> None:
+def install(blender: Blender, archive: Path) -> None:
     step("Install the zip")
     check(blender.do("value = bpy.app.background") is False, "a window")
     version = blender.do("value = bpy.app.version_string")
@@ -192,6 +192,9 @@ def drive(blender: Blender, archive: Path) -> None:
     blender.do("watch_tool()")
     print(f"   Blender {version}")
 
+
+def drive(blender: Blender, archive: Path) -> None:
+    install(blender, archive)
     step("Suzanne, and the tool in the toolbar")
     print(f"   {blender.do('value = helper.suzanne()')} triangles")
     blender.do("helper.look()")
@@ -299,11 +302,8 @@ def drive(blender: Blender, archive: Path) -> None:
     )
     written = "[list(p.co[:3]) for p in bpy.data.objects['Suzanne Curve'].data.splines[0].points]"
     kept = blender.do(f"value = {written}")
-    apart = max(
-        abs(a - b)
-        for one, other in zip(seen, kept, strict=True)
-        for a, b in zip(one, other, strict=True)
-    )
+    segments = list(zip(seen, [*seen[1:], seen[0]], strict=True))
+    apart = max(min(to_segment(point, *ends) for ends in segments) for point in kept)
     check(apart < 1e-6, f"what is kept is what was seen ({apart})")
     blender.shot("8-kept")
 
@@ -364,6 +364,16 @@ def drive(blender: Blender, archive: Path) -> None:
                 "    found.location.y -= 0.6 * (found.name != 'Suzanne')"
             )
         blender.shot(f"10-{name}")
+
+
+def to_segment(point, start, end) -> float:
+    """The distance of a point from a segment."""
+    step = [b - a for a, b in zip(start, end, strict=True)]
+    to = [p - a for p, a in zip(point, start, strict=True)]
+    squared = sum(s * s for s in step)
+    share = sum(t * s for t, s in zip(to, step, strict=True)) / squared if squared else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.dist(point, [a + share * s for a, s in zip(start, step, strict=True)])
 
 
 def open_again(blender: Blender, path: str) -> None:

@@ -85,6 +85,95 @@ class Helper:
         return [list(location) for _hit, location, _normal, _face in found]
 
     @staticmethod
+    def figure():
+        """Suzanne with a subdivision and an armature that an action bends up to frame 20."""
+        for found in list(bpy.data.objects):
+            bpy.data.objects.remove(found)
+        bpy.ops.mesh.primitive_monkey_add()
+        monkey = bpy.context.active_object
+        bpy.ops.object.shade_smooth()
+        bpy.ops.object.armature_add()
+        rig = bpy.context.active_object
+        bpy.ops.object.mode_set(mode="EDIT")
+        bone = rig.data.edit_bones[0]
+        bone.head, bone.tail = (0, 0, -1), (0, 0, -0.2)
+        upper = rig.data.edit_bones.new("Upper")
+        upper.head, upper.tail, upper.parent = (0, 0, -0.2), (0, 0, 1), bone
+        names = bone.name, upper.name
+        bpy.ops.object.mode_set(mode="OBJECT")
+        height = np.array([vertex.co.z for vertex in monkey.data.vertices])
+        for name, weights in zip(names, (height < -0.1, height >= -0.1), strict=True):
+            group = monkey.vertex_groups.new(name=name)
+            group.add(np.flatnonzero(weights).tolist(), 1.0, "REPLACE")
+        monkey.modifiers.new("Armature", "ARMATURE").object = rig
+        monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        posed = rig.pose.bones["Upper"]
+        posed.rotation_mode = "XYZ"
+        for frame, angle in ((1, 0.0), (20, 0.6)):
+            posed.rotation_euler = (0.0, 0.0, angle)
+            posed.keyframe_insert("rotation_euler", frame=frame)
+        bpy.context.scene.frame_set(8)
+        Helper.switch("Suzanne", "OBJECT")
+
+    @staticmethod
+    def switch(name, mode):
+        """Make an object active in a mode."""
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.ops.object.select_all(action="DESELECT")
+        chosen = bpy.data.objects[name]
+        chosen.select_set(True)
+        bpy.context.view_layer.objects.active = chosen
+        bpy.ops.object.mode_set(mode=mode)
+
+    @staticmethod
+    def bend(angle):
+        """Pose the upper bone, without a key."""
+        posed = bpy.data.objects["Armature"].pose.bones["Upper"]
+        posed.rotation_euler = (0.3, 0.0, angle)
+
+    @staticmethod
+    def pull_in_edit_mode():
+        """Move the vertices of a cheek as the Move tool does."""
+        import bmesh
+
+        mesh = bpy.data.objects["Suzanne"].data
+        edited = bmesh.from_edit_mesh(mesh)
+        for vertex in edited.verts:
+            vertex.select_set(vertex.co.x > 0.3 and vertex.co.z < 0.0)
+        bmesh.update_edit_mesh(mesh)
+        with Helper.in_view():
+            bpy.ops.transform.translate(value=(0.2, 0.0, -0.1))
+
+    @staticmethod
+    def shown_in_front(pairs):
+        """Where the shown surface of Suzanne is met from the front at x and z."""
+        graph = bpy.context.evaluated_depsgraph_get()
+        monkey = bpy.data.objects["Suzanne"]
+        found = [monkey.ray_cast((x, -5.0, z), (0.0, 1.0, 0.0), depsgraph=graph) for x, z in pairs]
+        return [list(location) for _hit, location, _normal, _face in found]
+
+    @staticmethod
+    def away():
+        """Greatest distance of the curve from the shown surface, in diagonals."""
+        from mathutils.bvhtree import BVHTree
+
+        monkey = bpy.data.objects["Suzanne"]
+        curve = next(found for found in bpy.data.objects if found.type == "CURVE")
+        if monkey.mode == "SCULPT" and not any(each.show_viewport for each in monkey.modifiers):
+            mesh = monkey.data
+        else:
+            evaluated = monkey.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            mesh = evaluated.to_mesh()
+        mesh.calc_loop_triangles()
+        places = [vertex.co.copy() for vertex in mesh.vertices]
+        faces = [tuple(triangle.vertices) for triangle in mesh.loop_triangles]
+        tree = BVHTree.FromPolygons(places, faces, all_triangles=True)
+        size = (max(places, key=lambda p: p.x) - min(places, key=lambda p: p.x)).length
+        points = curve.data.splines[0].points
+        return max(tree.find_nearest(point.co.xyz)[3] for point in points) / size
+
+    @staticmethod
     def session():
         """The session of the running tool, or None."""
         return Helper.running[0]._opened.session if Helper.running else None
