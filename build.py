@@ -267,14 +267,13 @@ def this_platform() -> str:
 # The commands
 
 
-def command_demo(_arguments: argparse.Namespace) -> int:
+def command_demo(arguments: argparse.Namespace) -> int:
     ensure_environment()
+    script = "close_ups.py" if arguments.close_ups else "suzanne.py"
     with tempfile.TemporaryDirectory() as user_folder:
         # Blender finds the extension where an installed one stands; its wheels are in .venv.
         stage(Path(user_folder) / "extensions" / "user_default" / manifest()["id"])
-        return run(
-            [VENV_PYTHON, ROOT / "demo" / "suzanne.py"], {"BLENDER_USER_RESOURCES": user_folder}
-        )
+        return run([VENV_PYTHON, ROOT / "demo" / script], {"BLENDER_USER_RESOURCES": user_folder})
 
 
 def command_test(arguments: argparse.Namespace) -> int:
@@ -318,6 +317,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
 
     demo = commands.add_parser("demo", help="draw curves on Suzanne in headless Blender")
+    demo.add_argument("--close-ups", action="store_true", help="render tubes close up instead")
     demo.set_defaults(command=command_demo)
 
     test = commands.add_parser("test", help="run every check")

@@ -63,6 +63,8 @@ def draw(layout, context) -> None:
     row = layout.row(align=True)
     row.operator(NICMM_OT_update_curves.bl_idname, icon=UPDATE_ICON)
     row.prop(context.scene, "nicmm_live_update", text="Live", toggle=True, icon="PLAY")
+    if context.scene.nicmm_live_update:
+        layout.prop(context.scene, "nicmm_live_playback")
 
 
 def register() -> None:

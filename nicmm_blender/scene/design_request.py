@@ -5,6 +5,7 @@ Blender's thread reads the data. `answer` accesses no Blender data, so it can ru
 (`operators.turns`).
 """
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import bpy
@@ -20,8 +21,8 @@ from .surface import Surface, group_weights, read
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points` and `options` are arguments of the core; `moved` counts the points that are no longer
-    at their positions of the previous design.
+    `points`, `options` and `start` are arguments of the core; `moved` counts the points that are no
+    longer at their positions of the previous design.
     """
 
     mesh_name: str
@@ -31,6 +32,7 @@ class DesignRequest:
     order: str
     asked: Asked
     options: dict
+    start: object = None
     moved: int = 0
 
     def mesh_object(self):
@@ -75,9 +77,14 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
 
 
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
-    """A request to design a curve again, on the present mesh."""
+    """A request to design a curve again on the present surface, along the same course."""
     points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
-    return replace(for_points(mesh_object, surface, points, "given", asked), moved=moved)
+    request = for_points(mesh_object, surface, points, "given", asked)
+    start = None
+    if asked.method == "NICMM" and curve_record.lies_on(curve_object, surface):
+        curves = curve_record.recall(curve_object, surface)
+        start = curves[0] if len(curves) == 1 else None
+    return replace(request, start=start, moved=moved)
 
 
 def answer(request: DesignRequest, progress):
@@ -86,10 +93,13 @@ def answer(request: DesignRequest, progress):
 
     asked = request.asked
     with designers.exclusive(request.surface.solved, request.surface.faces) as designer:
+        arguments = {"order": request.order, "progress": progress, **request.options}
         try:
-            return designer.design(
-                request.points, order=request.order, progress=progress, **request.options
-            )
+            if request.start is not None:
+                # A course that cannot be followed any more is sought again.
+                with contextlib.suppress(nicmm.CurveError):
+                    return designer.design(request.points, start=request.start, **arguments)
+            return designer.design(request.points, **arguments)
         except nicmm.MissingPackageError:
             raise
         except nicmm.NicmmError as error:

@@ -19,6 +19,9 @@ from ..relaxation.node_traces import crossing_steps
 ROUNDS = 4
 """Times that crossings are sought: steps between nodes in a new order may cross others."""
 
+MOST_CROSSINGS = 200
+"""Crossings of one curve above which it is left as it is."""
+
 
 def uncrossed(
     surface: CurveSurface, nodes: Nodes, visit: IntArray, any_order: bool
@@ -50,6 +53,8 @@ def uncrossed(
         for place in np.unique(pairs[:, 0] // size).tolist():
             number = which[place]
             crossings = pairs[pairs[:, 0] // size == place] - place * size
+            if len(crossings) > MOST_CROSSINGS:
+                continue
             control = visit[order[number]] >= 0
             sequence = reordered(crossings, control, nodes.closed, any_order)
             if not np.array_equal(sequence, np.arange(size)):
@@ -119,23 +124,24 @@ def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
     before : (n + 1,) int array
         Number of control points before each place.
     """
-    best, least = None, np.inf
-    for one, (begin, first_end) in enumerate(steps):
-        for other, (end, second_end) in enumerate(steps):
-            low, high = sorted((first_end, second_end))
-            if not begin < end < low < high:
-                continue
-            size = end - begin + high - low
-            free = before[end + 1] == before[begin + 1] and before[high + 1] == before[low + 1]
-            if not free or size >= least:
-                continue
-            here, there = (begin + 1, end + 1), (low + 1, high + 1)
-            if second_end < first_end:  # the strands run in opposite directions
-                here, there = here[::-1], there[::-1]
-            rest = (high + 1, len(before) - 1)
-            parts = [(0, begin + 1), there, (end + 1, low + 1), here, rest]
-            best, least = _Move(parts, [one, other]), size
-    return best
+    places = np.array(steps)  # (p, 2)
+    begin, first_end = places[:, :1], places[:, 1:]  # (p, 1), of one crossing
+    end, second_end = places[:, 0], places[:, 1]  # (p,), of another
+    low, high = np.minimum(first_end, second_end), np.maximum(first_end, second_end)  # (p, p)
+    free = (before[end + 1] == before[begin + 1]) & (before[high + 1] == before[low + 1])
+    possible = free & (begin < end) & (end < low) & (low < high)
+    if not possible.any():
+        return None
+    size = np.where(possible, end - begin + high - low, np.iinfo(np.int64).max)
+    one, other = np.unravel_index(int(size.argmin()), size.shape)
+    start, stop = int(begin[one, 0]), int(end[other])
+    least, most = int(low[one, other]), int(high[one, other])
+    here, there = (start + 1, stop + 1), (least + 1, most + 1)
+    if second_end[other] < first_end[one, 0]:  # the strands run in opposite directions
+        here, there = here[::-1], there[::-1]
+    rest = (most + 1, len(before) - 1)
+    parts = [(0, start + 1), there, (stop + 1, least + 1), here, rest]
+    return _Move(parts, [int(one), int(other)])
 
 
 def _reversal(

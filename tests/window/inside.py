@@ -174,6 +174,12 @@ class Helper:
         return max(tree.find_nearest(point.co.xyz)[3] for point in points) / size
 
     @staticmethod
+    def live_works():
+        """Whether Live has work."""
+        live = import_module(f"{MODULE}.operators.live_update")
+        return bpy.app.timers.is_registered(live.tick)
+
+    @staticmethod
     def session():
         """The session of the running tool, or None."""
         return Helper.running[0]._opened.session if Helper.running else None

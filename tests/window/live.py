@@ -99,6 +99,7 @@ def drive(blender: Blender, idle: float) -> None:
         for live in (False, True):
             blender.do(f"bpy.context.scene.nicmm_live_update = {live}")
             time.sleep(4.0)
+            blender.wait("not helper.live_works()", "the curves are up to date")
             used.append(cores(blender, idle))
         print(f"   {mode:12s} {used[0]:.3f} {used[1]:.3f}", flush=True)
         check(used[1] - used[0] <= MOST_IDLE, f"Live is idle in {mode}")
