@@ -58,7 +58,7 @@ DRAWS = 2
 """Searches with random lengths."""
 
 MOST_TRACED = 20_000
-"""Points of a curve times iterations of its relaxation above which no courses are sought again."""
+"""Points of curves times iterations of their relaxations above which no more courses are sought."""
 
 MOST_TRIED = 10
 """Courses relaxed for alternatives, besides two for each: many relax to the same curve."""
@@ -166,10 +166,10 @@ class SurfaceDesigner:
                 return designs[0]
             drawn = self._drawn_courses(request)
             try:
-                if by_course and _repays_another_search(designs[0]):
-                    best = (itertools.islice(each, 1) for each in drawn)
-                    for other in itertools.chain.from_iterable(best):
-                        designs.append(self._relaxed(request, other, config, None, started))
+                for draw in drawn:
+                    if by_course and _repay_another_search(designs):
+                        for other in itertools.islice(draw, 1):
+                            designs.append(self._relaxed(request, other, config, None, started))
                 if request.alternatives:
                     others = itertools.chain(courses, *drawn)
                     new = (start for start in others if _differs(start, designs))
@@ -312,15 +312,17 @@ class SurfaceDesigner:
         return CoarseStarts(self._surface)
 
 
-def _repays_another_search(design: Design) -> bool:
-    """Whether a curve bends so much that the search may have missed a far better one.
+def _repay_another_search(designs: list[Design]) -> bool:
+    """Whether the first curve bends so much that the search may have missed a far better one.
 
-    Not where its relaxation took long, as on needles: each further course would take as long.
+    Not where the relaxations took long, as on needles: another one would take as long.
     """
-    assert design.resumable is not None
-    nodes = design.resumable.curve.nodes
+    resumable = designs[0].resumable
+    assert resumable is not None
+    nodes = resumable.curve.nodes
     bends = bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
-    return bends and design.iterations * len(design.curves[0].faces) <= MOST_TRACED
+    traced = sum(design.iterations * len(design.curves[0].faces) for design in designs)
+    return bends and traced <= MOST_TRACED
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
