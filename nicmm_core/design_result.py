@@ -51,6 +51,12 @@ class Design:
     resumable: Resumable | None = dataclass_field(default=None, repr=False, compare=False)
     alternatives: list[Design] = dataclass_field(default_factory=list)
 
+    def __repr__(self) -> str:
+        return (
+            f"<Design: {self.status}; {self.iterations} iterations, {self.seconds:.2f} s; "
+            f"curves: {self.curves}>"
+        )
+
     @cached_property
     def field(self) -> FloatArray:
         """Level-set values in mesh units at the input mesh's vertices, shape (V,).

@@ -10,10 +10,17 @@ from ..tool.edit_operator import NICMM_OT_edit_curve
 from . import icons
 
 
-def draw_in_menu(menu, _context) -> None:
+def draw_in_menu(menu, context) -> None:
     _begin(menu)
     menu.layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
-    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=icons.EDIT)
+    draw_edit(menu.layout, context)
+
+
+def draw_edit(layout, context) -> None:
+    """Draw the entry of the tool, named after what it does with the active object."""
+    is_curve = curve_record.has_record(context.active_object)
+    text = "Edit Curve on Surface" if is_curve else "Draw Curve on Surface"
+    layout.operator(NICMM_OT_edit_curve.bl_idname, text=text, icon=icons.EDIT)
 
 
 def draw_in_context_menu(menu, context) -> None:
@@ -33,7 +40,7 @@ def draw_conversions(menu, context) -> None:
         text="Convert Designed Curve",
         icon=icons.CONVERT,
     )
-    menu.layout.operator(NICMM_OT_edit_curve.bl_idname, icon=icons.EDIT)
+    draw_edit(menu.layout, context)
 
 
 def _begin(menu) -> None:

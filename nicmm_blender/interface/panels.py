@@ -8,8 +8,7 @@ from ..operators import live_update
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..scene import curve_record
-from ..tool.edit_operator import NICMM_OT_edit_curve
-from . import curve_list, icons, map_rows
+from . import curve_list, icons, map_rows, menus
 
 
 class SidebarPanel:
@@ -33,7 +32,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
         operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
         for name in settings.PROPERTY_NAMES:
             setattr(operator, name, getattr(properties, name))
-        layout.operator(NICMM_OT_edit_curve.bl_idname, icon=icons.EDIT)
+        menus.draw_edit(layout, context)
         if curve_record.has_record(context.active_object):
             convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=icons.CONVERT)
             for name in settings.OutputProperties.__annotations__:

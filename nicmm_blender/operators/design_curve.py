@@ -99,6 +99,8 @@ class NICMM_OT_design_curve(
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
         summary = f"{_summary(mesh_object, design, order, request.asked)}: {made}"
+        if ignored := _other_selections():
+            self.report({"WARNING"}, ignored)
         if self.alternatives:
             summary += f"; {len(design.alternatives)} alternatives"
         if design.status == nicmm.Status.CONVERGED:
@@ -113,6 +115,19 @@ def _summary(mesh_object, design, order: str, asked) -> str:
     summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
     shown = "" if asked.use_modifiers else shown_beyond_the_cage(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
+
+
+def _other_selections() -> str:
+    """A warning if other meshes in Edit Mode have selected vertices; may be empty."""
+    context = bpy.context
+    names = [
+        f'"{other.name}"'
+        for other in context.objects_in_mode_unique_data
+        if other != context.object and other.type == "MESH" and other.data.total_vert_sel
+    ]
+    if context.mode != "EDIT_MESH" or not names:
+        return ""
+    return f"The selection on {', '.join(names)} is not used: a curve lies on one mesh"
 
 
 def register() -> None:

@@ -34,6 +34,8 @@ class Surface:
         Indices of the corners of the mesh.
     polygons : (F,) int array
         The face of the mesh that each triangle is a part of.
+    hidden : (F,) bool array
+        Which triangles the user has hidden in Edit Mode.
     linear : (3, 3) float array
         The map from the local space to the other.
     placement : (4, 4) float array
@@ -49,6 +51,7 @@ class Surface:
     faces: np.ndarray
     loops: np.ndarray
     polygons: np.ndarray
+    hidden: np.ndarray
     linear: np.ndarray
     placement: np.ndarray
     with_modifiers: bool
@@ -91,6 +94,9 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
         faces = _array(triangles, "vertices", 3, np.int32).astype(np.int64)
         loops = _array(triangles, "loops", 3, np.int32).astype(np.int64)
         polygons = _array(triangles, "polygon_index", 1, np.int32).astype(np.int64)
+        hidden = np.zeros(len(faces), dtype=bool)
+        if mesh_object.mode == "EDIT":
+            hidden = _array(mesh.polygons, "hide", 1, bool)[polygons]
         cage = trace(mesh_object, mesh, cage_mesh) if use_modifiers and traced else None
     linear = np.array(matrix.to_3x3(), dtype=np.float64)
     stretches = np.linalg.svd(linear, compute_uv=False)
@@ -108,6 +114,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
         faces,
         loops,
         polygons,
+        hidden,
         linear,
         placement,
         use_modifiers,

@@ -11,6 +11,7 @@ from .. import settings
 from ..operators import polls, viewports
 from ..operators.long_solves import reporting
 from ..operators.viewports import NAVIGATION, WHEEL
+from ..outputs.writing import SEPARATE
 from ..scene import curve_record, designers, mesh_data
 from ..scene.curve_record import Asked
 from ..scene.messages import InputError
@@ -55,6 +56,9 @@ HINTS = (
 )
 
 
+DRAWN = ("spline", "radius", "thickness", "offset")
+"""Properties of a drawing that the tool shares with the sidebar."""
+
 _OUTPUT = settings.OutputProperties.__annotations__
 
 
@@ -72,7 +76,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     """Draw a curve on the surface of the mesh point by point, or edit a designed curve"""
 
     bl_idname = "nicmm.edit_curve"
-    bl_label = "Edit Curve on Surface"
+    bl_label = "Draw Curve on Surface"
     bl_options = {"REGISTER", "UNDO"}
 
     output: bpy.props.EnumProperty(
@@ -124,7 +128,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             layout.prop_search(self, name, mesh_object, "vertex_groups")
         layout.prop(self, "clearance")
         if not self.curve:
-            for name in ("output", "spline", "radius", "thickness", "offset"):
+            for name in ("output", *DRAWN):
                 if name != "thickness" or not self.radius:
                     layout.prop(self, name)
             if self.output == "STICKY":
@@ -171,6 +175,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         return reporting(self, lambda: self._invoke(context, event))
 
     def _invoke(self, context, event):
+        self._take_output(context.scene.nicmm_curves)
         self._area = context.area
         self._grabbed, self._grip = None, np.zeros(2)
         self._last_move = 0.0
@@ -193,6 +198,14 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             self._press(context, event)
         viewports.redraw()
         return {"RUNNING_MODAL"}
+
+    def _take_output(self, panel) -> None:
+        """Take the settings of the sidebar for a new object, as far as the tool makes it."""
+        for name in ("output", *DRAWN):
+            value = getattr(panel, name)
+            given = self.properties.is_property_set(name, ghost=False)
+            if not given and (name != "output" or value in SEPARATE):
+                setattr(self, name, value)
 
     def _clicked(self, context, event) -> tuple | None:
         """A tuple of the designed curve under the mouse, or of None for a new one.
@@ -388,7 +401,12 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         for position in session.positions():
             self.points.add().position = position
         count = len(session.points)
-        self.report({"INFO"}, f'"{made.name}" through {count} points{opened.remark}')
+        words = f'"{made.name}" through {count} points{opened.remark}'
+        chosen = context.scene.nicmm_curves.bl_rna.properties["output"].enum_items
+        wanted = context.scene.nicmm_curves.output
+        if edited is None and wanted not in SEPARATE:
+            words += f". Convert it for {chosen[wanted].name}: the tool draws curve objects"
+        self.report({"INFO"}, words)
         return {"FINISHED"}
 
     # Display.

@@ -11,6 +11,9 @@ import numpy as np
 OFFSET = 2e-3
 """Offset towards the eye in drawing and in tests of visibility, in mesh diagonals."""
 
+BEHIND = 1e-7
+"""Step past a hidden face, relative to the visible depth."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -45,10 +48,15 @@ class View:
         """Face and barycentrics of the surface under a pixel; None off the mesh."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
-        rays = [vector[None] @ self.surface.linear.T for vector in self.ray(pixel)]
-        points, _ = first_hits(self.mesh, *rays)
-        face = int(points.faces[0])
-        return None if face < 0 else (face, points.barycentric[0])
+        origin, direction = (vector[None] @ self.surface.linear.T for vector in self.ray(pixel))
+        while True:
+            points, along = first_hits(self.mesh, origin, direction)
+            face = int(points.faces[0])
+            if face < 0 or not self.surface.hidden[face]:
+                return None if face < 0 else (face, points.barycentric[0])
+            # Behind the hidden face; each step passes it by more than rounding.
+            origin = origin + (along[0] + BEHIND) * direction
+            direction = direction * max(1.0 - along[0] - BEHIND, 0.0)
 
     def visible(self, positions: np.ndarray) -> np.ndarray:
         """Which positions are not hidden by the mesh, (n,)."""

@@ -42,6 +42,13 @@ class SurfaceCurve:
     points: FloatArray
     control_index: IntArray
 
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        return (
+            f"<SurfaceCurve: {kind}, {len(self.faces)} points, length {self.length:.6g}, "
+            f"{len(self.control_index)} control points>"
+        )
+
     @property
     def length(self) -> float:
         """Length in mesh units."""

@@ -57,6 +57,9 @@ class Mesh:
         self.vertices.setflags(write=False)
         self.faces.setflags(write=False)
 
+    def __repr__(self) -> str:
+        return f"<Mesh: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
     @cached_property
     def diagonal(self) -> float:
         """Diagonal of the bounding box of the vertices that faces use, in mesh units."""

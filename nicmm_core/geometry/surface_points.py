@@ -40,6 +40,9 @@ class SurfacePoints:
     def __len__(self) -> int:
         return len(self.faces)
 
+    def __repr__(self) -> str:
+        return f"<SurfacePoints: {len(self)} points>"
+
     def __getitem__(self, index: IntArray | BoolArray) -> SurfacePoints:
         """Some of the points, by an array of indices or a mask."""
         return SurfacePoints(self.faces[index], self.barycentric[index])
@@ -314,8 +317,9 @@ def _check_count(count: int, closed: bool) -> None:
     fewest = FEWEST_CLOSED if closed else FEWEST_OPEN
     if count < fewest:
         kind = "a closed" if closed else "an open"
+        number = f"{count} point" if count == 1 else f"{count} points"
         raise ControlPointError(
-            f"control_points has {count} points, too few; {kind} curve needs at least {fewest}"
+            f"control_points has {number}, too few; {kind} curve needs at least {fewest}"
         )
 
 

@@ -314,9 +314,9 @@ def test_errors_of_the_core_are_reports(empty_scene):
     core = empty_scene.core
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4)[:1])
-    with pytest.raises(core.NicmmError, match="control_points has 1 points, too few; ") as too_few:
+    with pytest.raises(core.NicmmError, match="control_points has 1 point, too few; ") as too_few:
         design(core, sphere, scenes.ring(sphere, 4)[:1])
-    assert str(too_few.value).replace("control_points has", "There are") in reported_error()
+    assert str(too_few.value).replace("control_points has", "There is") in reported_error()
 
 
 def test_separate_parts_are_reported(empty_scene):
@@ -392,3 +392,22 @@ def test_modifiers_are_mentioned(empty_scene, capfd):
     sphere.modifiers.new("Subdivision", "SUBSURF")
     bpy.ops.nicmm.design_curve(spline="EXACT", use_modifiers=False)
     assert "without its modifiers" in capfd.readouterr().out
+
+
+def test_two_points_of_a_closed_curve_name_the_way_out(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4)[:2])
+    assert "Turn Closed off for an open curve" in reported_error()
+
+
+def test_selections_on_other_meshes_are_mentioned(empty_scene, capfd):
+    other = scenes.sphere()
+    other.name = "Other"
+    scenes.select(other, scenes.ring(other, 4))
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    other.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
+    assert 'The selection on "Other" is not used' in capfd.readouterr().out
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -165,7 +165,7 @@ def test_object_of_another_file(empty_scene, tmp_path):
     assert_on_surface(empty_scene.core, curve, linked)
     before = scenes.points(curve)
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
-    np.testing.assert_allclose(scenes.points(curve), before, atol=2e-6)
+    np.testing.assert_allclose(scenes.points(curve), before, atol=1e-4)
 
 
 def test_override_of_another_file(empty_scene, tmp_path):

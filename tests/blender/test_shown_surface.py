@@ -360,3 +360,15 @@ def test_a_linked_mesh_is_not_written_to(monkey, tmp_path):
     bpy.context.scene.collection.objects.link(linked)
     curve = draw(linked)
     assert away(curve, linked) < EXACT
+
+
+def test_hidden_faces_are_known_in_edit_mode(monkey, empty_scene):
+    subdivision(monkey)
+    surface = module(empty_scene, "scene.surface")
+    assert not surface.read(monkey, True).hidden.any()
+    for polygon in monkey.data.polygons[:100]:
+        polygon.hide = True
+    assert not surface.read(monkey, True).hidden.any()
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert surface.read(monkey, True).hidden.any()
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -29,6 +29,9 @@ STROKE = ((-0.3, 0.7), (0.3, 0.6))
 IDLE = 30.0
 """Seconds of each measurement without events."""
 
+SETTLED = 20.0
+"""Seconds in which Blender draws the last change; software OpenGL is slow."""
+
 MOST_IDLE = 0.02
 """Cores that *Live* may use while nothing happens."""
 
@@ -98,8 +101,7 @@ def drive(blender: Blender, idle: float) -> None:
         used = []
         for live in (False, True):
             blender.do(f"bpy.context.scene.nicmm_live_update = {live}")
-            time.sleep(4.0)
-            blender.wait("not helper.live_works()", "the curves are up to date")
+            settle(blender)
             used.append(cores(blender, idle))
         print(f"   {mode:12s} {used[0]:.3f} {used[1]:.3f}", flush=True)
         check(used[1] - used[0] <= MOST_IDLE, f"Live is idle in {mode}")
@@ -126,6 +128,15 @@ def moves(blender: Blender, source: str, shot: str, stroke: bool = False) -> Non
     away = blender.do("value = helper.away()")
     check(away < 1e-4, f"on the shown surface ({away} diagonals)")
     blender.shot(shot)
+
+
+def settle(blender: Blender) -> None:
+    """Wait until Blender has updated the curves and drawn them, or for some time."""
+    time.sleep(2.0)
+    blender.wait("not helper.live_works()", "the curves are up to date")
+    ends = time.monotonic() + SETTLED
+    while cores(blender, 2.0) > 2.0 * MOST_IDLE and time.monotonic() < ends:
+        pass
 
 
 def cores(blender: Blender, seconds: float) -> float:
