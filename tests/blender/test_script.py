@@ -43,10 +43,13 @@ def test_documented_script(empty_scene, tmp_path):
     source, output = tmp_path / "head.blend", tmp_path / "out.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source))
 
+    # A user folder of its own: disabling the extension removes its wheels from the folder.
+    user_folder = tmp_path / "user"
+    build.stage(user_folder / "extensions" / "user_default" / "nicmm_curves")
     arguments = [source, SCRIPT, "--", mesh_name, indices, output]
     ran = subprocess.run(
         [sys.executable, "-c", RUNNER, *map(str, arguments)],
-        env=os.environ,  # the user folder with the installed extension
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(user_folder)},
         capture_output=True,
         text=True,
         timeout=120,

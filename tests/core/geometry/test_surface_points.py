@@ -60,7 +60,7 @@ THIRDS = np.full((3, 3), 1 / 3)
 
 BAD_POINTS = {
     "none at all": ([], "control_points has 0 points"),
-    "one": ([5], "control_points has 1 points"),
+    "one": ([5], "control_points has 1 point, too few"),
     "two": ([5, 9], "control_points has 2 points"),
     "past the end": ([5, 9, 642], r"control_points\[2\] = 642"),
     "negative": ([5, -1, 9], r"control_points\[1\] = -1"),
@@ -100,7 +100,7 @@ def test_bad_control_points_are_refused_by_name(ball, points, message):
 
 def test_open_curves_need_two_points(ball):
     assert len(locate_control_points(ball, [5, 9], closed=False)) == 2
-    with pytest.raises(nicmm.ControlPointError, match="control_points has 1 points"):
+    with pytest.raises(nicmm.ControlPointError, match="control_points has 1 point, too few"):
         locate_control_points(ball, [5], closed=False)
 
 
