@@ -8,8 +8,9 @@ of it, and is impossible where the mesh is linked from another file.
 
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
+
+from .apart import evaluated_apart
 
 VERTEX, FACE, PLACE = "nicmm_vertex", "nicmm_face", "nicmm_place"
 """Attributes of the copy."""
@@ -191,25 +192,11 @@ class _Copy:
 
     def trace(self, shown) -> CageTrace:
         """Evaluate the copy and read its attributes."""
-        data, copy = self.cage.copy(), self.mesh_object.copy()
-        scene = bpy.data.scenes.new("NICMM cage")
-        try:
-            copy.data = data
-            self._write(data)
-            scene.collection.objects.link(copy)
-            now = bpy.context.scene
-            scene.frame_current, scene.frame_subframe = now.frame_current, now.frame_subframe
-            layer = scene.view_layers[0]
-            layer.update()
-            evaluated = copy.evaluated_get(layer.depsgraph)
-            try:
-                return self._read(evaluated.to_mesh(), shown)
-            finally:
-                evaluated.to_mesh_clear()
-        finally:
-            bpy.data.scenes.remove(scene)
-            bpy.data.objects.remove(copy)
-            bpy.data.meshes.remove(data)
+        copy = self.mesh_object.copy()
+        copy.data = self.cage.copy()
+        self._write(copy.data)
+        with evaluated_apart(copy) as evaluated:
+            return self._read(evaluated, shown)
 
     def _write(self, data) -> None:
         starts, totals = (

@@ -15,6 +15,7 @@ import bmesh
 
 from .cage_trace import CageTrace, trace
 from .messages import InputError
+from .vertex_weights import weights_on
 
 FLAT = 1e-6
 """Least scale along an axis relative to the largest one, limited by single precision."""
@@ -173,14 +174,9 @@ def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | N
     """Weight of every vertex of the surface in a vertex group; None for an empty name."""
     if not name:
         return None
-    index = vertex_group(mesh_object, name).index
+    vertex_group(mesh_object, name)
     with shown_mesh(mesh_object, use_modifiers) as (mesh, _):
-        weights = np.zeros(len(mesh.vertices))
-        for number, vertex in enumerate(mesh.vertices):
-            for membership in vertex.groups:
-                if membership.group == index:
-                    weights[number] = membership.weight
-    return weights
+        return weights_on(mesh, name)
 
 
 def vertex_group(mesh_object, name: str):

@@ -232,6 +232,24 @@ def test_weights_are_those_that_modifiers_interpolate(monkey, empty_scene):
     assert between.any()
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_weights_agree_with_those_of_single_vertices(monkey, empty_scene, mode):
+    group = monkey.vertex_groups.new(name="Map")
+    for vertex in range(0, len(monkey.data.vertices), 2):
+        group.add([vertex], vertex / 1000.0, "REPLACE")
+    subdivision(monkey)
+    bpy.ops.object.mode_set(mode=mode)
+    surface = module(empty_scene, "scene.surface")
+    blocks = (bpy.data.meshes, bpy.data.objects, bpy.data.scenes, bpy.data.node_groups)
+    before = [len(kind) for kind in blocks]
+    found = surface.group_weights(monkey, "Map", True)
+    assert [len(kind) for kind in blocks] == before
+    with surface.shown_mesh(monkey, True) as (mesh, _):
+        singly = [sum(each.weight for each in vertex.groups) for vertex in mesh.vertices]
+    np.testing.assert_allclose(found, singly, rtol=0, atol=1e-7)
+    assert found.max() > 0.4
+
+
 def test_a_wall_keeps_the_curve_away_on_the_shown_surface(monkey):
     group = monkey.vertex_groups.new(name="Wall")
     monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2

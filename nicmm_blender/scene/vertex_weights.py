@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights of a vertex group as an array.
+
+Blender's Python gives them one vertex at a time. Geometry Nodes see a vertex group as an attribute,
+so a node stores it as one that can be read at once.
+"""
+
+import bpy
+import numpy as np
+
+from .apart import evaluated_apart
+
+STORED = "nicmm_weights"
+
+
+def weights_on(mesh, group: str) -> np.ndarray:
+    """Weight of every vertex of a mesh in a vertex group, (V,); 0 outside the group.
+
+    `mesh` may be the evaluated mesh of an object. It is not changed.
+    """
+    nodes = _storing(group)
+    try:
+        temporary = bpy.data.objects.new("NICMM weights", mesh.copy())
+        temporary.modifiers.new("NICMM weights", "NODES").node_group = nodes
+        with evaluated_apart(temporary) as stored:
+            weights = np.zeros(len(stored.vertices), dtype=np.float32)
+            stored.attributes[STORED].data.foreach_get("value", weights)
+    finally:
+        bpy.data.node_groups.remove(nodes)
+    return weights.astype(np.float64)
+
+
+def _storing(group: str):
+    """A node group that stores a vertex group as an attribute."""
+    made = bpy.data.node_groups.new("NICMM weights", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        made.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    read = made.nodes.new("GeometryNodeInputNamedAttribute")
+    store = made.nodes.new("GeometryNodeStoreNamedAttribute")
+    read.data_type = store.data_type = "FLOAT"
+    store.domain = "POINT"
+    read.inputs["Name"].default_value = group
+    store.inputs["Name"].default_value = STORED
+    first, last = made.nodes.new("NodeGroupInput"), made.nodes.new("NodeGroupOutput")
+    for start, end in (
+        (first.outputs[0], store.inputs["Geometry"]),
+        (read.outputs["Attribute"], store.inputs["Value"]),
+        (store.outputs["Geometry"], last.inputs[0]),
+    ):
+        made.links.new(start, end)
+    return made
