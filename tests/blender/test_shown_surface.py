@@ -44,8 +44,12 @@ def in_world(curve):
 
 def away(curve, mesh_object):
     """Greatest distance of a curve's points from the shown surface, in diagonals."""
+    return points_away(in_world(curve), mesh_object)
+
+
+def points_away(points, mesh_object):
     vertices, faces = shown(mesh_object)
-    squared, *_ = igl.point_mesh_squared_distance(in_world(curve), vertices, faces)
+    squared, *_ = igl.point_mesh_squared_distance(points, vertices, faces)
     return float(np.sqrt(squared.max()) / np.linalg.norm(np.ptp(vertices, axis=0)))
 
 
@@ -57,10 +61,10 @@ def faces_at(faces, vertex):
     return int((faces == vertex).any(axis=1).argmax())
 
 
-def draw(mesh_object, vertices=CHOSEN, **settings):
+def draw(mesh_object, vertices=CHOSEN, spline="EXACT", **settings):
     bpy.context.view_layer.objects.active = mesh_object
     text = ", ".join(map(str, vertices))
-    assert bpy.ops.nicmm.design_curve(points=text, spline="EXACT", **settings) == {"FINISHED"}
+    assert bpy.ops.nicmm.design_curve(points=text, spline=spline, **settings) == {"FINISHED"}
     return bpy.context.active_object
 
 
@@ -194,8 +198,28 @@ def test_curves_lie_on_the_shown_surface(monkey, change, output):
     assert away(curve, monkey) < EXACT
     np.testing.assert_array_equal(scenes.positions(monkey), before[0])
     assert len(monkey.data.attributes) == before[1]
-    assert not bpy.data.scenes.get("NICMM cage") and len(bpy.data.scenes) == 1
+    assert len(bpy.data.scenes) == 1
     assert all(modifier.show_viewport for modifier in monkey.modifiers)
+
+
+@pytest.mark.parametrize("change", WAYS, ids=lambda way: way.__name__)
+def test_even_curves_are_near_the_shown_surface_and_evenly_spaced(monkey, change):
+    change(monkey)
+    curve = draw(monkey, spline="EVEN")
+    points = in_world(curve)
+    following = np.roll(points, -1, axis=0)
+    for share in (0.0, 0.25, 0.5, 0.75):
+        assert points_away((1.0 - share) * points + share * following, monkey) < 1e-4
+    record = np.reshape(curve["nicmm_curve"]["control_positions"], (-1, 3))
+    placement = np.array(monkey.matrix_world)
+    controls = record @ placement[:3, :3].T + placement[:3, 3]
+    places = np.linalg.norm(points[:, None] - controls[None], axis=2)
+    assert places.min(axis=0).max() < 1e-5
+    bounds = np.sort(places.argmin(axis=0))
+    lengths = np.linalg.norm(following - points, axis=1)
+    for first, last in zip(bounds, np.append(bounds[1:], bounds[0] + len(points)), strict=True):
+        leg = lengths[np.arange(first, last) % len(points)]
+        assert leg.min() >= 0.5 * leg.mean()
 
 
 @pytest.mark.parametrize("change", [subdivision, armature_and_subdivision, mirror])
