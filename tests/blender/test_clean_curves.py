@@ -67,6 +67,7 @@ def diagonal(mesh_object):
     return float(np.linalg.norm(np.ptp(shown(mesh_object)[0], axis=0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spline", ["EVEN", "BEZIER"])
 @pytest.mark.parametrize("scale", [(1, 1, 1), (1.0, 0.3, 2.0)])
 def test_clean_splines_are_near_the_exact_one(monkey, spline, scale):
@@ -101,6 +102,7 @@ def test_even_points_are_on_the_surface_and_evenly_spaced(monkey):
         assert leg.min() >= 0.5 * leg.mean()
 
 
+@pytest.mark.slow
 def test_the_tube_has_the_radius_in_the_scene_whatever_the_scale(monkey):
     """All rings of the tube are circles of the radius, also on a sheared object."""
     bpy.ops.object.empty_add(rotation=(0.4, 0.2, 0.9))
@@ -135,6 +137,7 @@ def shown_tube(curve):
     return local @ world[:3, :3].T + world[:3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 3.0])
 def test_radius_zero_is_a_share_of_the_size(monkey, scale):
     monkey.scale = (scale,) * 3
@@ -146,6 +149,7 @@ def test_radius_zero_is_a_share_of_the_size(monkey, scale):
     assert draw(monkey, radius=0.5).data.bevel_depth * scale == pytest.approx(0.5, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("spline", ["EVEN", "EXACT"])
 def test_offset_lifts_the_curve_off_the_skin(monkey, output, spline):
@@ -181,6 +185,7 @@ def test_radii_tilts_and_materials_survive_an_update(monkey):
     assert [found.name for found in curve.data.materials] == ["Red"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spline", ["EVEN", "EXACT", "BEZIER"])
 def test_an_update_keeps_spline_and_offset(monkey, spline):
     curve = draw(monkey, spline=spline, offset=0.03)

@@ -65,6 +65,7 @@ def assert_same_curve(one, other):
         assert away.max() <= CONVERGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("closed", [True, False])
 def test_update_is_designing_again(sphere, output, closed):

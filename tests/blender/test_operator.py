@@ -47,6 +47,7 @@ def test_equals_the_core(empty_scene, mode):
     np.testing.assert_allclose(scenes.points(curve), expected.curves[0].points, atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_alternatives_become_curves_of_their_own(empty_scene):
     bpy.ops.mesh.primitive_torus_add(major_segments=48, minor_segments=24)
     torus = bpy.context.active_object

@@ -219,6 +219,7 @@ def test_instances(empty_scene):
     assert "Make a mesh object active" in refusal()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "matrix",
     [
@@ -261,6 +262,7 @@ def test_flat_scale_is_said(empty_scene):
     assert "scale" in report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", OUTPUTS)
 def test_large_and_bent_faces(empty_scene, output):
     """A prism with each end one face of sixteen corners, a star that is not flat."""

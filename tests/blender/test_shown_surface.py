@@ -202,6 +202,7 @@ def test_curves_lie_on_the_shown_surface(monkey, change, output):
     assert all(modifier.show_viewport for modifier in monkey.modifiers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", WAYS, ids=lambda way: way.__name__)
 def test_even_curves_are_near_the_shown_surface_and_evenly_spaced(monkey, change):
     change(monkey)
@@ -287,6 +288,7 @@ def test_a_wall_keeps_the_curve_away_on_the_shown_surface(monkey):
     assert np.linalg.norm(in_world(curve) - place, axis=1).min() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("levels", [(1, 2), (2, 1), (1, 0)])
 def test_points_survive_a_change_of_level(monkey, levels):
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
@@ -306,6 +308,7 @@ def test_points_survive_a_change_of_level(monkey, levels):
     assert away(curve, monkey) < 1e-4
 
 
+@pytest.mark.slow
 def test_points_stay_in_their_half_of_a_mirror(monkey):
     mirror(monkey)
     monkey.modifiers["Mirror"].use_mirror_merge = False
@@ -333,6 +336,7 @@ def test_a_curve_on_the_cage_moves_to_the_shown_surface(monkey):
     assert scenes.distances_to(vertices[list(CHOSEN)], in_world(curve)).max() < 2e-3
 
 
+@pytest.mark.slow
 def test_the_pose_is_followed(monkey):
     armature_and_subdivision(monkey)
     curve = draw(monkey)
@@ -365,6 +369,7 @@ def test_sticky_curves_follow_another_level(monkey, level):
     assert scenes.distances_to(before, in_world(curve)).max() < (0.05 if level else 0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [armature, simple_deform, shrinkwrap])
 def test_cuts_are_exact_where_modifiers_only_deform(monkey, change):
     change(monkey)

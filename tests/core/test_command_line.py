@@ -97,6 +97,7 @@ def test_options_reach_the_design(mesh_file, tmp_path):
     assert outputs[0] != outputs[1]
 
 
+@pytest.mark.slow
 def test_alternatives_are_written_beside_the_curve(tmp_path, capsys):
     mesh_path, output = tmp_path / "body.obj", tmp_path / "curve.csv"
     body = shapes.creature(5, resolution=32, faces=1500)

@@ -165,6 +165,7 @@ class TestResult:
         ]
         assert energies[1] < 0.8 * energies[0]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("smoothness", "count"), [(0.1, 4), (10.0, 4), (1.0, 20)])
     def test_field_does_not_go_flat(self, small_ball, smoothness, count):
         """A field without slope costs no bending, and its zero set means nothing any more."""

@@ -87,6 +87,7 @@ def test_a_seeded_part_of_the_fuzzing(part):
         assert hostile_input.answer(number).faults == [], number
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1746, 5864, 7294, 8976])
 def test_what_a_whole_run_has_found(number):
     """No nearest point; derivatives that overflowed; infinite coordinates; steps of no length."""

@@ -122,6 +122,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     np.testing.assert_array_equal(again.curves[0].points, whole.curves[0].points)
 
 
+@pytest.mark.slow
 def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
     """Where a curve bends strongly, courses are sought again; here always."""
     monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)

@@ -70,6 +70,7 @@ def far_apart(positions, candidates, count):
     return chosen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["given", "shortest"])
 def test_a_designer_remembers_no_answer(body, order):
     """Whatever was asked before, and also by a start, without one the answer is design_curve's."""

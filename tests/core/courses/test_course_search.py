@@ -116,6 +116,7 @@ def test_a_refined_mesh_is_the_same_surface(body, times):
     np.testing.assert_allclose(back.barycentric, points.barycentric, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_alternatives_are_whole_curves_that_differ(body, closed):
     chosen = [20, 250, 600]

@@ -50,6 +50,7 @@ def test_rigid_motions_and_scales_keep_the_numbers(body, seed):
     np.testing.assert_array_equal(frame_coordinates(moved), frame_coordinates(body))
 
 
+@pytest.mark.slow
 def test_points_values_and_curves_are_mapped(surface):
     there = renumbered(surface)
     frame = principal_frame(surface.vertices, surface.faces, surface.face_areas)

@@ -47,6 +47,7 @@ def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     assert loss_of(problem, result.field) <= loss_of(problem, start.field) * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_iterations_lower_the_loss_of_an_untrained_network(problem):
     torch.manual_seed(0)
     untrained = CurveNetwork(NetworkConfig(width=16, depth=1))

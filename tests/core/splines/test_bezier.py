@@ -124,6 +124,7 @@ def test_zigzag_within_the_tolerance_does_not_show():
     assert turning(sampled(spline), True) == pytest.approx(2.0 * np.pi, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DESIGNS)
 @pytest.mark.parametrize("share", [CLEAN_CURVE, 10 * CLEAN_CURVE])
 def test_designed_curve(name, share):
