@@ -12,10 +12,10 @@ from scipy.sparse import csgraph
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
+from nicmm_core.geometry.distances import distance_to_segments
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.geometry.tracing import trace_from
-from nicmm_core.level_set.redistancing import distance_to_segments
 from tests.oracles.checker import judge_curve
 
 from . import collections, report

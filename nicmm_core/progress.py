@@ -16,8 +16,9 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .geometry.array_types import FloatArray
+FloatArray = NDArray[np.float64]
 
 Progress = Callable[[float, FloatArray], object]
 """Called with the fraction done and the points of the current curve, (n, 3); False cancels."""

@@ -14,13 +14,14 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
+from ..geometry.normals import unsigned_normals
 from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.refinement import Refined, refined
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import component_unit
 from ..path.initial_loop import visiting_order
 from ..path.via_points import with_via_points
-from ..relaxation.curve_nodes import CurveSurface, curve_surface, unsigned_normals, with_maps
+from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from ..request import Request, renumbered_request
 from .course_search import find_courses
 from .hop_graph import CELLS, HopGraph, build_hop_graph

@@ -6,7 +6,9 @@ import igl
 import numpy as np
 
 from ..progress import checkpoint
-from .array_types import FloatArray, IntArray
+from . import tolerances
+from .array_types import BoolArray, FloatArray, IntArray
+from .mesh import Mesh
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -15,3 +17,70 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
     checkpoint()
     return np.nan_to_num(normals)
+
+
+def unsigned_normals(mesh: Mesh) -> FloatArray:
+    """Unit normals at the vertices, up to their signs, shape (V, 3).
+
+    Weighted by corner angle. At corners of folded faces, as beside a vertex pushed over an edge,
+    they are weighted by signed area instead, which does not change when a vertex moves within the
+    plane of its neighbours. Where faces of opposite orientation meet, as on a Möbius strip, normals
+    would cancel; there the normal is the principal direction of the face normals.
+    """
+    normals = vertex_normals(mesh.vertices, mesh.faces)
+    mixed = mesh.unoriented_vertices
+    checkpoint()
+    folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
+    owner, face_normals, areas = _faces_around(mesh, folded)
+    area_vector = np.zeros((len(folded), 3))
+    np.add.at(area_vector, owner, areas[:, None] * face_normals)
+    there = area_vector.any(axis=1)
+    normals[folded[there]] = unit_vectors(area_vector[there])
+    owner, face_normals, areas = _faces_around(mesh, mixed)
+    weighted = areas[:, None] * face_normals
+    spread = np.zeros((len(mixed), 3, 3))
+    np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
+    normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
+    return normals
+
+
+def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
+    """Vertices of faces at an angle of at least 90° to the normal of a corner, ascending.
+
+    A normal of zero counts too.
+    """
+    folded = np.zeros(len(mesh.vertices), dtype=bool)
+    folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
+    return np.flatnonzero(folded)
+
+
+def folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
+    """Faces that point against the normals of their corners; None if no face does.
+
+    Faces at vertices where opposite orientations meet never count: signs have no meaning there.
+    """
+    folded = _facing(mesh, normals).sum(axis=1) < 0.0
+    if folded.any():
+        mixed = np.zeros(len(mesh.vertices), dtype=bool)
+        mixed[mesh.unoriented_vertices] = True
+        folded &= ~mixed[mesh.faces].any(axis=1)
+    return folded if folded.any() else None
+
+
+def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
+    """Cosines between the normals of faces and of their corners, (F, 3)."""
+    checkpoint()
+    return np.einsum("fcd,fd->fc", normals[mesh.faces], mesh.face_normals)
+
+
+def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Faces around some vertices: the index of the vertex, the normal and the area of each."""
+    incidence = mesh.vertex_faces[vertices]
+    owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
+    return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
+
+
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Vectors, (n, 3), divided by their lengths."""
+    lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
+    return vectors / np.maximum(lengths, tolerances.TINY)[:, None]

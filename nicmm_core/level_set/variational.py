@@ -17,12 +17,13 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import BoolArray, FloatArray
+from ..geometry.distances import build_distance_surface
 from ..progress import checkpoint
 from ..status import Status
 from .losses import LossWeights, energy_surface, loss_terms
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
 from .problem import Problem
-from .redistancing import build_distance_surface, redistanced
+from .redistancing import redistanced
 from .solution import Solution
 from .sparse_solver import factorise
 from .topology import breaking_vertices
@@ -97,10 +98,10 @@ def solve(
     """
     h = problem.edge_length
     controls = problem.loop.control_vertices
-    surface = build_distance_surface(problem.vertices, problem.working.faces, h, problem.bundle)
+    surface = build_distance_surface(problem.vertices, problem.working.faces, h)
     links = VertexLinks(problem.working, problem.bundle)
     reach = (config.half_width + 1.0) * h
-    field = redistanced(surface, problem.initial_distance, controls, reach)
+    field = redistanced(surface, problem.initial_distance, controls, reach, problem.bundle)
     best_field, losses, least = field, [], []
     damping = config.damping
     status = Status.ITERATION_LIMIT
@@ -123,8 +124,8 @@ def solve(
         if moved is None:
             status = Status.CONVERGED
             break
-        field = redistanced(surface, moved, controls, reach)
-    field = redistanced(surface, best_field, controls)
+        field = redistanced(surface, moved, controls, reach, problem.bundle)
+    field = redistanced(surface, best_field, controls, bundle=problem.bundle)
     terms = loss_terms(energy_surface(problem), field)
     terms = {name: float(value) for name, value in terms.items()}
     return Solution(field, terms, losses, status, keeps_topology=True)

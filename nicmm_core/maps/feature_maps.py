@@ -17,7 +17,7 @@ from ..errors import ArgumentError
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, unique_edges
-from ..relaxation.curve_nodes import unsigned_normals
+from ..geometry.normals import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
 """Angle between the normals of two faces, in radians, from which their edge is sharp."""

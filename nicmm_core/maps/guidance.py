@@ -22,8 +22,8 @@ from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.distances import build_distance_surface, spread
 from ..geometry.mesh import Mesh, edge_lengths
-from ..level_set.redistancing import DistanceSurface, spread
 from ..progress import checkpoint
 
 BASELINE = 1.0
@@ -186,9 +186,7 @@ def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
         distance = np.where((level[vertices] < step) | rim[vertices], 0.0, np.inf)
         if not np.isfinite(distance).any():
             continue
-        entries = (np.ones(corners.size), (corners.ravel(), np.repeat(np.arange(len(faces)), 3)))
-        around = sparse.csr_array(sparse.coo_array(entries, shape=(len(vertices), len(corners))))
-        surface = DistanceSurface(mesh.vertices[vertices], corners, around, edge_length)
+        surface = build_distance_surface(mesh.vertices[vertices], corners, edge_length)
         spread(surface, distance, limit)
         own = level[vertices] == step
         result[vertices[own]] = np.minimum(distance[own], limit)

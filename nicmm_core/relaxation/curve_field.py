@@ -11,9 +11,9 @@ import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
+from ..geometry.distances import build_distance_surface, distance_to_segments, spread
 from ..geometry.mesh import Mesh, unique_edges
 from ..geometry.sides import two_sides
-from ..level_set.redistancing import build_distance_surface, distance_to_segments, spread
 
 
 def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:

@@ -13,10 +13,9 @@ from scipy import sparse
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
-from ..geometry.normals import vertex_normals
+from ..geometry.normals import folded_faces, unit_vectors, unsigned_normals
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import feature_map
-from ..progress import checkpoint
 
 FEATURE_TENSION = 600.0
 """τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
@@ -62,7 +61,7 @@ class CurveSurface:
 def curve_surface(mesh: Mesh) -> CurveSurface:
     """The surface of a mesh, without a feature map."""
     normals = unsigned_normals(mesh)
-    return CurveSurface(mesh, normals, folded=_folded_faces(mesh, normals))
+    return CurveSurface(mesh, normals, folded=folded_faces(mesh, normals))
 
 
 def with_maps(
@@ -76,67 +75,6 @@ def with_maps(
         return surface
     phi_fea = feature_map(surface.mesh, obstacles, alignment, unit)
     return replace(surface, feature_map=phi_fea, feature_weight=FEATURE_TENSION / unit**2)
-
-
-def unsigned_normals(mesh: Mesh) -> FloatArray:
-    """Unit normals at the vertices, up to their signs, shape (V, 3).
-
-    Weighted by corner angle. At corners of folded faces, as beside a vertex pushed over an edge,
-    they are weighted by signed area instead, which does not change when a vertex moves within the
-    plane of its neighbours. Where faces of opposite orientation meet, as on a Möbius strip, normals
-    would cancel; there the normal is the principal direction of the face normals.
-    """
-    normals = vertex_normals(mesh.vertices, mesh.faces)
-    mixed = mesh.unoriented_vertices
-    checkpoint()
-    folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
-    owner, face_normals, areas = _faces_around(mesh, folded)
-    area_vector = np.zeros((len(folded), 3))
-    np.add.at(area_vector, owner, areas[:, None] * face_normals)
-    there = area_vector.any(axis=1)
-    normals[folded[there]] = unit_vectors(area_vector[there])
-    owner, face_normals, areas = _faces_around(mesh, mixed)
-    weighted = areas[:, None] * face_normals
-    spread = np.zeros((len(mixed), 3, 3))
-    np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
-    normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
-    return normals
-
-
-def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
-    """Vertices of faces at an angle of at least 90° to the normal of a corner, ascending.
-
-    A normal of zero counts too.
-    """
-    folded = np.zeros(len(mesh.vertices), dtype=bool)
-    folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
-    return np.flatnonzero(folded)
-
-
-def _folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
-    """Faces that point against the normals of their corners; None if no face does.
-
-    Faces at vertices where opposite orientations meet never count: signs have no meaning there.
-    """
-    folded = _facing(mesh, normals).sum(axis=1) < 0.0
-    if folded.any():
-        mixed = np.zeros(len(mesh.vertices), dtype=bool)
-        mixed[mesh.unoriented_vertices] = True
-        folded &= ~mixed[mesh.faces].any(axis=1)
-    return folded if folded.any() else None
-
-
-def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
-    """Cosines between the normals of faces and of their corners, (F, 3)."""
-    checkpoint()
-    return np.einsum("fcd,fd->fc", normals[mesh.faces], mesh.face_normals)
-
-
-def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Faces around some vertices: the index of the vertex, the normal and the area of each."""
-    incidence = mesh.vertex_faces[vertices]
-    owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
-    return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
 
 
 @dataclass(frozen=True)
@@ -275,12 +213,6 @@ def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
     normals = surface.vertex_normals[surface.mesh.faces[faces]]
     against = (normals * surface.mesh.face_normals[faces][:, None]).sum(axis=2) < 0.0
     return normals * np.where(against, -1.0, 1.0)[..., None]
-
-
-def unit_vectors(vectors: FloatArray) -> FloatArray:
-    """Vectors, (n, 3), divided by their lengths."""
-    lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
-    return vectors / np.maximum(lengths, tolerances.TINY)[:, None]
 
 
 def dot(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -14,9 +14,10 @@ from scipy.sparse import csgraph
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import overlapping_segments, segments_meet
+from ..geometry.normals import unit_vectors
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
 from ..geometry.tracing import Traces, strictly_inside, trace_between
-from .curve_nodes import CurveSurface, Nodes, nodes_at, unit_vectors
+from .curve_nodes import CurveSurface, Nodes, nodes_at
 
 DETOUR = 3.0
 """Longest trace between two nodes, relative to their distance in space; longer ones fail."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import PointName, UnreachableError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.distances import build_distance_surface, spread
 from ..geometry.surface_points import SurfacePoints
-from ..level_set.redistancing import build_distance_surface, spread
 from .mapped_mesh import MappedMesh
 from .nonmanifold import welded_vertices
 

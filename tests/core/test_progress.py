@@ -27,7 +27,7 @@ STAGES = {
         MESHES["fins"],
         [3, 100, 400, 500],
         {"order": "shortest", "clearance": 0.05},
-        "nonmanifold mapped_mesh redistancing visiting_order",
+        "nonmanifold mapped_mesh distances visiting_order",
     ),
     "paper": (
         shapes.sphere(2),
@@ -40,7 +40,7 @@ STAGES = {
         shapes.sphere(3),
         [3, 100, 400, 500],
         {"order": "shortest", "method": "variational"},
-        "leg_search topology redistancing variational sparse_solver",
+        "leg_search topology distances variational sparse_solver",
     ),
 }
 

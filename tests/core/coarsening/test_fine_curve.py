@@ -8,8 +8,9 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
 from nicmm_core.coarsening.fine_curve import curve_on_fine_mesh
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface
 from tests.core.checks import assert_valid_curve
 
 

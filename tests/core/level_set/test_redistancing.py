@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nicmm_core import Mesh, shapes
-from nicmm_core.level_set import redistancing
-from nicmm_core.level_set.redistancing import build_distance_surface, redistanced
+from nicmm_core.geometry import distances
+from nicmm_core.geometry.distances import build_distance_surface
+from nicmm_core.level_set.redistancing import redistanced
 
 NOTHING = np.zeros(0, dtype=np.int64)
 
@@ -102,7 +103,7 @@ def test_needles_in_a_ring_do_not_lower_one_anothers_distance(monkeypatch, twist
     """Of the hostile input one case took 11,000 rounds on 3,400 vertices."""
     mesh = twisted_prism(100, 10, 0.001, twist)
     rounds = []
-    monkeypatch.setattr(redistancing, "checkpoint", lambda: rounds.append(1))
+    monkeypatch.setattr(distances, "checkpoint", lambda: rounds.append(1))
     line = mesh.vertices[:, 0] - 0.01
     found = np.abs(redistanced(distance_surface(mesh), line, NOTHING))
     assert len(rounds) < 200

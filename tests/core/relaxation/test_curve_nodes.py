@@ -6,8 +6,9 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at
 from tests.core.checks import circle, flipped, points_near, random_surface_points, scaled
 
 ANGLES = np.arange(48) * 2 * np.pi / 48

@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.geometry.normals import unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at
 from nicmm_core.relaxation.elastic_energy import (
     OVER_TENSION,
     Balance,

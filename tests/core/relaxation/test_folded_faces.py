@@ -6,8 +6,9 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.curve import curve_on_mesh
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.tracing import trace_between, trace_from
-from nicmm_core.relaxation.curve_nodes import curve_surface, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import curve_surface
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.noded_curve import moved_along_conormals, noded_curve, traced_through
 from tests.core.checks import assert_valid_curve, curve_through, flipped, grid, points_near

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints, in_faces
-from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface, nodes_at
 from nicmm_core.relaxation.elastic_energy import bending_energy
 from nicmm_core.relaxation.noded_curve import (
     is_simple,

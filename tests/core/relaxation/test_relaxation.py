@@ -10,14 +10,10 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.crossings import crossing_segments
 from nicmm_core.geometry.curve import geodesic_curvature, resample
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation import levenberg_marquardt
-from nicmm_core.relaxation.curve_nodes import (
-    FEATURE_TENSION,
-    CurveSurface,
-    nodes_at,
-    unsigned_normals,
-)
+from nicmm_core.relaxation.curve_nodes import FEATURE_TENSION, CurveSurface, nodes_at
 from nicmm_core.relaxation.elastic_energy import OVER_TENSION, bending_energy, feature_energy
 from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from nicmm_core.status import Status

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from nicmm_core import shapes
-from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes, nodes_at, unsigned_normals
+from nicmm_core.geometry.normals import unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from nicmm_core.relaxation.strand_contact import CLEARANCE, contacts_between
 from tests.core.checks import circle, points_near, scaled
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 import nicmm_core as nicmm
+from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.relaxation.curve_nodes import CurveSurface, unsigned_normals
+from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.noded_curve import without_short_segments
 from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
 from nicmm_core.relaxation.warm_start import WARM, moved_along

@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.level_set.redistancing import build_distance_surface, spread
+from nicmm_core.geometry.distances import build_distance_surface, spread
 from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import assert_valid_design
 from tests.oracles.named_curves import nearest_vertices
