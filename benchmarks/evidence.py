@@ -15,6 +15,7 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
     Modules that it imports count, but not rooms of the core in its `WITHOUT`.
     """
     own = ROOT / "benchmarks" / f"{name}.py"
-    statements, imports = _reached(_parsed(own, read), "measure")
+    statements, imports = _reached(_parsed(read(own)), "measure")
     excluded = getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
     digests = {_relative(own): _digest(statements)}
     waiting = list(_files(imports, own))
@@ -122,9 +123,8 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
         room = relative.split("/")[1] if relative.startswith("nicmm_core/") else ""
         if relative in digests or relative in PRESENTATION or room in excluded:
             continue
-        tree = _parsed(path, read)
-        digests[relative] = _digest([tree])
-        waiting += _files([n for n in ast.walk(tree) if isinstance(n, IMPORTS)], path)
+        digests[relative], imported = _whole(read(path))
+        waiting += _files(imported, path)
     if "network" not in excluded:
         for path in sorted((ROOT / WEIGHTS).iterdir()):
             if path.is_file() and path.suffix != ".py":
@@ -143,9 +143,16 @@ def meshes_behind(name: str) -> str | None:
 IMPORTS = (ast.Import, ast.ImportFrom)
 
 
-def _parsed(path: Path, read: Read) -> ast.Module:
+@cache
+def _whole(content: bytes) -> tuple[str, list[ast.stmt]]:
+    """The digest of all statements of a file, and its imports."""
+    tree = _parsed(content)
+    return _digest([tree]), [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
+
+
+def _parsed(content: bytes) -> ast.Module:
     """The statements of a file, without docstrings; comments are not part of them."""
-    tree = ast.parse(read(path))
+    tree = ast.parse(content)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
