@@ -106,6 +106,7 @@ def _answer(one: Isolated[Item, Outcome]) -> Results:
         "folder": one.item.folder,
         "mesh": one.item.name,
         "request": one.item.request,
+        "faces": one.result.faces if one.result else 0,
         "verdict": verdict,
         "words": words[:300] if verdict in (DECLINED, WRONG) else "",
         "printed": one.output.strip()[:200],
