@@ -121,11 +121,12 @@ class Example:
     def results(self) -> Results:
         """What results keep; shares and seconds are those without and with guidance."""
         designs = [design for design in (self.free, self.guided) if design is not None]
+        shares = self.shares
         return {
             "mesh": self.name,
             "vertices": len(self.mesh.vertices),
             "guidance": None if self.region is None else self.region.kind,
-            "shares": None if self.shares is None else [round(each, 4) for each in self.shares],
+            "shares": None if shares is None else [round(share, 4) for share in shares],
             "status": designs[-1].status.name,
             "seconds": [round(design.seconds, 2) for design in designs],
         }
