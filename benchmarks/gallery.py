@@ -17,6 +17,7 @@ from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve, resample
 from nicmm_core.geometry.mesh import Mesh, unique_edges
 from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.io.files import read_mesh
+from tests.oracles.mesh_files import mesh_files
 
 from . import collections, renders, report
 from .evidence import Results
@@ -220,7 +221,7 @@ def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
     if scale is Scale.SMOKE:
         yield "disc", shapes.disc(16)
         return
-    folders = [collections.mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
+    folders = [mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
     longest = max(len(files) for files in folders)
     for number in range(longest):
         for files in folders:
