@@ -155,13 +155,15 @@ def run_networks(
     Returns
     -------
     Results
-        For each network of each sample the seconds of all fine-tuning, and the least loss before
-        the first step and after the last one; of all samples together the mean of the least loss so
-        far, by iteration.
+        By network: for each sample its mesh, the seconds of all fine-tuning, and the least loss
+        before the first step and after the last one; for all samples together the mean of the least
+        loss so far, by iteration.
     """
+    meshes: list[str] = []
     losses: dict[str, list[FloatArray]] = {label: [] for label in networks}
     seconds: dict[str, list[float]] = {label: [] for label in networks}
     for sample in samples:
+        meshes.append(sample.name)
         for label, network in networks.items():
             started = time.perf_counter()
             finetuned = finetune(
@@ -173,14 +175,15 @@ def run_networks(
             f"{label} {of_network[-1][-1]:.3f}" for label, of_network in losses.items()
         )
         print(f"  {sample.name}: {last}", flush=True)
-    if not any(losses.values()):
+    if not meshes:
         raise SystemExit("No set had a simple loop through its points; there is nothing to measure")
-    return {label: _run(np.array(losses[label]), seconds[label]) for label in networks}
+    return {label: _run(meshes, np.array(losses[label]), seconds[label]) for label in networks}
 
 
-def _run(least_losses: FloatArray, seconds: list[float]) -> Results:
+def _run(meshes: list[str], least_losses: FloatArray, seconds: list[float]) -> Results:
     """What results keep of (samples, iterations + 1) losses: all of them would be too many."""
     return {
+        "meshes": meshes,
         "seconds": [significant(value) for value in seconds],
         "first_losses": [significant(value) for value in least_losses[:, 0]],
         "last_losses": [significant(value) for value in least_losses[:, -1]],
