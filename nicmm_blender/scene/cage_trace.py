@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .apart import evaluated_apart
+from .mesh_arrays import corner_vertices, read, triangle_faces
+from .mesh_arrays import positions as positions_of
 
 VERTEX, FACE, PLACE = "nicmm_vertex", "nicmm_face", "nicmm_place"
 """Attributes of the copy."""
@@ -69,7 +71,7 @@ class CagePlaces:
     copies: np.ndarray
 
 
-def trace(mesh_object, shown, cage_mesh) -> CageTrace | None:
+def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
     """Find the cage in the shown mesh of an object; None where it has the cage's faces.
 
     Parameters
@@ -77,15 +79,17 @@ def trace(mesh_object, shown, cage_mesh) -> CageTrace | None:
     mesh_object : bpy.types.Object
     shown : bpy.types.Mesh
         With modifiers.
+    loops : (F, 3) int array
+        Corners of its triangles.
     cage_mesh : callable
         Gives a context with the mesh without modifiers.
     """
     if not any(modifier.show_viewport for modifier in mesh_object.modifiers):
         return None
     with cage_mesh(mesh_object) as cage:
-        if _sizes(cage) == _sizes(shown) and np.array_equal(_corners(cage), _corners(shown)):
+        if _have_equal_faces(cage, shown):
             return None
-        return _Copy(mesh_object, cage).trace(shown)
+        return _Copy(mesh_object, cage).trace(shown, loops)
 
 
 def with_own_cage(surface):
@@ -117,7 +121,7 @@ def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces
     cage = surface.cage
     places = np.einsum("nj,njk->nk", barycentric, cage.places[faces])
     found = CagePlaces(cage.faces[faces], places, np.zeros(len(faces), dtype=np.int64))
-    triangles = _TrianglesOf(surface)
+    triangles = _TrianglesOf(surface, found.faces)
     for number, position in enumerate(surface.points(faces, barycentric)):
         copies = triangles.at(int(found.faces[number]), places[number])
         away = [np.linalg.norm(surface.points(*copy)[0] - position) for copy in copies]
@@ -131,7 +135,7 @@ def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces
 def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
     """Triangles, (k,), -1 where there is none, and barycentrics, (k, 3), of points in the cage."""
     faces, barycentric = np.full(len(places.faces), -1), np.zeros((len(places.faces), 3))
-    triangles = _TrianglesOf(surface)
+    triangles = _TrianglesOf(surface, places.faces)
     for number, (face, copy) in enumerate(zip(places.faces, places.copies, strict=True)):
         copies = triangles.at(int(face), places.places[number])
         if copy < len(copies):
@@ -140,11 +144,12 @@ def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
 
 
 class _TrianglesOf:
-    """The triangles of a surface by the face of the cage that they come from."""
+    """The triangles of a surface that come from some faces of the cage."""
 
-    def __init__(self, surface) -> None:
+    def __init__(self, surface, faces: np.ndarray) -> None:
         self.surface = surface
-        self.order = np.argsort(surface.cage.faces, kind="stable")
+        from_these = np.flatnonzero(np.isin(surface.cage.faces, faces))
+        self.order = from_these[np.argsort(surface.cage.faces[from_these], kind="stable")]
         self.sorted = surface.cage.faces[self.order]
 
     def at(self, face: int, place: np.ndarray) -> list:
@@ -190,17 +195,17 @@ class _Copy:
         self.mesh_object, self.cage = mesh_object, cage
         self.identities = np.random.default_rng(0).random((len(cage.vertices), 3), np.float32)
 
-    def trace(self, shown) -> CageTrace:
+    def trace(self, shown, loops: np.ndarray) -> CageTrace:
         """Evaluate the copy and read its attributes."""
         copy = self.mesh_object.copy()
         copy.data = self.cage.copy()
         self._write(copy.data)
         with evaluated_apart(copy) as evaluated:
-            return self._read(evaluated, shown)
+            return self._read(evaluated, shown, loops)
 
     def _write(self, data) -> None:
         starts, totals = (
-            _get(data.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total")
+            read(data.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total")
         )
         places = np.zeros((len(data.loops), 3), dtype=np.float32)
         number = np.arange(len(places)) - np.repeat(starts, totals)
@@ -213,15 +218,13 @@ class _Copy:
         ):
             data.attributes.new(name, kind, domain).data.foreach_set(field, values.ravel())
 
-    def _read(self, mesh, shown) -> CageTrace:
-        positions = _get(self.cage.vertices, "co", 3, np.float32).astype(np.float64)
+    def _read(self, mesh, shown, loops: np.ndarray) -> CageTrace:
+        positions = positions_of(self.cage)
         vertices = np.full(len(positions), -1)
-        mesh.calc_loop_triangles()
-        count = len(shown.loop_triangles)
-        faces, places = np.full(count, -1), np.zeros((count, 3, 2))
+        faces, places = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
         domains = {VERTEX: "POINT", FACE: "FACE", PLACE: "CORNER"}
         # A simulation may differ in the copy, and nodes may remove or move attributes.
-        if _sizes(mesh) == _sizes(shown) and np.array_equal(_corners(mesh), _corners(shown)):
+        if _have_equal_faces(mesh, shown):
             kept = {
                 name: attribute
                 for name, domain in domains.items()
@@ -230,40 +233,40 @@ class _Copy:
             }
             if VERTEX in kept:
                 vertices = _first_equal(
-                    self.identities, _get(kept[VERTEX].data, "vector", 3, np.float32)
+                    self.identities, read(kept[VERTEX].data, "vector", 3, np.float32)
                 )
             if FACE in kept and PLACE in kept:
-                polygons = _get(shown.loop_triangles, "polygon_index", 1, np.int32)
-                loops = _get(shown.loop_triangles, "loops", 3, np.int32)
-                faces = _get(kept[FACE].data, "value", 1, np.int32)[polygons].astype(np.int64)
-                places = _get(kept[PLACE].data, "vector", 3, np.float32)[loops, :2]
-        starts = _get(self.cage.polygons, "loop_start", 1, np.int32)
-        corners = _corners(self.cage)[starts[:, None] + np.arange(3)]
+                number = read(kept[FACE].data, "value", 1, np.int32)
+                faces = number[triangle_faces(shown)].astype(np.int64)
+                places = read(kept[PLACE].data, "vector", 3, np.float32)[loops, :2]
+        starts = read(self.cage.polygons, "loop_start", 1, np.int32)
+        corners = corner_vertices(self.cage)[starts[:, None] + np.arange(3)]
         sizes = _sizes(self.cage)
-        return CageTrace(positions, vertices, sizes, corners, faces, places.astype(np.float64))
+        return CageTrace(positions, vertices, sizes, corners, faces, places)
+
+
+def _have_equal_faces(one, other) -> bool:
+    return _sizes(one) == _sizes(other) and np.array_equal(
+        corner_vertices(one), corner_vertices(other)
+    )
 
 
 def _first_equal(wanted: np.ndarray, among: np.ndarray) -> np.ndarray:
     """The first row of `among` with the same bytes as each row of `wanted`, or -1."""
-    whole = np.dtype((np.void, wanted.dtype.itemsize * wanted.shape[1]))
-    keys = np.ascontiguousarray(among).view(whole).ravel()
-    known, first = np.unique(keys, return_index=True)
-    searched = np.ascontiguousarray(wanted).view(whole).ravel()
-    if not len(known):
-        return np.full(len(searched), -1)
-    at = np.minimum(np.searchsorted(known, searched), len(known) - 1)
-    return np.where(known[at] == searched, first[at], -1)
+    known, order = np.unique(_keys(wanted), return_index=True)
+    keys = _keys(among)
+    at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    equal = np.flatnonzero(known[at] == keys)[::-1]
+    equal = equal[(among[equal] == wanted[order[at[equal]]]).all(axis=1)]
+    found = np.full(len(wanted), -1)
+    found[order[at[equal]]] = equal  # the last assignment, of the first row, counts
+    return found
+
+
+def _keys(rows: np.ndarray) -> np.ndarray:
+    """The first two of three single-precision numbers of each row as one number."""
+    return np.ascontiguousarray(rows[:, :2]).view(np.uint64)[:, 0]
 
 
 def _sizes(mesh) -> tuple:
     return len(mesh.vertices), len(mesh.polygons), len(mesh.loops)
-
-
-def _corners(mesh) -> np.ndarray:
-    return _get(mesh.loops, "vertex_index", 1, np.int32)
-
-
-def _get(sequence, name: str, width: int, kind) -> np.ndarray:
-    values = np.empty((len(sequence), width), dtype=kind)
-    sequence.foreach_get(name, values.ravel())
-    return values if width > 1 else values[:, 0]

@@ -7,12 +7,14 @@ copy of it.
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import bpy
 import numpy as np
 
 import bmesh
 
+from . import mesh_arrays
 from .cage_trace import CageTrace, trace
 from .messages import InputError
 from .vertex_weights import weights_on
@@ -62,7 +64,7 @@ class Surface:
         """Positions in the object's local space of points given by face and barycentrics."""
         return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal in the object's local space."""
         return float(np.linalg.norm(np.ptp(self.local, axis=0)))
@@ -89,16 +91,14 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
     Quads and larger faces are triangulated as Blender draws them.
     """
     with shown_mesh(mesh_object, use_modifiers) as (mesh, matrix):
-        local = _array(mesh.vertices, "co", 3, np.float32).astype(np.float64)
-        mesh.calc_loop_triangles()
-        triangles = mesh.loop_triangles
-        faces = _array(triangles, "vertices", 3, np.int32).astype(np.int64)
-        loops = _array(triangles, "loops", 3, np.int32).astype(np.int64)
-        polygons = _array(triangles, "polygon_index", 1, np.int32).astype(np.int64)
+        local = mesh_arrays.positions(mesh)
+        loops = mesh_arrays.triangle_corners(mesh).astype(np.int64)
+        faces = mesh_arrays.corner_vertices(mesh).astype(np.int64)[loops]
+        polygons = mesh_arrays.triangle_faces(mesh).astype(np.int64)
         hidden = np.zeros(len(faces), dtype=bool)
         if mesh_object.mode == "EDIT":
-            hidden = _array(mesh.polygons, "hide", 1, bool)[polygons]
-        cage = trace(mesh_object, mesh, cage_mesh) if use_modifiers and traced else None
+            hidden = mesh_arrays.read(mesh.polygons, "hide", 1, bool)[polygons]
+        cage = trace(mesh_object, mesh, loops, cage_mesh) if use_modifiers and traced else None
     linear = np.array(matrix.to_3x3(), dtype=np.float64)
     stretches = np.linalg.svd(linear, compute_uv=False)
     if stretches[-1] <= FLAT * stretches[0]:
@@ -218,13 +218,6 @@ def _depsgraph_of(mesh_object):
         f'"{mesh_object.name}" is in no view layer, so its modifiers are not computed. Bring it '
         "back to the scene, or turn Use Modifiers off"
     )
-
-
-def _array(sequence, name: str, width: int, kind) -> np.ndarray:
-    """An attribute of all elements, (n,) or (n, width)."""
-    values = np.empty((len(sequence), width), dtype=kind)
-    sequence.foreach_get(name, values.ravel())
-    return values if width > 1 else values[:, 0]
 
 
 def _keeps_proportions(linear: np.ndarray) -> bool:

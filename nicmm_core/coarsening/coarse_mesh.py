@@ -19,7 +19,7 @@ from scipy.sparse import csgraph
 from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.mesh import Mesh, edge_lengths
+from ..geometry.mesh import Mesh, corners_differ, edge_lengths
 from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
@@ -141,7 +141,7 @@ def build_coarse_mesh(
     if (cell[faces] < 0).any():
         cell = _nearest_seeds(mesh.vertices, graph, seed, np.inf)
     corners = cell[faces]
-    apart = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    apart = corners_differ(corners)
     checkpoint()
     corners = corners[apart]
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)

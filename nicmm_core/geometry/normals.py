@@ -8,7 +8,7 @@ import numpy as np
 from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh
+from .mesh import Mesh, blocks
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -27,10 +27,23 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     plane of its neighbours. Where faces of opposite orientation meet, as on a Möbius strip, normals
     would cancel; there the normal is the principal direction of the face normals.
     """
+    return normals_and_folds(mesh)[0]
+
+
+def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
+    """`unsigned_normals`, and the folded faces, (F,); None if no face is folded.
+
+    A folded face points against the normals of its corners. Faces at vertices where opposite
+    orientations meet never count: signs have no meaning there.
+    """
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = mesh.unoriented_vertices
-    checkpoint()
-    folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
+    against = _facing(mesh, normals) <= 0.0  # a normal of zero counts too
+    if not len(mixed) and not against.any():
+        return normals, None
+    corners = np.zeros(len(mesh.vertices), dtype=bool)
+    corners[mesh.faces[against.any(axis=1)]] = True
+    folded = np.setdiff1d(np.flatnonzero(corners), mixed)
     owner, face_normals, areas = _faces_around(mesh, folded)
     area_vector = np.zeros((len(folded), 3))
     np.add.at(area_vector, owner, areas[:, None] * face_normals)
@@ -41,36 +54,20 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     spread = np.zeros((len(mixed), 3, 3))
     np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
     normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
-    return normals
-
-
-def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
-    """Vertices of faces at an angle of at least 90° to the normal of a corner, ascending.
-
-    A normal of zero counts too.
-    """
-    folded = np.zeros(len(mesh.vertices), dtype=bool)
-    folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
-    return np.flatnonzero(folded)
-
-
-def folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:
-    """Faces that point against the normals of their corners; None if no face does.
-
-    Faces at vertices where opposite orientations meet never count: signs have no meaning there.
-    """
-    folded = _facing(mesh, normals).sum(axis=1) < 0.0
-    if folded.any():
-        mixed = np.zeros(len(mesh.vertices), dtype=bool)
-        mixed[mesh.unoriented_vertices] = True
-        folded &= ~mixed[mesh.faces].any(axis=1)
-    return folded if folded.any() else None
+    is_mixed = np.zeros(len(mesh.vertices), dtype=bool)
+    is_mixed[mixed] = True
+    faces = (_facing(mesh, normals).sum(axis=1) < 0.0) & ~is_mixed[mesh.faces].any(axis=1)
+    return normals, faces if faces.any() else None
 
 
 def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
     """Cosines between the normals of faces and of their corners, (F, 3)."""
-    checkpoint()
-    return np.einsum("fcd,fd->fc", normals[mesh.faces], mesh.face_normals)
+    facing = np.empty(mesh.faces.shape)
+    for block in blocks(len(mesh.faces)):
+        for corner in range(3):
+            of_corner = np.take(normals, mesh.faces[block, corner], axis=0)
+            facing[block, corner] = np.einsum("fd,fd->f", of_corner, mesh.face_normals[block])
+    return facing
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
-from .mesh import LARGEST, Mesh
+from .mesh import LARGEST, Mesh, blocks
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
@@ -164,13 +164,17 @@ def principal_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> PrincipalFrame:
     """The frame of a surface, computed from the centroids and areas of its faces."""
-    centroids = vertices[faces].mean(axis=1)
+    offset = np.empty(faces.shape)
+    for block in blocks(len(faces)):
+        first, second, third = (np.take(vertices, corner, axis=0) for corner in faces[block].T)
+        offset[block] = (first + second + third) / 3.0
     share = face_areas / face_areas.sum()
-    centre = share @ centroids
-    offset = centroids - centre
+    centre = share @ offset
+    offset -= centre
     squares, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
     deviation = float(np.sqrt(squares.sum()))
-    skewness = share @ (offset @ axes / max(deviation, TINY)) ** 3
+    along = offset @ axes / max(deviation, TINY)
+    skewness = share @ (along * along * along)
     return PrincipalFrame(centre, deviation, axes, skewness)
 
 

@@ -13,7 +13,7 @@ from scipy import sparse
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
-from ..geometry.normals import folded_faces, unit_vectors, unsigned_normals
+from ..geometry.normals import normals_and_folds, unit_vectors
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import feature_map
 
@@ -60,8 +60,8 @@ class CurveSurface:
 
 def curve_surface(mesh: Mesh) -> CurveSurface:
     """The surface of a mesh, without a feature map."""
-    normals = unsigned_normals(mesh)
-    return CurveSurface(mesh, normals, folded=folded_faces(mesh, normals))
+    normals, folded = normals_and_folds(mesh)
+    return CurveSurface(mesh, normals, folded=folded)
 
 
 def with_maps(

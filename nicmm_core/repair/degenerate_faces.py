@@ -7,7 +7,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components
-from ..geometry.mesh import edge_lengths, unique_edges
+from ..geometry.mesh import blocks, edge_lengths, triangle_areas, unique_edges
 from ..progress import checkpoint
 
 ATTEMPTS = 4
@@ -33,14 +33,21 @@ def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray
     -------
     (f,) bool array
     """
-    checkpoint()
-    sides = vertices[np.roll(faces, -1, axis=1)]
-    sides -= vertices[faces]
-    checkpoint()
-    lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
-    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    without = twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
-    return without | (lengths[:, 0] <= short)
+    flat = np.empty(len(faces), dtype=bool)
+    for block in blocks(len(faces)):
+        corners = [np.take(vertices, corner, axis=0) for corner in faces[block].T]
+        squared = [_squared_lengths(corners[corner - 1] - corners[corner]) for corner in range(3)]
+        shortest = np.sqrt(np.minimum.reduce(squared))
+        longest = np.sqrt(np.maximum.reduce(squared))
+        twice_area = 2.0 * triangle_areas(vertices, faces[block])
+        without = twice_area <= tolerances.WITHOUT_AREA * shortest * longest
+        flat[block] = without | (shortest <= short)
+    return flat
+
+
+def _squared_lengths(vectors: FloatArray) -> FloatArray:
+    x, y, z = vectors.T
+    return x * x + y * y + z * z
 
 
 def with_areas(

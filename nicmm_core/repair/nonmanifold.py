@@ -21,7 +21,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.grouping import components, distinct_rows, grouped
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, corners_differ
 from ..progress import checkpoint
 from .degenerate_faces import flat_faces, with_areas
 from .edge_subdivision import SubdividedFaces, subdivided
@@ -33,6 +33,9 @@ REPAIRS = 4
 SEGMENTS = 2
 """Segments of each piece of an edge. The point between them belongs to one pair of faces only, so
 no two edges of the result have the same ends."""
+
+MOST_FACES = 100
+"""Faces at a vertex up to which a mesh is checked for defects by walking round its vertices."""
 
 MOST_COMPARED = 32
 """Faces at an edge up to which all pairs are compared to find the straightest one."""
@@ -58,6 +61,12 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     """
     connected = number % 2 == 1
     welded = np.arange(len(mesh.vertices))
+    if number < 2 and len(usable) == len(mesh.faces) and is_manifold(mesh):
+        return (
+            None
+            if connected
+            else _with_areas(mesh, welded, mesh.faces, mesh.vertices, usable, None, welded)
+        )
     if number >= 2:
         welded = welded_vertices(mesh)
         if (welded == np.arange(len(welded))).all():
@@ -88,6 +97,40 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
 
 
+def is_manifold(mesh: Mesh) -> bool:
+    """Whether a mesh is surely an oriented manifold, whose faces need no pairing.
+
+    Edges have at most two faces, of one orientation and with different corners, and the faces at
+    each vertex are one fan. False too where a vertex has more than `MOST_FACES` faces.
+    """
+    if not mesh.is_oriented or mesh.has_nonmanifold_edges or _has_lone_twins(mesh):
+        return False
+    faces, across = mesh.faces, mesh.face_neighbours
+    degree = np.bincount(faces.ravel(), minlength=len(mesh.vertices))
+    if degree.max() > MOST_FACES:
+        return False
+    # From one corner of each vertex, at an open fan the last one, the faces before it in turn.
+    face = np.zeros(len(mesh.vertices), dtype=np.int64)
+    for corner in range(3):
+        checkpoint()
+        face[faces[:, corner]] = np.arange(len(faces))
+    for corner in range(3):
+        checkpoint()
+        last = np.flatnonzero(across[:, corner - 1] < 0)
+        face[faces[last, corner]] = last
+    vertex = np.flatnonzero(degree)
+    face = first = face[vertex]
+    visited = np.zeros(len(degree), dtype=np.int64)
+    while len(vertex):
+        checkpoint()
+        visited[vertex] += 1
+        corner = (faces[face] == vertex[:, None]).argmax(axis=1)
+        face = across[face, corner - 2]
+        going = (face >= 0) & (face != first)
+        vertex, face, first = vertex[going], face[going], first[going]
+    return bool((visited == degree).all())
+
+
 def welded_vertices(mesh: Mesh) -> IntArray:
     """The first vertex at the position of each vertex of an open edge, shape (V,).
 
@@ -106,8 +149,9 @@ def welded_vertices(mesh: Mesh) -> IntArray:
 
 def _has_lone_twins(mesh: Mesh) -> bool:
     """Whether two faces have the same three corners and their edges have no other faces."""
-    across = mesh.face_neighbours
-    return bool(((across == np.roll(across, 1, axis=1)) & (across >= 0)).any())
+    one, other, third = mesh.face_neighbours.T
+    alike = ((one == other) & (one >= 0)) | ((other == third) & (other >= 0))
+    return bool((alike | ((third == one) & (third >= 0))).any())
 
 
 def _without_twins(faces: IntArray) -> IntArray:
@@ -291,7 +335,7 @@ def _with_areas(
     Copies of a vertex of the original are moved apart.
     """
     # A side with both ends welded to one vertex has no length, so its face is left out.
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    whole = corners_differ(faces)
     if not whole.all():
         faces, face = faces[whole], face[whole]
         corners = None if corners is None else corners[whole]

@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.geometry.mesh import unique_edges, unoriented_vertices
+from nicmm_core.geometry.mesh import unique_edges
 from tests.core.checks import flipped, joined
 
 CORNERS = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0]]
@@ -154,16 +154,17 @@ def test_a_face_without_area_has_no_normal():
 
 
 def test_only_vertices_of_a_face_turned_over_are_unoriented(ball):
-    assert len(unoriented_vertices(ball.faces)) == 0
+    assert len(ball.unoriented_vertices) == 0
     faces = ball.faces.copy()
     faces[37] = faces[37, ::-1]
-    np.testing.assert_array_equal(unoriented_vertices(faces), np.sort(faces[37]))
+    turned = nicmm.Mesh(ball.vertices, faces)
+    np.testing.assert_array_equal(turned.unoriented_vertices, np.sort(faces[37]))
 
 
 def test_a_moebius_strip_is_unoriented_across_its_seam_and_nowhere_else():
     strip = shapes.moebius_strip(12, 3)
     # The first ring, where the last one is joined to it turned over.
-    np.testing.assert_array_equal(unoriented_vertices(strip.faces), np.arange(4))
+    np.testing.assert_array_equal(strip.unoriented_vertices, np.arange(4))
 
 
 def test_edges_are_those_of_the_faces_once_each(surface):

@@ -6,10 +6,10 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry import tolerances
-from nicmm_core.geometry.mesh import unique_edges
+from nicmm_core.geometry.mesh import corners_differ, unique_edges
 from nicmm_core.geometry.surface_points import locate_points
 from nicmm_core.path.leg_graph import nonmanifold_vertices
-from nicmm_core.repair.nonmanifold import REPAIRS, repaired, welded_vertices
+from nicmm_core.repair.nonmanifold import REPAIRS, _Sides, is_manifold, repaired, welded_vertices
 from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import grid, joined
 from tests.oracles import corpus
@@ -50,6 +50,31 @@ def test_meshes_without_defects_are_their_own_copy(mesh):
     first, *others = repairs_of(mesh)
     assert first.mesh is mesh and not first.differs
     assert others == [None, None, None]
+
+
+@pytest.mark.parametrize("seed", [None, *range(8)])
+def test_a_mesh_taken_for_a_manifold_needs_no_cut(seed):
+    """Checked on defects, and on spheres some of whose vertices are welded at random."""
+    meshes = list(MESHES.values())
+    if seed is not None:
+        generator = np.random.default_rng(seed)
+        ball = shapes.sphere(2)
+        number = np.arange(len(ball.vertices))
+        number[generator.choice(len(number), seed, replace=False)] = generator.integers(len(number))
+        meshes = [nicmm.Mesh(ball.vertices, faces_between(number[ball.faces]))]
+    for mesh in meshes:
+        sides = _Sides(mesh.faces, np.arange(len(mesh.vertices)))
+        needs_none = not sides.branching and np.array_equal(
+            sides.cut(sides.plain_pairs, len(mesh.vertices))[0], mesh.faces
+        )
+        assert needs_none or not is_manifold(mesh)
+    if seed in (None, 0):
+        assert is_manifold(shapes.sphere(2)) and is_manifold(shapes.disc(4))
+
+
+def faces_between(faces):
+    """Faces whose corners differ."""
+    return faces[corners_differ(faces)]
 
 
 @pytest.mark.parametrize("name", MESHES)
