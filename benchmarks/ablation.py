@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -15,16 +15,22 @@ from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.trainable_network import CurveNetwork
 from nicmm_core.status import Status
 
-from . import collections, report
+from . import collections, plots, report
+from .evidence import Results
 from .scale import Scale
 from .solving import (
-    Runs,
-    least_losses_figure,
+    PARTS_WITHOUT,
+    Sample,
     level_set,
     random_samples,
     run_networks,
+    significant,
     train,
 )
+
+TITLE = "Ablation (Table 3, Table 4)"
+TIMED = True
+WITHOUT = PARTS_WITHOUT
 
 SEED = 11
 TEST_SEED = 12
@@ -64,27 +70,7 @@ PAPER_FEATURES = {ALL_FEATURES: 32.0, "w/o normals": 35.4, "w/o φ_p": 75.4, "w/
 """Average iterations of Table 4."""
 
 
-@dataclass(frozen=True)
-class Stop:
-    """How fine-tuning for one set ended.
-
-    Attributes
-    ----------
-    iterations : int
-    loss : float
-    early : bool
-        Whether the early stop ended it and not the cap.
-    one_loop : bool
-        Whether the level set as it is was one closed loop through all points.
-    """
-
-    iterations: int
-    loss: float
-    early: bool
-    one_loop: bool
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Pretrain every variant alike on one mesh and fine-tune for other sets of that mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets, epochs = scale.choose(100, 6, 4), scale.choose(10, 2)
@@ -98,22 +84,51 @@ def run(scale: Scale) -> None:
     stops = _early_stops(
         {label: networks[label] for label in FEATURES}, name, mesh, scale.choose(10, 1), cap
     )
-    figure = least_losses_figure(
-        runs, "Networks without their modules (Table 3)", "ablation", scale
+    return {
+        "collection": collections.label(scale),
+        "mesh": name,
+        "vertices": len(mesh.vertices),
+        "pretraining": {"seed": SEED, "sets": sets, "epochs": epochs, "seconds": seconds},
+        "modules": {"seed": TEST_SEED, "iterations": ITERATIONS, "runs": runs},
+        "features": {
+            "seed": FEATURE_SEED,
+            "cap": cap,
+            "least_iterations": FinetuningConfig.least_iterations,
+            "stops": stops,
+        },
+    }
+
+
+def section(results: Results) -> str:
+    """Both tables, and whether they agree with the paper's."""
+    pretraining, modules, features = (
+        results[part] for part in ("pretraining", "modules", "features")
     )
-    body = (
-        f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices. Every variant "
-        f"is pretrained on the same {sets} sets (seed {SEED}) × {epochs} epochs; that takes "
-        f"{min(seconds.values()):.0f} to {max(seconds.values()):.0f} s on one core, where the "
+    seconds, runs, stops = pretraining["seconds"].values(), modules["runs"], features["stops"]
+    return (
+        f"Mesh {results['mesh']} ({results['collection']}), {results['vertices']} vertices. Every "
+        f"variant is pretrained on the same {pretraining['sets']} sets (seed "
+        f"{pretraining['seed']}) × {pretraining['epochs']} epochs; that takes "
+        f"{min(seconds):.0f} to {max(seconds):.0f} s on one core, where the "
         "paper has 30 minutes (Table 3) and 2 minutes (Table 4) on an RTX 4090, out of reach "
         "here. Sets have 3–5 random vertices, shortest order.\n\n"
-        f"### Modules (Table 3)\n\n{len(runs[FULL].seconds)} sets (seed {TEST_SEED}), "
-        f"{ITERATIONS} iterations.\n\n{_module_table(runs)}\n\n{_module_findings(runs)}\n\n"
-        f"{figure}\n\n"
-        f"### Input features (Table 4)\n\n{len(stops[ALL_FEATURES])} sets (seed {FEATURE_SEED}), "
-        f"with early stop.\n\n{_feature_table(stops, cap)}\n\n{_feature_findings(stops)}"
+        f"### Modules (Table 3)\n\n{len(runs[FULL]['seconds'])} sets (seed {modules['seed']}), "
+        f"{modules['iterations']} iterations.\n\n{_module_table(runs)}\n\n"
+        f"{_module_findings(runs)}\n\n"
+        f"{report.figure('ablation.png', plots.LEAST_LOSSES)}\n\n"
+        f"### Input features (Table 4)\n\n{len(stops[ALL_FEATURES])} sets (seed "
+        f"{features['seed']}), with early stop.\n\n{_feature_table(stops, features['cap'])}\n\n"
+        f"{_feature_findings(stops, features['least_iterations'])}"
     )
-    report.write_section("ablation", "Ablation (Table 3, Table 4)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw the losses of the networks without their modules."""
+    plots.least_losses(
+        {label: run["mean_losses"] for label, run in results["modules"]["runs"].items()},
+        "Networks without their modules (Table 3)",
+        folder / "ablation.png",
+    )
 
 
 def _pretrained(
@@ -128,22 +143,23 @@ def _pretrained(
             networks[label], seconds[label] = networks[same], seconds[same]
             continue
         trained = train(mesh, sets, epochs, SEED, config)
-        networks[label], seconds[label] = trained.network, trained.training_seconds
+        networks[label] = trained.network
+        seconds[label] = round(trained.training_seconds, 2)
     return networks, seconds
 
 
-def _module_table(runs: Mapping[str, Runs]) -> str:
+def _module_table(runs: Mapping[str, Results]) -> str:
     rows: list[tuple[object, ...]] = []
     for label, one in runs.items():
         milliseconds, loss = PAPER_MODULES[label]
         rows.append(
             (
                 label,
-                f"{1000 * one.seconds.mean():.0f}",
+                f"{1000 * np.mean(one['seconds']):.0f}",
                 milliseconds,
                 f"{_time_ratio(runs, label):.2f}",
                 f"{milliseconds / PAPER_MODULES[FULL][0]:.2f}",
-                f"{one.least_losses[:, -1].mean():.4f}",
+                f"{np.mean(one['last_losses']):.4f}",
                 f"{loss:.2f}",
                 f"{_loss_ratio(runs, label):.2f}",
                 f"{loss / PAPER_MODULES[FULL][1]:.2f}",
@@ -155,22 +171,22 @@ def _module_table(runs: Mapping[str, Runs]) -> str:
     return report.table(header, rows)
 
 
-def _time_ratio(runs: Mapping[str, Runs], label: str) -> float:
-    return float(runs[label].seconds.mean() / runs[FULL].seconds.mean())
+def _time_ratio(runs: Mapping[str, Results], label: str) -> float:
+    return float(np.mean(runs[label]["seconds"]) / np.mean(runs[FULL]["seconds"]))
 
 
-def _loss_ratio(runs: Mapping[str, Runs], label: str) -> float:
-    return float(runs[label].least_losses[:, -1].mean() / runs[FULL].least_losses[:, -1].mean())
+def _loss_ratio(runs: Mapping[str, Results], label: str) -> float:
+    return float(np.mean(runs[label]["last_losses"]) / np.mean(runs[FULL]["last_losses"]))
 
 
-def _module_findings(runs: Mapping[str, Runs]) -> str:
+def _module_findings(runs: Mapping[str, Results]) -> str:
     """What Table 3 says, in words."""
     text = ""
-    for label in MODULES:
+    for label in runs:
         if label == FULL:
             continue
         loss, paper = _loss_ratio(runs, label), PAPER_MODULES[label][1] / PAPER_MODULES[FULL][1]
-        higher = runs[label].least_losses[:, -1] > runs[FULL].least_losses[:, -1]
+        higher = np.greater(runs[label]["last_losses"], runs[FULL]["last_losses"])
         if loss < 1.0:
             verdict = "lower, which contradicts the paper"
         elif loss - 1.0 < 0.25 * (paper - 1.0):
@@ -181,7 +197,7 @@ def _module_findings(runs: Mapping[str, Runs]) -> str:
             f"{label[0].upper()}{label[1:]} the loss is {verdict} ({loss:.2f} against "
             f"{paper:.2f}; higher on {100 * higher.mean():.0f} % of the sets). "
         )
-    faster = all(_time_ratio(runs, label) < 1.0 for label in MODULES if label != FULL)
+    faster = all(_time_ratio(runs, label) < 1.0 for label in runs if label != FULL)
     text += (
         "Each module costs time, as in the paper. "
         if faster
@@ -196,37 +212,45 @@ def _module_findings(runs: Mapping[str, Runs]) -> str:
 
 def _early_stops(
     networks: Mapping[str, CurveNetwork], name: str, mesh: Mesh, count: int, cap: int
-) -> dict[str, list[Stop]]:
-    stops: dict[str, list[Stop]] = {label: [] for label in networks}
-    config = FinetuningConfig(iterations=cap)
+) -> dict[str, list[Results]]:
+    """How fine-tuning ends, by network."""
+    stops: dict[str, list[Results]] = {label: [] for label in networks}
     for sample in random_samples([(name, mesh)], count, FEATURE_SEED):
         started = time.perf_counter()
         for label, network in networks.items():
-            finetuned = finetune(network, sample.problem, sample.weights, config)
-            stops[label].append(
-                Stop(
-                    iterations=finetuned.iterations,
-                    loss=min(finetuned.losses),
-                    early=finetuned.status == Status.CONVERGED,
-                    one_loop=is_one_curve(level_set(sample, finetuned.field)),
-                )
-            )
-        counts = ", ".join(f"{label} {stops[label][-1].iterations}" for label in networks)
+            stops[label].append(_stop(network, sample, cap))
+        counts = ", ".join(f"{label} {ends[-1]['iterations']}" for label, ends in stops.items())
         print(f"  {name}: {counts}, {time.perf_counter() - started:.0f} s", flush=True)
     if not stops[ALL_FEATURES]:
         raise SystemExit("No set had a simple loop through its points; there is nothing to measure")
     return stops
 
 
-def _feature_table(stops: Mapping[str, Sequence[Stop]], cap: int) -> str:
+def _stop(network: CurveNetwork, sample: Sample, cap: int) -> Results:
+    """How fine-tuning for one set ends.
+
+    It is early if the early stop ends it and not the cap, and one loop if the level set itself is
+    one closed loop through all points.
+    """
+    config = FinetuningConfig(iterations=cap)
+    finetuned = finetune(network, sample.problem, sample.weights, config)
+    return {
+        "iterations": finetuned.iterations,
+        "loss": significant(min(finetuned.losses)),
+        "early": finetuned.status == Status.CONVERGED,
+        "one_loop": bool(is_one_curve(level_set(sample, finetuned.field))),
+    }
+
+
+def _feature_table(stops: Mapping[str, Sequence[Results]], cap: int) -> str:
     rows = [
         (
             label,
             f"{_iterations(ends):.1f}",
             f"{PAPER_FEATURES[label]:.1f}",
-            sum(not end.early for end in ends),
-            f"{np.mean([end.loss for end in ends]):.4f}",
-            f"{sum(end.one_loop for end in ends)} of {len(ends)}",
+            sum(not end["early"] for end in ends),
+            f"{np.mean([end['loss'] for end in ends]):.4f}",
+            f"{sum(end['one_loop'] for end in ends)} of {len(ends)}",
         )
         for label, ends in stops.items()
     ]
@@ -237,11 +261,11 @@ def _feature_table(stops: Mapping[str, Sequence[Stop]], cap: int) -> str:
     return report.table(header, rows)
 
 
-def _iterations(ends: Sequence[Stop]) -> float:
-    return float(np.mean([end.iterations for end in ends]))
+def _iterations(ends: Sequence[Results]) -> float:
+    return float(np.mean([end["iterations"] for end in ends]))
 
 
-def _feature_findings(stops: Mapping[str, Sequence[Stop]]) -> str:
+def _feature_findings(stops: Mapping[str, Sequence[Results]], least_iterations: int) -> str:
     """What Table 4 says, in words."""
     full = _iterations(stops[ALL_FEATURES])
     text = ""
@@ -257,14 +281,14 @@ def _feature_findings(stops: Mapping[str, Sequence[Stop]]) -> str:
             f"{label[0].upper()}{label[1:]} it takes {ratio:.2f} times as many iterations, "
             f"{agrees} ({paper:.2f}). "
         )
-    losses = {label: float(np.mean([end.loss for end in ends])) for label, ends in stops.items()}
+    losses = {label: float(np.mean([end["loss"] for end in ends])) for label, ends in stops.items()}
     if losses[ALL_FEATURES] == min(losses.values()):
         text += (
             "Fewer iterations do not mean a better end: the early stop fires when the energy "
             "rests, at whatever value, and the loss then is least with all features. "
         )
     without = stops["w/o φ₀"]
-    loops = sum(end.one_loop for end in without)
+    loops = sum(end["one_loop"] for end in without)
     text += (
         "A channel switched off is fed as zeros, in pretraining too. Without φ₀ the network's "
         "output is no longer added to it either, so nothing says how the points are joined or "
@@ -281,7 +305,4 @@ def _feature_findings(stops: Mapping[str, Sequence[Stop]]) -> str:
             "The early stop only sees that the energy rests, not whether there is a curve, so "
             "that row's iterations say little; the paper does not mention this. "
         )
-    return text + (
-        f"The early stop does not count stillness before {FinetuningConfig.least_iterations} "
-        "iterations."
-    )
+    return text + f"The early stop does not count stillness before {least_iterations} iterations."

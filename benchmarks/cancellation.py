@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import igl
 import numpy as np
@@ -17,7 +18,12 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from tests.oracles.defects import defective_meshes
 
 from . import report
+from .evidence import Results
 from .scale import Scale
+
+TITLE = "Cancelling"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 0
 
@@ -51,34 +57,66 @@ class Gaps:
         return float(gaps[place]), f"{self.places[place]} to {self.places[place + 1]}"
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Design on large and on bad meshes, and note every question."""
-    rows = []
-    for name, mesh, points, arguments in _requests(scale):
-        gaps, designer = Gaps(), nicmm.Designer  # which loads the core, once
-        with _always_asked():
-            gaps.note("start")
-            design = designer(mesh).design(points, progress=gaps, **arguments)
-            gaps.note("end")
-        longest, where = gaps.longest
-        total = gaps.seconds[-1] - gaps.seconds[0]
-        backwards = int((np.diff(gaps.fractions) < 0.0).sum())
-        counted = int((np.diff(gaps.seconds) > LONG).sum())
-        rows.append(
-            (name, len(mesh.faces), design.status.name.lower(), f"{total:.1f}",
-             len(gaps.fractions), counted, f"{longest:.2f}", where, backwards)
-        )  # fmt: skip
+    return {
+        "seed": SEED,
+        "long": LONG,
+        "interval": progress.INTERVAL,
+        "designs": [_designed(*request) for request in _requests(scale)],
+    }
+
+
+def section(results: Results) -> str:
+    """The longest times, and where they passed."""
     header = (
-        "mesh", "faces", "status", "seconds", "questions", f"longer than {LONG:g} s apart",
-        "longest, s", "from … to", "fractions that fell",
+        "mesh", "faces", "status", "seconds", "questions",
+        f"longer than {results['long']:g} s apart", "longest, s", "from … to",
+        "fractions that fell",
     )  # fmt: skip
-    body = (
-        f"Seed {SEED}. CPU time between two places where a design asks whether to go on; the "
-        f"progress function itself is called at most every {progress.INTERVAL:g} s. The longest "
-        "times are single calls that pass over arrays of the size of the mesh.\n\n"
-        + report.table(header, rows)
+    rows = [
+        (
+            each["mesh"],
+            each["faces"],
+            each["status"],
+            f"{each['seconds']:.1f}",
+            each["questions"],
+            each["long"],
+            f"{each['longest']:.2f}",
+            each["where"],
+            each["backwards"],
+        )
+        for each in results["designs"]
+    ]
+    return (
+        f"Seed {results['seed']}. CPU time between two places where a design asks whether to go "
+        "on; the progress function itself is called at most every "
+        f"{results['interval']:g} s. The longest times are single calls that pass over arrays of "
+        "the size of the mesh.\n\n" + report.table(header, rows)
     )
-    report.write_section("cancellation", "Cancelling", body, scale)
+
+
+def _designed(
+    name: str, mesh: nicmm.Mesh, points: IntArray | FloatArray, arguments: dict[str, Any]
+) -> Results:
+    """One design with the times between its questions."""
+    gaps, designer = Gaps(), nicmm.Designer  # which loads the core, once
+    with _always_asked():
+        gaps.note("start")
+        design = designer(mesh).design(points, progress=gaps, **arguments)
+        gaps.note("end")
+    longest, where = gaps.longest
+    return {
+        "mesh": name,
+        "faces": len(mesh.faces),
+        "status": design.status.name.lower(),
+        "seconds": round(gaps.seconds[-1] - gaps.seconds[0], 4),
+        "questions": len(gaps.fractions),
+        "long": int((np.diff(gaps.seconds) > LONG).sum()),
+        "longest": round(longest, 4),
+        "where": where,
+        "backwards": int((np.diff(gaps.fractions) < 0.0).sum()),
+    }
 
 
 @contextmanager
@@ -105,7 +143,7 @@ def _asking() -> str:
 
 def _requests(
     scale: Scale,
-) -> Iterator[tuple[str, nicmm.Mesh, IntArray | FloatArray, dict[str, object]]]:
+) -> Iterator[tuple[str, nicmm.Mesh, IntArray | FloatArray, dict[str, Any]]]:
     """Name, mesh, points and arguments."""
     creature = shapes.creature(1, faces=1_300, subdivisions=0)
     for subdivisions in range(scale.choose(2, 2, 1), scale.choose(6, 4, 2)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -15,14 +15,20 @@ from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.status import Status
 
 from . import collections, plots, renders, report
+from .evidence import Results
 from .scale import Scale
 from .solving import (
+    PARTS_WITHOUT,
     Sample,
     designed_curve,
     random_samples,
     relative_distances,
+    significant,
     without_early_stop,
 )
+
+TITLE = "Convergence and early stop (Fig. 3, Fig. 4)"
+WITHOUT = PARTS_WITHOUT
 
 SEED = 3
 LATER = (100, 200, 500)
@@ -38,58 +44,71 @@ INDISTINGUISHABLE = 1.0
 RESTING = 0.1
 """Share of its value that a loss may fall further when it is said to rest."""
 
+STILLS = "convergence_curves.png"
 PICTURED = 3
 COLOURS = (renders.BLUE, renders.ORANGE, renders.GREEN, renders.YELLOW)
 
 
-@dataclass(frozen=True)
-class Course:
-    """One fine-tuning run, continued far beyond its early stop.
-
-    Attributes
-    ----------
-    sample : Sample
-    stop : int
-        Iteration of the early stop.
-    early : bool
-        Whether it was one, and not the cap.
-    losses : list of float
-        Of every iteration.
-    curves : list of SurfaceCurve
-        At the early stop and later.
-    by_itself : list of bool
-        Which of them were one loop before the topology was held.
-    seconds : list of float
-        Of fine-tuning until then.
-    """
-
-    sample: Sample
-    stop: int
-    early: bool
-    losses: list[float]
-    curves: list[SurfaceCurve]
-    by_itself: list[bool]
-    seconds: list[float]
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Continue fine-tuning beyond its early stop, on several meshes."""
     network = load_network()
     meshes = collections.surfaces(scale, scale.choose(8, 1))
-    courses = [_followed(network, sample) for sample in random_samples(meshes, 1, SEED)]
+    courses: list[Results] = []
+    pictures: list[renders.Picture] = []
+    for sample in random_samples(meshes, 1, SEED):
+        course, curves = _followed(network, sample)
+        courses.append(course)
+        pictures.append(_picture(sample, course["stop"], curves))
     if not courses:
         raise SystemExit("No set had a simple loop through its points; there is nothing to follow")
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order, "
-        f"{collections.label(scale)}, shipped weights. Distances are mean / greatest in percent "
-        "of the bounding box's diagonal; seconds are of the prediction stage alone.\n\n"
-        f"{_table(courses)}\n\n{_findings(courses)}\n\n{_loss_plot(courses, scale)}\n\n"
-        f"{_stills(courses, scale)}"
+    path = report.figures_folder(scale) / STILLS
+    renders.render_sheet(pictures[:PICTURED], path, scale, columns=PICTURED)
+    return {
+        "seed": SEED,
+        "collection": collections.label(scale),
+        "later": list(LATER),
+        "courses": courses,
+        "stills": STILLS,
+    }
+
+
+def section(results: Results) -> str:
+    """The course of every loss and curve, and whether they agree with the paper's."""
+    courses, later = results["courses"], results["later"]
+    loss_plot = report.figure(
+        "convergence.png",
+        "Loss against the iteration; dots: early stop; dashed: where the paper sees a plateau",
     )
-    report.write_section("convergence", "Convergence and early stop (Fig. 3, Fig. 4)", body, scale)
+    first, second, third = later
+    stills = report.figure(
+        results["stills"],
+        f"Curves at the early stop (blue), {first} (orange), {second} (green) and {third} (yellow)",
+    )
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, "
+        f"{results['collection']}, shipped weights. Distances are mean / greatest in percent "
+        "of the bounding box's diagonal; seconds are of the prediction stage alone.\n\n"
+        f"{_table(courses, later)}\n\n{_findings(courses, later)}\n\n{loss_plot}\n\n{stills}"
+    )
 
 
-def _followed(network: CurveNetwork, sample: Sample) -> Course:
+def draw(results: Results, folder: Path) -> None:
+    """Draw the losses."""
+    figure, axes = plots.labelled("Loss of every iteration (Fig. 3)", "iteration", "total loss")
+    for course in results["courses"]:
+        losses = _losses(course)
+        (line,) = axes.plot(losses, linewidth=1.0, label=course["mesh"])
+        stop = min(course["stop"], len(losses)) - 1
+        axes.plot(stop, losses[stop], "o", color=line.get_color())
+    axes.axvline(PAPER_PLATEAU, color="0.4", linestyle="--", linewidth=1)
+    axes.set_yscale("log")
+    plots.plain_ticks(axes.yaxis)
+    axes.legend(fontsize=8, ncols=2)
+    plots.save(figure, folder / "convergence.png")
+
+
+def _followed(network: CurveNetwork, sample: Sample) -> tuple[Results, list[SurfaceCurve]]:
+    """One fine-tuning run, continued far beyond its early stop, and its curves there and later."""
     early = finetune(network, sample.problem, sample.weights, FinetuningConfig())
     wanted = (early.iterations, *LATER)
     fields: dict[int, FloatArray] = {}
@@ -108,42 +127,53 @@ def _followed(network: CurveNetwork, sample: Sample) -> Course:
         network, sample.problem, sample.weights, without_early_stop(LATER[-1]), watch
     ).losses
     outcomes = [designed_curve(sample, fields[iteration]) for iteration in wanted]
+    curves = [curve for curve, _ in outcomes]
     print(f"  {sample.name}: {early.status} at {early.iterations}", flush=True)
-    return Course(
-        sample=sample,
-        stop=early.iterations,
-        early=early.status == Status.CONVERGED,
-        losses=losses,
-        curves=[curve for curve, _ in outcomes],
-        by_itself=[by_itself for _, by_itself in outcomes],
-        seconds=[seconds[iteration] for iteration in wanted],
-    )
+    course = {
+        "mesh": sample.name,
+        "stop": early.iterations,
+        "early": early.status == Status.CONVERGED,
+        "losses": [significant(loss) for loss in losses],
+        "by_itself": [bool(by_itself) for _, by_itself in outcomes],
+        "seconds": [significant(seconds[iteration]) for iteration in wanted],
+        "distances": _distances(sample, curves),
+    }
+    return course, curves
 
 
-def _distances(course: Course) -> list[tuple[float, float]]:
-    """From each curve to the next, and from the first to the last."""
-    pairs = [*zip(course.curves, course.curves[1:], strict=False)]
-    pairs.append((course.curves[0], course.curves[-1]))
-    return [relative_distances(course.sample, *pair) for pair in pairs]
+def _distances(sample: Sample, curves: Sequence[SurfaceCurve]) -> list[list[float | None]]:
+    """Mean and greatest from each curve to the next, and from the first to the last."""
+    pairs = [*zip(curves, curves[1:], strict=False), (curves[0], curves[-1])]
+    return [[significant(value) for value in relative_distances(sample, *pair)] for pair in pairs]
 
 
-def _fallen(course: Course, iteration: int) -> float:
+def _picture(sample: Sample, stop: int, curves: Sequence[SurfaceCurve]) -> renders.Picture:
+    title = f"{sample.name}, early stop after {stop}"
+    return renders.Picture(title, sample.mesh, list(zip(curves, COLOURS, strict=True)))
+
+
+def _losses(course: Results) -> FloatArray:
+    """Of every iteration; NaN where they were not finite."""
+    return np.array(course["losses"], dtype=np.float64)
+
+
+def _fallen(course: Results, iteration: int) -> float:
     """Share of the loss's fall, from the start to the end, that is done by an iteration."""
-    least = np.fmin.accumulate(course.losses)
+    least = np.fmin.accumulate(_losses(course))
     whole = least[0] - least[-1]
     return float((least[0] - least[iteration]) / whole) if whole > 0.0 else 1.0
 
 
-def _table(courses: Sequence[Course]) -> str:
+def _table(courses: Sequence[Results], later: Sequence[int]) -> str:
     rows: list[tuple[object, ...]] = []
     for course in courses:
         rows.append(
             (
-                course.sample.name,
-                f"{course.stop}" if course.early else f"{course.stop} (cap)",
-                " · ".join(f"{value:.1f}" for value in course.seconds),
-                *(f"{mean:.2f} / {most:.2f}" for mean, most in _distances(course)),
-                " ".join("yes" if one else "no" for one in course.by_itself),
+                course["mesh"],
+                f"{course['stop']}" if course["early"] else f"{course['stop']} (cap)",
+                " · ".join(f"{value:.1f}" for value in course["seconds"]),
+                *(f"{mean:.2f} / {most:.2f}" for mean, most in course["distances"]),
+                " ".join("yes" if one else "no" for one in course["by_itself"]),
                 f"{100 * _fallen(course, PAPER_PLATEAU):.0f} %",
             )
         )
@@ -151,28 +181,29 @@ def _table(courses: Sequence[Course]) -> str:
         ("paper, Fig. 4", PAPER_EARLY_STOP, "–", *["“nearly indistinguishable”"] * 4, "–",
          "“notably plateaus”")
     )  # fmt: skip
-    later = " · ".join(map(str, LATER))
+    first, second, third = later
     header = (
-        "mesh", "early stop", f"seconds at the stop · {later}", "stop to 100", "100 to 200",
-        "200 to 500", "stop to 500", f"one loop by itself at the stop, {later}",
+        "mesh", "early stop", f"seconds at the stop · {first} · {second} · {third}",
+        f"stop to {first}", f"{first} to {second}", f"{second} to {third}", f"stop to {third}",
+        f"one loop by itself at the stop, {first} · {second} · {third}",
         f"loss fallen by iteration {PAPER_PLATEAU}",
     )  # fmt: skip
     return report.table(header, rows)
 
 
-def _findings(courses: Sequence[Course]) -> str:
+def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     """What the table says, in words."""
-    stops = [course.stop for course in courses]
-    greatest = [_distances(course)[-1][1] for course in courses]
+    stops = [course["stop"] for course in courses]
+    greatest = [course["distances"][-1][1] for course in courses]
     same = sum(value <= INDISTINGUISHABLE for value in greatest)
     fallen = [_fallen(course, PAPER_PLATEAU) for course in courses]
-    at_stop = [_fallen(course, min(course.stop, LATER[-1])) for course in courses]
-    least = [np.fmin.accumulate(course.losses) for course in courses]
+    at_stop = [_fallen(course, min(course["stop"], later[-1])) for course in courses]
+    least = [np.fmin.accumulate(_losses(course)) for course in courses]
     further = float(np.median([1.0 - one[-1] / one[PAPER_PLATEAU] for one in least]))
-    longer = float(np.median([course.seconds[-1] / course.seconds[0] for course in courses]))
+    longer = float(np.median([course["seconds"][-1] / course["seconds"][0] for course in courses]))
     text = (
         f"Fig. 3: by iteration {PAPER_PLATEAU} the loss has fallen by "
-        f"{100 * np.median(fallen):.0f} % (median) of what it falls until {LATER[-1]}, "
+        f"{100 * np.median(fallen):.0f} % (median) of what it falls until {later[-1]}, "
     )
     text += f"and falls by a further {100 * further:.0f} % of its value there" + (
         ": it rests, as in the paper. "
@@ -182,9 +213,9 @@ def _findings(courses: Sequence[Course]) -> str:
     text += (
         f"At the early stop, after {np.median(stops):.0f} iterations (median; paper: "
         f"{PAPER_EARLY_STOP}), it has fallen by {100 * np.median(at_stop):.0f} %. "
-        f"{_jumps(courses)}\n\n"
-        f"Fig. 4: {LATER[-1]} iterations take {longer:.1f} times as long as the early stop "
-        f"(median). From there to {LATER[-1]} the curve moves by at most "
+        f"{_jumps(courses, later[0])}\n\n"
+        f"Fig. 4: {later[-1]} iterations take {longer:.1f} times as long as the early stop "
+        f"(median). From there to {later[-1]} the curve moves by at most "
         f"{np.median(greatest):.2f} % of the diagonal by the median and {max(greatest):.2f} % on "
         f"the worst set; {same} of {len(courses)} stay within {INDISTINGUISHABLE:g} %, "
     )
@@ -195,7 +226,7 @@ def _findings(courses: Sequence[Course]) -> str:
         if same
         else "which contradicts the paper's “nearly indistinguishable”."
     )
-    changing = sum(len(set(course.by_itself)) > 1 for course in courses)
+    changing = sum(len(set(course["by_itself"])) > 1 for course in courses)
     if changing:
         text += (
             f" On {changing} sets the level set was one loop by itself at some of these iterations "
@@ -204,50 +235,18 @@ def _findings(courses: Sequence[Course]) -> str:
     return text
 
 
-def _jumps(courses: Sequence[Course]) -> str:
+def _jumps(courses: Sequence[Results], after: int) -> str:
     """On how many sets the loss left its course after the early iterations."""
     heights = {
-        course.sample.name: max(course.losses[LATER[0] :]) / course.losses[0] for course in courses
+        course["mesh"]: np.nanmax(_losses(course)[after:]) / _losses(course)[0]
+        for course in courses
     }
     jumping = [name for name, height in heights.items() if height > 1.0]
     if not jumping:
-        return f"After iteration {LATER[0]} no loss ever exceeds that of the start."
+        return f"After iteration {after} no loss ever exceeds that of the start."
     return (
-        f"After iteration {LATER[0]} the loss jumps above that of the start on {len(jumping)} of "
+        f"After iteration {after} the loss jumps above that of the start on {len(jumping)} of "
         f"{len(courses)} sets ({report.listed(jumping)}), up to {max(heights.values()):.0f} times "
         "that value: the “numerical instability” of too many iterations that the paper warns of. "
         "The field of the least loss is kept."
-    )
-
-
-def _loss_plot(courses: Sequence[Course], scale: Scale) -> str:
-    figure, axes = plots.labelled("Loss of every iteration (Fig. 3)", "iteration", "total loss")
-    for course in courses:
-        (line,) = axes.plot(course.losses, linewidth=1.0, label=course.sample.name)
-        stop = min(course.stop, len(course.losses)) - 1
-        axes.plot(stop, course.losses[stop], "o", color=line.get_color())
-    axes.axvline(PAPER_PLATEAU, color="0.4", linestyle="--", linewidth=1)
-    axes.set_yscale("log")
-    plots.plain_ticks(axes.yaxis)
-    axes.legend(fontsize=8, ncols=2)
-    path = plots.save(figure, report.output_folder(scale) / "convergence.png")
-    return report.figure(
-        path,
-        "Loss against the iteration; dots: early stop; dashed: where the paper sees a plateau",
-    )
-
-
-def _stills(courses: Sequence[Course], scale: Scale) -> str:
-    pictures = [
-        renders.Picture(
-            f"{course.sample.name}, early stop after {course.stop}",
-            course.sample.mesh,
-            list(zip(course.curves, COLOURS, strict=True)),
-        )
-        for course in courses[:PICTURED]
-    ]
-    path = report.output_folder(scale) / "convergence_curves.png"
-    renders.render_sheet(pictures, path, scale, columns=PICTURED)
-    return report.figure(
-        path, "Curves at the early stop (blue), 100 (orange), 200 (green) and 500 (yellow)"
     )

@@ -28,6 +28,7 @@ from tests.oracles.isolation import Isolated, isolated
 from tests.oracles.mesh_files import COLLECTIONS, mesh_files
 
 from . import report
+from .evidence import Results
 from .scale import Scale
 
 PATIENCE = 1200.0
@@ -39,47 +40,40 @@ SLOWEST = 8
 KIND = {True: "closed", False: "open"}
 
 
-def run(scale: Scale) -> None:
-    """Ask for curves on all meshes and sort what comes, one collection after the other."""
-    items = _items(scale)
-    folders = [f for f in (GENERATED, *FOLDERS) if any(item.folder == f for item in items)]
-    done: list[Isolated[Item, Outcome]] = []
-    for number, folder in enumerate(folders, start=1):
-        here = [item for item in items if item.folder == folder]
-        for one in isolated(outcome, here, PATIENCE):
-            done.append(one)
-            if _verdict(one) in (DECLINED, WRONG):
-                print(f"  {_line(one)}", flush=True)
-        _write(done, folders[:number], folders[number:], scale)
+TITLE = "Every mesh"
 
 
-def _write(
-    done: Sequence[Isolated[Item, Outcome]],
-    folders: Sequence[str],
-    missing: Sequence[str],
-    scale: Scale,
-) -> None:
-    """The section as far as the measurement is; a large collection takes hours."""
+def measure(scale: Scale) -> Results:
+    """Ask for curves on all meshes, one collection after the other."""
+    found = []
+    for one in isolated(outcome, _items(scale), PATIENCE):
+        found.append(_answer(one))
+        if found[-1]["verdict"] in (DECLINED, WRONG):
+            print(f"  {_line(found[-1])}", flush=True)
+    return {"seed": SEED, "requests": len(REQUESTS), "answers": found}
+
+
+def section(results: Results) -> str:
+    """What came, sorted."""
+    answers = results["answers"]
     rows = []
-    for folder in folders:
-        rows += _row(folder, [one for one in done if one.item.folder == folder])
-    rows += _row("all", done)
-    slowest = sorted(done, key=lambda one: -one.seconds)[:SLOWEST]
-    listed = [one for one in done if _verdict(one) in (DECLINED, WRONG)]
-    body = (
-        f"Seed {SEED}; on each mesh {len(REQUESTS)} curves through random vertices, shortest "
-        "order: 3–5 closed and 2–4 open, drawn from one part of the surface that "
-        "common edges connect, and from all of its vertices. Whether an error is due is decided "
-        "from the arrays alone.\n\n"
+    for folder in dict.fromkeys(each["folder"] for each in answers):
+        rows.append(_row(folder, [each for each in answers if each["folder"] == folder]))
+    rows.append(_row("all", answers))
+    slowest = sorted(answers, key=lambda each: -each["seconds"])[:SLOWEST]
+    listed = [each for each in answers if each["verdict"] in (DECLINED, WRONG)]
+    return (
+        f"Seed {results['seed']}; on each mesh {results['requests']} curves through random "
+        "vertices, shortest order: 3–5 closed and 2–4 open, drawn from one part of the surface "
+        "that common edges connect, and from all of its vertices. Whether an error is due is "
+        "decided from the arrays alone.\n\n"
         + report.table(("meshes", "curves", GOOD, DUE, DECLINED, WRONG, "CPU seconds"), rows)
         + "\n\n"
-        + ("".join(f"- {_line(one)}\n" for one in listed[:LISTED]) or "None declined or wrong.\n")
+        + ("".join(f"- {_line(each)}\n" for each in listed[:LISTED]) or "None declined or wrong.\n")
         + "\nThe slowest: "
-        + report.listed(f"{_name(one.item)} {one.seconds:.0f} s" for one in slowest)
+        + report.listed(f"{_name(each)} {each['seconds']:.0f} s" for each in slowest)
         + "."
-        + (f"\n\nNot measured yet: {report.listed(missing)}." if missing else "")
     )
-    report.write_section("corpus", "Every mesh", body, scale)
 
 
 def _items(scale: Scale) -> list[Item]:
@@ -105,29 +99,39 @@ def _generated_requests(scale: Scale) -> list[tuple[str, int]]:
     return [(name, request) for name in names for request in range(len(REQUESTS))]
 
 
-def _verdict(one: Isolated[Item, Outcome]) -> str:
-    return WRONG if one.result is None or one.output.strip() else one.result.verdict
-
-
-def _name(item: Item) -> str:
-    of_one_part, closed = REQUESTS[item.request]
-    where = "one part" if of_one_part else "anywhere"
-    return f"{item.folder}/{item.name} {KIND[closed]} {where}"
-
-
-def _line(one: Isolated[Item, Outcome]) -> str:
+def _answer(one: Isolated[Item, Outcome]) -> Results:
+    verdict = WRONG if one.result is None or one.output.strip() else one.result.verdict
     words = one.failure if one.result is None else one.result.words
-    printed = f" printed {one.output.strip()[:200]!r}" if one.output.strip() else ""
-    return f"{_name(one.item)}: {_verdict(one)}: {words[:300]}{printed} ({one.seconds:.1f} s)"
+    return {
+        "folder": one.item.folder,
+        "mesh": one.item.name,
+        "request": one.item.request,
+        "faces": one.result.faces if one.result else 0,
+        "verdict": verdict,
+        "words": words[:300] if verdict in (DECLINED, WRONG) else "",
+        "printed": one.output.strip()[:200],
+        "seconds": round(one.seconds, 2),
+    }
 
 
-def _row(label: str, done: Sequence[Isolated[Item, Outcome]]) -> list[tuple[object, ...]]:
-    if not done:
-        return []
-    counts = Counter(map(_verdict, done))
+def _name(answer: Results) -> str:
+    of_one_part, closed = REQUESTS[answer["request"]]
+    where = "one part" if of_one_part else "anywhere"
+    return f"{answer['folder']}/{answer['mesh']} {KIND[closed]} {where}"
+
+
+def _line(answer: Results) -> str:
+    printed = f" printed {answer['printed']!r}" if answer["printed"] else ""
+    words = f"{answer['words']}{printed} ({answer['seconds']:.1f} s)"
+    return f"{_name(answer)}: {answer['verdict']}: {words}"
+
+
+def _row(label: str, answers: Sequence[Results]) -> tuple[object, ...]:
+    counts = Counter(each["verdict"] for each in answers)
     shares = [
-        f"{counts[each]} ({100 * counts[each] / len(done):.1f} %)"
+        f"{counts[each]} ({100 * counts[each] / len(answers):.1f} %)"
         for each in (GOOD, DUE, DECLINED, WRONG)
     ]
-    meshes = len({(one.item.folder, one.item.name) for one in done})
-    return [(f"{meshes} {label}", len(done), *shares, f"{sum(one.seconds for one in done):.0f}")]
+    meshes = len({(each["folder"], each["mesh"]) for each in answers})
+    seconds = sum(each["seconds"] for each in answers)
+    return (f"{meshes} {label}", len(answers), *shares, f"{seconds:.0f}")

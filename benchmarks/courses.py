@@ -8,7 +8,7 @@ these is chosen by its result.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from unittest import mock
 
@@ -24,8 +24,12 @@ from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.elastic_energy import comparable_energies
 
 from . import collections, report
+from .evidence import Results
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Which course a curve takes"
+WITHOUT = ("outputs",)
 
 SEED = 23
 
@@ -41,27 +45,67 @@ MOVED = 0.01
 DEFAULT, NETWORK = "default", "start by the network alone"
 FIELDS, GRAPHS = "paths over random fields", "hop graphs with random weights"
 
+KIND = {True: "closed", False: "open"}
 
-def run(scale: Scale) -> None:
+
+def measure(scale: Scale) -> Results:
     """Compare the default with the best known, and with itself on changed meshes."""
     starts = scale.choose(8, 4, 1)
-    ratios: dict[tuple[str, str], list[float]] = defaultdict(list)
-    moved: dict[tuple[str, str], list[float]] = defaultdict(list)
     surfaces = list(collections.surfaces(scale, scale.choose(12, 4, 1)))
-    for number, (_, mesh, points) in enumerate(random_sets(surfaces, 1, SEED)):
-        for kind, closed in (("closed", True), ("open", False)):
+    requests = []
+    for number, (name, mesh, points) in enumerate(random_sets(surfaces, 1, SEED)):
+        for closed in (True, False):
             every = _portfolio(mesh, points, closed, starts, number)
-            energies = _energies(mesh, every)
-            best = min(min(values) for values in energies.values())
-            for name, values in energies.items():
-                ratios[kind, name].append(min(values) / best)
             default = every[DEFAULT][0].curves[0].points
-            for name, change in CHANGES.items():
+            moved = {}
+            for change_name, change in CHANGES.items():
                 other = _on_changed(mesh, points, closed, change, number)
                 away = farthest_between(default, other) / mesh.diagonal
-                moved[kind, name].append(away)
+                moved[change_name] = round(float(away), 9)
+            energies = _energies(mesh, every)
+            requests.append({"mesh": name, "closed": closed, "energies": energies, "moved": moved})
+    return {
+        "seed": SEED,
+        "meshes": collections.label(scale),
+        "starts": starts,
+        "field": FIELD,
+        "smoothing": SMOOTHING,
+        "weights": WEIGHTS,
+        "requests": requests,
+    }
+
+
+def section(results: Results) -> str:
+    """Energies relative to the least known, and how far the default moves."""
+    requests = results["requests"]
     header = ("start", "curves", "geometric mean", "median", "75 %", "90 %", "greatest")
-    rows = [
+    return (
+        f"Seed {results['seed']}, `nicmm`, one set of 3–5 random vertices a mesh, shortest order, "
+        f"on {sum(each['closed'] for each in requests)} meshes ({results['meshes']}). Energies "
+        "with one length scale, the least length among all curves of a request, relative to the "
+        "least of all: of the default, of the start by the network alone, of "
+        f"{results['starts']} paths over random smooth fields (exp({results['field']} x) times "
+        f"the lengths, x averaged {results['smoothing']} times), and of {results['starts']} hop "
+        f"graphs with random weights (exp({results['weights']} x) at the cells). The lines of "
+        "several starts have their best.\n\n"
+        + report.table(header, _ratio_rows(requests))
+        + "\n\nThe default on the same surface with other numbers, rotated, moved and scaled, and "
+        "mirrored, compared with the default, transformed in the same way.\n\n"
+        + report.table(
+            ("changed", "curves", f"moved by more than {100 * MOVED:g} %", "within 1e-6"),
+            _moved_rows(requests),
+        )
+    )
+
+
+def _ratio_rows(requests: Sequence[Results]) -> list[tuple[str, ...]]:
+    """Statistics of every start's least energy, relative to the least of all starts."""
+    ratios: dict[tuple[str, str], list[float]] = defaultdict(list)
+    for request in requests:
+        best = min(min(values) for values in request["energies"].values())
+        for name, values in request["energies"].items():
+            ratios[KIND[request["closed"]], name].append(min(values) / best)
+    return [
         (
             name,
             kind,
@@ -70,7 +114,15 @@ def run(scale: Scale) -> None:
         )
         for (kind, name), values in ratios.items()
     ]
-    moves = [
+
+
+def _moved_rows(requests: Sequence[Results]) -> list[tuple[str, ...]]:
+    """How many curves moved on changed meshes."""
+    moved: dict[tuple[str, str], list[float]] = defaultdict(list)
+    for request in requests:
+        for name, away in request["moved"].items():
+            moved[KIND[request["closed"]], name].append(away)
+    return [
         (
             name,
             kind,
@@ -79,19 +131,6 @@ def run(scale: Scale) -> None:
         )
         for (kind, name), values in moved.items()
     ]
-    body = (
-        f"Seed {SEED}, `nicmm`, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(surfaces)} meshes ({collections.label(scale)}). Energies with one length scale, the "
-        "least length among all curves of a request, relative to the least of all: of the default, "
-        f"of the start by the network alone, of {starts} paths over random smooth fields "
-        f"(exp({FIELD} x) times the lengths, x averaged {SMOOTHING} times), and of {starts} hop "
-        f"graphs with random weights (exp({WEIGHTS} x) at the cells). The lines of several starts "
-        "have their best.\n\n" + report.table(header, rows) + "\n\nThe default on the same "
-        "surface with other numbers, rotated, moved and scaled, and mirrored, compared with the "
-        "default, transformed in the same way.\n\n"
-        + report.table(("changed", "curves", "moved by more than 1 %", "within 1e-6"), moves)
-    )
-    report.write_section("courses", "Which course a curve takes", body, scale)
 
 
 def _portfolio(
@@ -121,7 +160,10 @@ def _energies(mesh: Mesh, every: dict[str, list[nicmm.Design]]) -> dict[str, lis
     scale = min(curve.length for several in curves.values() for curve in several)
     surface = CurveSurface(mesh, mesh.vertices)  # without maps only the nodes count
     return {
-        name: [float(comparable_energies(surface, each.nodes, 1.0, scale)[0]) for each in several]
+        name: [
+            round(float(comparable_energies(surface, each.nodes, 1.0, scale)[0]), 6)
+            for each in several
+        ]
         for name, several in curves.items()
     }
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -14,8 +13,11 @@ from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import unique_edges
 
 from . import collections, report
+from .evidence import Results
 from .samples import point_sets
 from .scale import Scale
+
+TITLE = "Cuts along curves"
 
 SEED = 0
 
@@ -23,43 +25,41 @@ AREA = 1e-9
 """Most that the total area may change by, relative to itself."""
 
 
-@dataclass(frozen=True)
-class Cut:
-    """What came of cutting along one curve; ``least`` is the smallest part of any face."""
-
-    collection: str
-    name: str
-    faults: tuple[str, ...]
-    milliseconds: float
-    least: float
-    bounds: bool
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Cut along a closed and an open curve on every mesh."""
-    cuts, refused = [], 0
+    answers = []
     for label, meshes in _collections(scale):
         for name, mesh in meshes:
             generator = np.random.default_rng([SEED, zlib.crc32(name.encode())])
             designer = nicmm.Designer(mesh)
             (points,) = point_sets(mesh, 1, generator)
+            faults: list[str] = []
             for closed in (True, False):
                 design = designer.design(points, closed=closed, order="shortest")
+                answer: Results = {"meshes": label, "mesh": name, "closed": closed}
                 try:
-                    cuts.append(_cut(label, name, mesh, design.curves[0]))
+                    answer |= _cut(mesh, design.curves[0])
+                    faults += answer["faults"]
                 except nicmm.CurveError as error:
-                    refused += 1
+                    answer["refused"] = str(error)
                     print(f"  {label}, {name}: {error}", flush=True)
-            print(f"  {label}, {name}: {cuts[-1].faults or 'sound'}", flush=True)
-    body = (
-        f"Seed {SEED}; on each mesh a closed and an open curve through 3–5 random vertices. A cut "
-        "is sound if Euler characteristic, boundary length and total area (to 1e-9) are as before, "
-        "no edge has more than two faces that had not, every part has a positive area and turns as "
-        "its face does, every edge of the chain is there, and the mesh falls apart along it "
-        "exactly where the curve bounds a region. Refused: "
-        f"{refused}.\n\n{_table(cuts)}\n\n{_faults(cuts)}"
+                answers.append(answer)
+            print(f"  {label}, {name}: {report.listed(faults) or 'sound'}", flush=True)
+    return {"seed": SEED, "area": AREA, "answers": answers}
+
+
+def section(results: Results) -> str:
+    """How many cuts are sound."""
+    cuts = [each for each in results["answers"] if "refused" not in each]
+    area = np.format_float_scientific(results["area"], trim="-", exp_digits=1)
+    return (
+        f"Seed {results['seed']}; on each mesh a closed and an open curve through 3–5 random "
+        "vertices. A cut is sound if Euler characteristic, boundary length and total area (to "
+        f"{area}) are as before, no edge has more than two faces that had not, every part has a "
+        "positive area and turns as its face does, every edge of the chain is there, and the mesh "
+        "falls apart along it exactly where the curve bounds a region. Refused: "
+        f"{len(results['answers']) - len(cuts)}.\n\n{_table(cuts)}\n\n{_faults(cuts)}"
     )
-    report.write_section("cuts", "Cuts along curves", body, scale)
 
 
 def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.Mesh]]]]:
@@ -70,7 +70,8 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
     yield "closed manifold", collections.clean(scale.choose(36, 3))
 
 
-def _cut(label: str, name: str, mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> Cut:
+def _cut(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> Results:
+    """What came of cutting along one curve; "least" is the smallest part of any face."""
     started = time.process_time()
     cut = nicmm.cut_mesh(mesh, curve)
     milliseconds = 1e3 * (time.process_time() - started)
@@ -89,8 +90,12 @@ def _cut(label: str, name: str, mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> 
         "chain": _has_chain(cut),
         "parts": bounds == (_n_parts(nicmm.part_mesh(cut).part) > _n_parts(mesh.face_component)),
     }
-    faults = tuple(check for check, fine in checks.items() if not fine)
-    return Cut(label, name, faults, milliseconds, float(shares.min()), bounds)
+    return {
+        "faults": [check for check, fine in checks.items() if not fine],
+        "milliseconds": round(milliseconds, 2),
+        "least": float(f"{shares.min():.4g}"),
+        "bounds": bounds,
+    }
 
 
 def _euler(faces: IntArray) -> int:
@@ -113,23 +118,29 @@ def _n_parts(label: IntArray) -> int:
     return len(np.unique(label))
 
 
-def _table(cuts: list[Cut]) -> str:
-    lines = [
-        "| meshes | cuts | sound | that bound a region | least part of a face | "
-        "median ms (CPU) | most |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for label in dict.fromkeys(cut.collection for cut in cuts):
-        here = [cut for cut in cuts if cut.collection == label]
-        sound = sum(not cut.faults for cut in here)
-        times = [cut.milliseconds for cut in here]
-        lines.append(
-            f"| {label} | {len(here)} | {sound} | {sum(cut.bounds for cut in here)} | "
-            f"{min(cut.least for cut in here):.1e} | {np.median(times):.0f} | {max(times):.0f} |"
+def _table(cuts: Sequence[Results]) -> str:
+    header = (
+        "meshes", "cuts", "sound", "that bound a region", "least part of a face",
+        "median ms (CPU)", "most",
+    )  # fmt: skip
+    rows = []
+    for label in dict.fromkeys(cut["meshes"] for cut in cuts):
+        here = [cut for cut in cuts if cut["meshes"] == label]
+        times = [cut["milliseconds"] for cut in here]
+        rows.append(
+            (
+                label,
+                len(here),
+                sum(not cut["faults"] for cut in here),
+                sum(cut["bounds"] for cut in here),
+                f"{min(cut['least'] for cut in here):.1e}",
+                f"{np.median(times):.0f}",
+                f"{max(times):.0f}",
+            )
         )
-    return "\n".join(lines)
+    return report.table(header, rows)
 
 
-def _faults(cuts: list[Cut]) -> str:
-    listed = [f"- {cut.name}: {', '.join(cut.faults)}" for cut in cuts if cut.faults]
+def _faults(cuts: Sequence[Results]) -> str:
+    listed = [f"- {cut['mesh']}: {report.listed(cut['faults'])}" for cut in cuts if cut["faults"]]
     return "\n".join(listed) or "No cut has a fault."

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +22,15 @@ from tests.oracles.perturbation import (
 )
 
 from . import collections, plots, renders, report
+from .evidence import Results
 from .measures import bending
 from .methods import METHODS
 from .resolution import REMARKABLE
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Degraded meshes (Fig. 10, 11, top of Fig. 12)"
+WITHOUT = ("outputs",)
 
 SEED = 11
 
@@ -35,76 +40,92 @@ SEVERITIES = {Scale.FULL: (32, 8, 2, 1), Scale.QUICK: (8, 1), Scale.SMOKE: (8,)}
 THIN = 5.0
 """Degrees; faces with a smaller angle are counted."""
 
+PLOT = "degraded.png"
 
-@dataclass
-class Outcomes:
-    """What one method did on the meshes of one severity.
-
-    Attributes
-    ----------
-    curves : list of SurfaceCurve or None
-        Of each set; None where the method did not give one finite curve through all points.
-    diverged : int
-        Designs that say so themselves, of which some still give a curve.
-    offsets : list of (mean, greatest)
-        Distances to the method's curve on the clean mesh, relative to the diagonal.
-    bends : list of float
-        L ∮ κ_g² ds of the curves.
-    """
-
-    curves: list[SurfaceCurve | None] = field(default_factory=list)
-    diverged: int = 0
-    offsets: list[tuple[float, float]] = field(default_factory=list)
-    bends: list[float] = field(default_factory=list)
-
-    @property
-    def succeeded(self) -> int:
-        """Number of sets with a curve."""
-        return sum(curve is not None for curve in self.curves)
-
-    def add(self, mesh: Mesh, curve: SurfaceCurve | None, clean: SurfaceCurve | None) -> None:
-        """Note a result and, where both have one, how far it is from the clean mesh's curve."""
-        self.curves.append(curve)
-        if curve is not None:
-            self.bends.append(bending(mesh, curve))
-            if clean is not None:
-                mean, greatest = distances(curve, clean)
-                self.offsets.append((mean / mesh.diagonal, greatest / mesh.diagonal))
+CURVES = "degraded_curves.png"
+"""The picture of the first mesh."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Perturb meshes more and more and compare every method with itself on the clean mesh."""
     severities = (0, *SEVERITIES[scale])
-    outcomes = {(n, method): Outcomes() for n in severities for method in METHODS}
-    quality: dict[int, list[tuple[float, float]]] = {n: [] for n in severities}
     pictures: list[renders.Picture] = []
-    names = []
+    names: list[str] = []
+    sets = []
     surfaces = collections.surfaces(scale, scale.choose(12, 2))
     for name, clean_mesh, points in random_sets(surfaces, 1, SEED):
         names.append(name)
         clean: dict[str, SurfaceCurve | None] = {}
         for n in severities:
             mesh, moved = _mesh(clean_mesh, n, len(names), points)
-            smallest = angles(mesh.vertices[mesh.faces]).min(axis=1)
-            quality[n].append((float(smallest.min()), float((smallest < THIN).mean())))
+            answers, shown = {}, {}
             for method in METHODS:
-                outcome = outcomes[n, method]
-                curve = _curve(f"{name}, n = {n}", mesh, points, method, outcome)
+                status, curve = _asked(f"{name}, n = {n}", mesh, points, method)
                 clean.setdefault(method, curve)
-                outcome.add(mesh, curve, clean[method])
+                answers[method] = _answer(status, mesh, curve, clean[method])
+                shown[method] = curve
+            sets.append({"mesh": name, "n": n, **_quality(mesh), "answers": answers})
             if len(names) == 1:
-                shown = {method: outcomes[n, method].curves[-1] for method in METHODS}
                 pictures.append(_picture(n, moved, mesh, shown))
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(names)} meshes ({collections.label(scale)}: {report.listed(names)}). One face in "
-        f"every n is drawn; one of its corners moves across the opposite edge by "
-        f"{LEAST_FRACTION:g} to {GREATEST_FRACTION:g} of that edge, and back where an angle falls "
-        f"below {LEAST_ANGLE:g}° or another vertex is too near. Control points stay.\n\n"
-        f"{_table(outcomes, quality)}\n\n{_findings(outcomes, severities)}\n\n"
-        f"{_plot(outcomes, severities, scale)}\n\n{_stills(pictures, scale)}"
+    return {
+        "seed": SEED,
+        "collection": collections.label(scale),
+        "meshes": names,
+        "methods": list(METHODS),
+        "severities": list(severities),
+        "fractions": [LEAST_FRACTION, GREATEST_FRACTION],
+        "least_angle": LEAST_ANGLE,
+        "thin": THIN,
+        "sets": sets,
+        "picture": _rendered(pictures, scale),
+    }
+
+
+def section(results: Results) -> str:
+    """What every method does at every severity."""
+    names = results["meshes"]
+    least, greatest = results["fractions"]
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, on "
+        f"{len(names)} meshes ({results['collection']}: {report.listed(names)}). One face in "
+        "every n is drawn; one of its corners moves across the opposite edge by "
+        f"{least:g} to {greatest:g} of that edge, and back where an angle falls "
+        f"below {results['least_angle']:g}° or another vertex is too near. Control points stay."
+        f"\n\n{_table(results)}\n\n{_findings(results)}\n\n"
+        + report.figure(PLOT, "Greatest distance to the method's own curve on the clean mesh")
+        + f"\n\n{_shown_picture(results['picture'])}"
     )
-    report.write_section("degraded", "Degraded meshes (Fig. 10, 11, top of Fig. 12)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Distances to the clean mesh's curves."""
+    methods = results["methods"]
+    figure, axes = plots.labelled(
+        "Distance to the clean mesh's curve",
+        "faces drawn",
+        "greatest distance, % of the diagonal",
+    )
+    perturbations = [n for n in results["severities"] if n]
+    width = 0.8 / len(methods)
+    for number, method in enumerate(methods):
+        colour = plots.METHOD_COLOURS[method]
+        for place, n in enumerate(perturbations):
+            offsets = _greatest(_answers(results, n, method))
+            if offsets:
+                axes.boxplot(
+                    [offsets],
+                    positions=[place + (number - 0.5 * (len(methods) - 1)) * width],
+                    widths=0.8 * width,
+                    patch_artist=True,
+                    boxprops={"facecolor": colour, "alpha": 0.6},
+                    medianprops={"color": "black"},
+                )
+        axes.plot([], [], color=colour, linewidth=8, alpha=0.6, label=method)
+    axes.set_xticks(range(len(perturbations)), [_name(n) for n in perturbations])
+    axes.set_xlim(-0.6, len(perturbations) - 0.4)
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+    plots.save(figure, folder / PLOT)
 
 
 def _mesh(clean: Mesh, n: int, number: int, points: IntArray) -> tuple[Mesh, int]:
@@ -113,47 +134,90 @@ def _mesh(clean: Mesh, n: int, number: int, points: IntArray) -> tuple[Mesh, int
     return perturbed(clean, n, np.random.default_rng([SEED, number, n]), points)
 
 
-def _curve(
-    label: str, mesh: Mesh, points: IntArray, method: str, outcome: Outcomes
-) -> SurfaceCurve | None:
-    """The method's curve if it is one, finite and through all points."""
+def _quality(mesh: Mesh) -> Results:
+    """The smallest angle in degrees, and the share of faces with a small one."""
+    smallest = angles(mesh.vertices[mesh.faces]).min(axis=1)
+    return {
+        "smallest": round(float(smallest.min()), 4),
+        "thin": round(float((smallest < THIN).mean()), 6),
+    }
+
+
+def _asked(
+    label: str, mesh: Mesh, points: IntArray, method: str
+) -> tuple[str, SurfaceCurve | None]:
+    """The status, and the method's curve if it is one, finite and through all points."""
     try:
         design = nicmm.design_curve(mesh, points, order="shortest", method=method)
     except nicmm.NicmmError as error:
         print(f"  {label}, {method}: {error}", flush=True)
-        return None
+        return "error", None
+    status = design.status.name.lower()
     print(f"  {label}, {method}: {design.status.name}, {design.seconds:.1f} s", flush=True)
-    outcome.diverged += design.status is nicmm.Status.DIVERGED
     if not is_one_curve(design.curves) or not np.isfinite(design.curves[0].points).all():
-        return None
-    return design.curves[0]
+        return status, None
+    return status, design.curves[0]
+
+
+def _answer(
+    status: str, mesh: Mesh, curve: SurfaceCurve | None, clean: SurfaceCurve | None
+) -> Results:
+    """What a method did: bending, and how far the curve is from the clean mesh's, in percent.
+
+    Mean and greatest distance are relative to the diagonal.
+    """
+    answer: dict[str, Any] = {"status": status, "bending": None, "offset": None}
+    if curve is not None:
+        answer["bending"] = round(bending(mesh, curve), 4)
+        if clean is not None:
+            answer["offset"] = [
+                round(100.0 * float(each) / mesh.diagonal, 6) for each in distances(curve, clean)
+            ]
+    return answer
 
 
 def _name(n: int) -> str:
     return "clean" if n == 0 else f"1 in {n}"
 
 
-def _table(
-    outcomes: Mapping[tuple[int, str], Outcomes],
-    quality: Mapping[int, Sequence[tuple[float, float]]],
-) -> str:
+def _answers(results: Results, n: int, method: str) -> list[Results]:
+    """What a method did on all meshes of one severity."""
+    return [each["answers"][method] for each in results["sets"] if each["n"] == n]
+
+
+def _greatest(answers: Sequence[Results]) -> list[float]:
+    """Greatest distances to the clean curves, in percent."""
+    return [each["offset"][1] for each in answers if each["offset"]]
+
+
+def _succeeded(answers: Sequence[Results]) -> int:
+    return sum(each["bending"] is not None for each in answers)
+
+
+def _table(results: Results) -> str:
     rows = []
-    for (n, method), outcome in outcomes.items():
-        smallest, thin = np.median(quality[n], axis=0)
-        rows.append(
-            (
-                _name(n),
-                f"{smallest:.2f}°, {100 * thin:.1f} %",
-                method,
-                f"{outcome.succeeded} of {len(outcome.curves)}",
-                outcome.diverged,
-                _median([100 * mean for mean, _ in outcome.offsets], 2),
-                _median([100 * greatest for _, greatest in outcome.offsets], 2),
-                _median(outcome.bends, 0),
+    for n in results["severities"]:
+        of_severity = [each for each in results["sets"] if each["n"] == n]
+        smallest = np.median([each["smallest"] for each in of_severity])
+        thin = 100 * np.median([each["thin"] for each in of_severity])
+        for method in results["methods"]:
+            answers = _answers(results, n, method)
+            rows.append(
+                (
+                    _name(n),
+                    f"{smallest:.2f}°, {thin:.1f} %",
+                    method,
+                    f"{_succeeded(answers)} of {len(answers)}",
+                    sum(each["status"] == "diverged" for each in answers),
+                    _median([each["offset"][0] for each in answers if each["offset"]], 2),
+                    _median(_greatest(answers), 2),
+                    _median(
+                        [each["bending"] for each in answers if each["bending"] is not None], 0
+                    ),
+                )
             )
-        )
     header = (
-        "faces drawn", f"smallest angle, faces below {THIN:g}°", "method",
+        "faces drawn", f"smallest angle, faces below {results['thin']:g}°", "method",
         "one finite curve through all points", "diverged", "mean distance to the clean curve, %",
         "greatest distance, %", "L ∮ κ_g² ds",
     )  # fmt: skip
@@ -167,63 +231,32 @@ def _median(values: Sequence[float], digits: int) -> str:
     return f"{np.median(values):.{digits}f}" if values else "–"
 
 
-def _findings(outcomes: Mapping[tuple[int, str], Outcomes], severities: Sequence[int]) -> str:
+def _findings(results: Results) -> str:
     """The claims of section 4.6 against what was measured at the worst severity."""
-    worst = severities[-1]
+    worst = results["severities"][-1]
+    at_worst = {method: _answers(results, worst, method) for method in results["methods"]}
     parts = []
-    for method in METHODS:
-        outcome = outcomes[worst, method]
-        share = 100 * outcome.succeeded / len(outcome.curves)
-        greatest = [100 * greatest for _, greatest in outcome.offsets]
-        parts.append(f"`{method}` succeeds in {share:.0f} % and moves by {_median(greatest, 1)} %")
+    for method, answers in at_worst.items():
+        share = 100 * _succeeded(answers) / len(answers)
+        moved = _median(_greatest(answers), 1)
+        parts.append(f"`{method}` succeeds in {share:.0f} % and moves by {moved} %")
     text = f"At {_name(worst)}: {'; '.join(parts)} of the diagonal (greatest distance, median). "
-    moved = [greatest for _, greatest in outcomes[worst, "nicmm-paper"].offsets]
-    if moved and np.median(moved) > REMARKABLE:
+    greatest = _greatest(at_worst["nicmm-paper"])
+    if greatest and np.median(greatest) > 100 * REMARKABLE:
         text += (
             f"More than {100 * REMARKABLE:g} % are plain to the eye, which contradicts the “nearly "
             "identical shapes” of the paper's Fig. 12. "
         )
-    if "variational" not in METHODS:
+    if "variational" not in at_worst:
         return text + "The paper's comparison with the variational method is not possible yet."
-    variational, paper = outcomes[worst, "variational"], outcomes[worst, "nicmm-paper"]
-    if variational.succeeded < paper.succeeded:
+    variational, paper = (_succeeded(at_worst[each]) for each in ("variational", "nicmm-paper"))
+    if variational < paper:
         return text + "The paper's failure of the variational method on such meshes shows here too."
     return text + (
         "The paper's failure of the variational method on such meshes (Fig. 11) does not show "
-        f"here, which contradicts it: {variational.succeeded} of {len(variational.curves)} curves, "
-        f"and {paper.succeeded} with `nicmm-paper`."
+        f"here, which contradicts it: {variational} of {len(at_worst['variational'])} curves, "
+        f"and {paper} with `nicmm-paper`."
     )
-
-
-def _plot(
-    outcomes: Mapping[tuple[int, str], Outcomes], severities: Sequence[int], scale: Scale
-) -> str:
-    figure, axes = plots.labelled(
-        "Distance to the clean mesh's curve",
-        "faces drawn",
-        "greatest distance, % of the diagonal",
-    )
-    perturbations = [n for n in severities if n]
-    width = 0.8 / len(METHODS)
-    for number, method in enumerate(METHODS):
-        for place, n in enumerate(perturbations):
-            offsets = [100 * greatest for _, greatest in outcomes[n, method].offsets]
-            if offsets:
-                axes.boxplot(
-                    [offsets],
-                    positions=[place + (number - 0.5 * (len(METHODS) - 1)) * width],
-                    widths=0.8 * width,
-                    patch_artist=True,
-                    boxprops={"facecolor": plots.METHOD_COLOURS[method], "alpha": 0.6},
-                    medianprops={"color": "black"},
-                )
-        axes.plot([], [], color=plots.METHOD_COLOURS[method], linewidth=8, alpha=0.6, label=method)
-    axes.set_xticks(range(len(perturbations)), [_name(n) for n in perturbations])
-    axes.set_xlim(-0.6, len(perturbations) - 0.4)
-    axes.set_ylim(bottom=0.0)
-    axes.legend()
-    path = plots.save(figure, report.output_folder(scale) / "degraded.png")
-    return report.figure(path, "Greatest distance to the method's own curve on the clean mesh")
 
 
 def _picture(
@@ -239,16 +272,22 @@ def _picture(
     )
 
 
-def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
-    """The same view of every severity; those without any curve are left out."""
+def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
+    """The same view of every severity, without those that have no curve; the picture's name."""
     shown = [picture for picture in pictures if picture.curves]
     if not shown:
-        return "No method gave a curve on the first mesh, so there is no picture of it."
-    path = report.output_folder(scale) / "degraded_curves.png"
+        return None
     view = renders.best_view(shown[0])
+    path = report.figures_folder(scale) / CURVES
     renders.render_sheet(shown, path, scale, columns=5, views=[view] * len(shown))
+    return CURVES
+
+
+def _shown_picture(name: str | None) -> str:
+    if name is None:
+        return "No method gave a curve on the first mesh, so there is no picture of it."
     return report.figure(
-        path,
+        name,
         "nicmm (blue), nicmm-paper (orange) and variational (green) on the first mesh, more and "
         "more degraded (Fig. 11, top of Fig. 12)",
     )

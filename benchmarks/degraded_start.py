@@ -12,14 +12,18 @@ from collections import defaultdict
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, curve_on_mesh
 from tests.oracles.distances import distances
 from tests.oracles.perturbation import perturbed
 
 from . import collections, report
+from .evidence import Results
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "What moves a curve on degraded meshes"
+WITHOUT = ("outputs",)
 
 SEED = 11
 
@@ -31,38 +35,60 @@ FROM_NOTHING = "1 in {}, from nothing"
 FROM_CLEAN = "1 in {}, begun with the clean mesh's curve"
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Compare every curve with that of the clean mesh, in percent of the diagonal."""
     severities = SEVERITIES if scale is not Scale.SMOKE else SEVERITIES[-1:]
-    offsets: dict[str, list[FloatArray]] = defaultdict(list)  # mean and greatest
-    lower = pairs = 0
+    found = []
     surfaces = collections.surfaces(scale, scale.choose(12, 6, 1))
-    for number, (_, clean, points) in enumerate(random_sets(surfaces, 1, SEED)):
+    for number, (name, clean, points) in enumerate(random_sets(surfaces, 1, SEED)):
         curve = _design(clean, points).curves[0]
-        found = {REORDERED: _in_another_order(clean, points, number)}
+        reordered = _in_another_order(clean, points, number)
+        degraded = []
         for n in severities:
             mesh, _ = perturbed(clean, n, np.random.default_rng([SEED, number, n]), points)
             plain, carried = _design(mesh, points), _carried(mesh, curve)
-            found[FROM_NOTHING.format(n)] = plain.curves[0]
-            found[FROM_CLEAN.format(n)] = carried.curves[0]
-            pairs += 1
-            lower += carried.energy["smooth"] < plain.energy["smooth"]
-        for name, other in found.items():
-            offsets[name].append(100.0 * np.array(distances(other, curve)) / clean.diagonal)
+            degraded.append(
+                {
+                    "n": n,
+                    "from_nothing": _offset(plain.curves[0], curve, clean),
+                    "from_clean": _offset(carried.curves[0], curve, clean),
+                    "lower": bool(carried.energy["smooth"] < plain.energy["smooth"]),
+                }
+            )
+        offset = _offset(reordered, curve, clean)
+        found.append({"mesh": name, "reordered": offset, "degraded": degraded})
+    return {"seed": SEED, "collection": collections.label(scale), "meshes": found}
+
+
+def section(results: Results) -> str:
+    """Distances by what was changed."""
+    meshes = results["meshes"]
+    pairs = [pair for mesh in meshes for pair in mesh["degraded"]]
+    offsets: dict[str, list[list[float]]] = defaultdict(list)  # mean and greatest
+    for mesh in meshes:
+        offsets[REORDERED].append(mesh["reordered"])
+        for pair in mesh["degraded"]:
+            offsets[FROM_NOTHING.format(pair["n"])].append(pair["from_nothing"])
+            offsets[FROM_CLEAN.format(pair["n"])].append(pair["from_clean"])
     rows = []
     for name, both in offsets.items():
         means, greatest = np.array(both).T
         quartiles = " · ".join(f"{value:.2f}" for value in np.percentile(means, [25, 50, 75]))
         rows.append((name, quartiles, f"{np.median(greatest):.2f}"))
     header = ("curve", "mean distance, %, quartiles", "greatest distance, %, median")
-    body = (
-        f"Seed {SEED}, `nicmm`, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(offsets[REORDERED])} meshes ({collections.label(scale)}), degraded as in "
-        "`degraded`. Distances to the curve that the clean mesh gets, relative to the diagonal. "
-        f"Of {pairs} degraded meshes {lower} get less bending energy begun with the clean "
-        "mesh's curve than from nothing.\n\n" + report.table(header, rows)
+    return (
+        f"Seed {results['seed']}, `nicmm`, one set of 3–5 random vertices a mesh, shortest order, "
+        f"on {len(meshes)} meshes ({results['collection']}), degraded as in `degraded`. Distances "
+        "to the curve that the clean mesh gets, relative to the diagonal. Of "
+        f"{len(pairs)} degraded meshes {sum(pair['lower'] for pair in pairs)} get less bending "
+        "energy begun with the clean mesh's curve than from nothing.\n\n"
+        + report.table(header, rows)
     )
-    report.write_section("degraded_start", "What moves a curve on degraded meshes", body, scale)
+
+
+def _offset(curve: SurfaceCurve, reference: SurfaceCurve, mesh: nicmm.Mesh) -> list[float]:
+    """Mean and greatest distance of two curves in percent of the diagonal."""
+    return [round(100.0 * float(each) / mesh.diagonal, 6) for each in distances(curve, reference)]
 
 
 def _design(mesh: nicmm.Mesh, points: IntArray) -> nicmm.Design:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import igl
 import numpy as np
@@ -16,11 +15,16 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.checker import judge
 
 from . import collections, report
+from .evidence import Results
 from .measures import bending
 from .peer_systems import later_signed_heat
 from .peers import task_on
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Dragging a control point"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 0
 DRAGS = 5
@@ -32,26 +36,10 @@ PEER_BODY = (812, 2)
 """Faces and subdivisions of the body on which signed heat is compared with: 13,000 faces."""
 
 PEER_SETS = 10
+PEER_POINTS = 4
 
 
-@dataclass(frozen=True)
-class Drag:
-    """Seconds and iterations on one mesh.
-
-    "First" is the first curve on a mesh, "another" one through other points on the same Designer,
-    "dragged" the median of those after small moves, "rival" the variational method's.
-    """
-
-    first: float
-    another: float
-    dragged: float
-    rival: float
-    iterations: float
-    bends: float
-    faults: int
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Drag on the paper's resolution and on one with sixteen times as many faces."""
     coarse = _measured(collections.surfaces(scale, scale.choose(40, 4)), rival=True)
     if scale is Scale.SMOKE:
@@ -59,71 +47,88 @@ def run(scale: Scale) -> None:
     else:
         meshes = collections.shrec16(scale.choose(8, 1), FINE_SUBDIVISIONS)
         fine = _measured(meshes, rival=False)
+    return {
+        "seed": SEED,
+        "drags": DRAGS,
+        "collection": collections.label(scale),
+        "coarse": coarse,
+        "fine_subdivisions": FINE_SUBDIVISIONS,
+        "fine": fine,
+        "signed_heat": _beside_signed_heat(scale),
+    }
+
+
+def section(results: Results) -> str:
+    """What a dragged curve takes, beside a first one and beside other methods."""
+    coarse, fine = results["coarse"], results["fine"]
+    header = (
+        "meshes", "vertices", "first curve (ms)", "another on the same Designer", "dragged",
+        "iterations", "variational", "bending, dragged / anew", "faults",
+    )  # fmt: skip
+    rows = [
+        _row(f"{results['collection']}, {len(coarse)}", coarse),
+        _row(f"{len(fine)}, {results['fine_subdivisions']} subdivisions", fine),
+    ]
     ratio = _median(coarse, "dragged") / _median(coarse, "rival")
     first = _median(coarse, "first") / _median(coarse, "rival")
     growth = _median(fine, "dragged") / _median(coarse, "dragged")
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order; the first point then "
-        f"moves to a neighbouring vertex {DRAGS} times. One process, medians over the meshes.\n\n"
-        + report.table(
-            (
-                "meshes",
-                "vertices",
-                "first curve (ms)",
-                "another on the same Designer",
-                "dragged",
-                "iterations",
-                "variational",
-                "bending, dragged / anew",
-                "faults",
-            ),  # fmt: skip
-            [
-                _row(f"{collections.label(scale)}, {len(coarse)}", coarse),
-                _row(f"{len(fine)}, {FINE_SUBDIVISIONS} subdivisions", fine),
-            ],
-        )
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order; the first "
+        f"point then moves to a neighbouring vertex {results['drags']} times. One process, medians "
+        "over the meshes.\n\n"
+        + report.table(header, rows)
         + f"\n\nA dragged curve takes {ratio:.3f} times as long as the variational method (goal "
         f"0.10) and a first one {first:.2f} times (goal 0.25). With sixteen times as many faces a "
-        f"dragged curve takes {growth:.1f} times as long (goal 4)."
+        f"dragged curve takes {growth:.1f} times as long (goal 4).\n\n"
+        + _signed_heat_words(results["signed_heat"])
     )
-    body += "\n\n" + _beside_signed_heat(scale)
-    report.write_section("dragging", "Dragging a control point", body, scale)
 
 
-def _beside_signed_heat(scale: Scale) -> str:
+def _beside_signed_heat(scale: Scale) -> Results | None:
     """A dragged curve beside a later solve of potpourri3d's signed heat, on the same mesh."""
     if importlib.util.find_spec("potpourri3d") is None:
-        return "potpourri3d is not installed, so its signed heat method is not measured."
+        return None
     faces, subdivisions = (200, 1) if scale is Scale.SMOKE else PEER_BODY
     mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
     generator = np.random.default_rng(SEED)
     ours, theirs = [], []
     for _ in range(scale.choose(PEER_SETS, 3)):
-        points = generator.choice(len(mesh.vertices), 4, replace=False)
-        ours.append(_dragged(mesh, points, rival=False).dragged)
-        theirs.append(later_signed_heat(task_on(mesh, points)))
-    ratio = np.median(ours) / np.median(theirs)
+        points = generator.choice(len(mesh.vertices), PEER_POINTS, replace=False)
+        ours.append(_dragged(mesh, points, rival=False)["dragged"])
+        theirs.append(round(later_signed_heat(task_on(mesh, points)), 6))
+    return {"faces": len(mesh.faces), "points": PEER_POINTS, "ours": ours, "theirs": theirs}
+
+
+def _signed_heat_words(beside: Results | None) -> str:
+    if beside is None:
+        return "potpourri3d is not installed, so its signed heat method is not measured."
+    ours, theirs = np.median(beside["ours"]), np.median(beside["theirs"])
     return (
-        f"On a generated body of {len(mesh.faces):,} faces, {len(ours)} sets of 4 points, a "
-        f"dragged curve takes {1000 * np.median(ours):.0f} ms and a later solve of potpourri3d's "
-        f"signed heat method, whose factorisations are kept, {1000 * np.median(theirs):.0f} ms by "
-        f"the median: {ratio:.2f} (goal 1.0)."
+        f"On a generated body of {beside['faces']:,} faces, {len(beside['ours'])} sets of "
+        f"{beside['points']} points, a dragged curve takes {1000 * ours:.0f} ms and a later solve "
+        "of potpourri3d's signed heat method, whose factorisations are kept, "
+        f"{1000 * theirs:.0f} ms by the median: {ours / theirs:.2f} (goal 1.0)."
     )
 
 
-def _measured(meshes: Iterable[tuple[str, Mesh]], rival: bool) -> list[tuple[int, Drag]]:
-    results = []
+def _measured(meshes: Iterable[tuple[str, Mesh]], rival: bool) -> list[Results]:
+    found = []
     for name, mesh, points in random_sets(meshes, 1, SEED):
-        result = _dragged(mesh, points, rival)
-        results.append((len(mesh.vertices), result))
+        drag = _dragged(mesh, points, rival)
+        found.append({"mesh": name, "vertices": len(mesh.vertices), **drag})
         print(
-            f"  {name}: first {1000 * result.first:.0f} ms, dragged {1000 * result.dragged:.0f}",
+            f"  {name}: first {1000 * drag['first']:.0f} ms, dragged {1000 * drag['dragged']:.0f}",
             flush=True,
         )
-    return results
+    return found
 
 
-def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Drag:
+def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
+    """Seconds, iterations, bending and faults on one mesh.
+
+    "First" is the first curve on a mesh, "another" one through other points on the same Designer,
+    "dragged" the median of those after small moves, "rival" the variational method's.
+    """
     neighbours = igl.adjacency_list(mesh.faces)
     mesh = Mesh(mesh.vertices, mesh.faces)  # without anything cached
     designer = nicmm.Designer(mesh)
@@ -138,36 +143,35 @@ def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Drag:
     generator = np.random.default_rng(SEED)
     others = generator.choice(np.flatnonzero(mesh.referenced), len(points), replace=False)
     another = designer.design(others, order="shortest")
-    slow = np.nan
+    slow = None
     if rival:
-        slow = nicmm.design_curve(mesh, points, order="shortest", method="variational").seconds
-    return Drag(
-        first=designs[0].seconds,
-        another=another.seconds,
-        dragged=float(np.median([design.seconds for design in designs[1:]])),
-        rival=slow,
-        iterations=float(np.median([design.iterations for design in designs[1:]])),
-        bends=bending(mesh, designs[-1].curves[0], SAMPLES)
-        / bending(mesh, anew.curves[0], SAMPLES),
-        faults=faults,
-    )
+        design = nicmm.design_curve(mesh, points, order="shortest", method="variational")
+        slow = round(design.seconds, 6)
+    bends = [bending(mesh, each.curves[0], SAMPLES) for each in (designs[-1], anew)]
+    return {
+        "first": round(designs[0].seconds, 6),
+        "another": round(another.seconds, 6),
+        "dragged": round(float(np.median([design.seconds for design in designs[1:]])), 6),
+        "rival": slow,
+        "iterations": float(np.median([design.iterations for design in designs[1:]])),
+        "bending": round(bends[0] / bends[1], 6),
+        "faults": faults,
+    }
 
 
-def _median(results: list[tuple[int, Drag]], name: str) -> float:
-    return float(np.median([getattr(result, name) for _, result in results]))
+def _median(drags: Sequence[Results], name: str) -> float:
+    return float(np.median([drag[name] for drag in drags]))
 
 
-def _row(label: str, results: list[tuple[int, Drag]]) -> tuple[object, ...]:
-    milliseconds = [
-        f"{1000 * _median(results, name):.0f}" for name in ("first", "another", "dragged", "rival")
-    ]
-    rival = "–" if np.isnan(_median(results, "rival")) else milliseconds[3]
+def _row(label: str, drags: Sequence[Results]) -> tuple[object, ...]:
+    names = ["first", "another", "dragged"]
+    measured_rival = all(drag["rival"] is not None for drag in drags)
     return (
         label,
-        f"{np.median([count for count, _ in results]):.0f}",
-        *milliseconds[:3],
-        f"{_median(results, 'iterations'):.0f}",
-        rival,
-        f"{_median(results, 'bends'):.2f}",
-        sum(result.faults for _, result in results),
+        f"{_median(drags, 'vertices'):.0f}",
+        *(f"{1000 * _median(drags, name):.0f}" for name in names),
+        f"{_median(drags, 'iterations'):.0f}",
+        f"{1000 * _median(drags, 'rival'):.0f}" if measured_rival else "–",
+        f"{_median(drags, 'bending'):.2f}",
+        sum(drag["faults"] for drag in drags),
     )

@@ -6,12 +6,13 @@ of its own, so that crashes, hangs and what is printed below Python are found to
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 
 from tests.oracles.hostile_input import SEED, Answer, answer
 from tests.oracles.isolation import Isolated, isolated
 
 from . import report
+from .evidence import Results
 from .scale import Scale
 
 SLOW = 10.0
@@ -29,16 +30,17 @@ TOLD = 500
 """Cases after which a run says how far it is."""
 
 
-def run(scale: Scale) -> None:
+TITLE = "Hostile input"
+
+
+def measure(scale: Scale) -> Results:
     """Ask, and list what is wrong."""
     cases = scale.choose(10_500, 1_050, 42)
-    kinds: Counter[str] = Counter()
     outcomes: Counter[tuple[str, str]] = Counter()
     findings: list[str] = []
     slowest = 0.0
     for done in isolated(answer, range(cases), PATIENCE, MEMORY):
         kind = done.result.kind if done.result else "?"
-        kinds[kind] += 1
         outcomes[kind, done.result.outcome if done.result else "lost"] += 1
         slowest = max(slowest, done.seconds)
         if done.item and done.item % TOLD == 0:
@@ -46,20 +48,34 @@ def run(scale: Scale) -> None:
         for fault in _faults(done):
             findings.append(f"{done.item} ({kind}): {fault}")
             print(f"  {findings[-1]}", flush=True)
-    rows = []
-    for kind, count in sorted(kinds.items()):
-        of_kind = [f"{o} {n}" for (k, o), n in sorted(outcomes.items()) if k == kind]
-        rows.append((kind, count, report.listed(of_kind)))
-    body = (
-        f"Seed {SEED}, {cases} cases of hostile input, see `tests/oracles/hostile_input.py`. A "
-        "finding is an error not the package's own, anything printed, a curve that `checker.py` "
-        f"faults, a changed mesh, a crash, or more than {SLOW:g} s of CPU time; the slowest took "
-        f"{slowest:.1f} s.\n\n**{len(findings)} findings.**\n\n"
-        + "".join(f"- {finding}\n" for finding in findings[:LISTED])
+    by_kind: dict[str, dict[str, int]] = defaultdict(dict)
+    for (kind, outcome), count in sorted(outcomes.items()):
+        by_kind[kind][outcome] = count
+    return {
+        "seed": SEED,
+        "cases": cases,
+        "outcomes": by_kind,
+        "findings": findings,
+        "slowest": round(slowest, 1),
+    }
+
+
+def section(results: Results) -> str:
+    """The outcomes of each kind of input, and what is wrong."""
+    rows = [
+        (kind, sum(of_kind.values()), report.listed(f"{o} {n}" for o, n in of_kind.items()))
+        for kind, of_kind in results["outcomes"].items()
+    ]
+    return (
+        f"Seed {results['seed']}, {results['cases']} cases of hostile input, see "
+        "`tests/oracles/hostile_input.py`. A finding is an error not the package's own, anything "
+        "printed, a curve that `checker.py` faults, a changed mesh, a crash, or more than "
+        f"{SLOW:g} s of CPU time; the slowest took {results['slowest']:.1f} s.\n\n"
+        f"**{len(results['findings'])} findings.**\n\n"
+        + "".join(f"- {finding}\n" for finding in results["findings"][:LISTED])
         + "\n"
         + report.table(("input", "cases", "outcomes"), rows)
     )
-    report.write_section("fuzz", "Hostile input", body, scale)
 
 
 def _faults(done: Isolated[int, Answer]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +17,16 @@ from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve, resample
 from nicmm_core.geometry.mesh import Mesh, unique_edges
 from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.io.files import read_mesh
+from tests.oracles.mesh_files import mesh_files
 
 from . import collections, renders, report
+from .evidence import Results
 from .lanes import lane_beside
 from .methods import METHODS
 from .scale import Scale
+
+TITLE = "Pictures (Fig. 13, 14, 15)"
+WITHOUT = ("outputs", "splines")
 
 SEED = 16
 METHOD = METHODS[0]
@@ -43,6 +48,9 @@ FEWEST_VERTICES, MOST_VERTICES = 1500, 12000
 
 FOLLOWED = 0.8
 """Share of an alignment region's middle line that has to have the curve near it."""
+
+ALIGNED, AVOIDED, MANY = "gallery_alignment.png", "gallery_obstacles.png", "gallery.png"
+"""Pictures: Fig. 13, 14 and 15."""
 
 OBSTACLE, ALIGNMENT = "obstacle", "alignment"
 GUIDANCE = (OBSTACLE, ALIGNMENT, None)
@@ -111,6 +119,19 @@ class Example:
             self.region.share(self.mesh, self.guided.curves[0]),
         )
 
+    def results(self) -> Results:
+        """What results keep; shares and seconds are those without and with guidance."""
+        designs = [design for design in (self.free, self.guided) if design is not None]
+        shares = self.shares
+        return {
+            "mesh": self.name,
+            "vertices": len(self.mesh.vertices),
+            "guidance": None if self.region is None else self.region.kind,
+            "shares": None if shares is None else [round(share, 4) for share in shares],
+            "status": designs[-1].status.name,
+            "seconds": [round(design.seconds, 2) for design in designs],
+        }
+
     def picture(self, title: str, free: bool = True, guided: bool = True) -> renders.Picture:
         """The painted mesh with its free curve in white and the guided one in blue."""
         curves = [(self.free.curves[0], renders.WHITE)] if free else []
@@ -126,45 +147,64 @@ class Example:
         )
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Render all three figures."""
     generator = np.random.default_rng(SEED)
-    folder = report.output_folder(scale)
     first = _example(*_named_mesh("horse", scale), ALIGNMENT, generator)
     second = _example(*_named_mesh("woman", scale), OBSTACLE, generator)
     if first is None or second is None:
         raise SystemExit("There is no ring of points with a curve for Fig. 13 or 14")
-    view = renders.best_view(first.picture(""))
-    alignment = folder / "gallery_alignment.png"
-    renders.render_sheet(
-        [
-            first.picture("without guidance", guided=False),
-            first.picture("with alignment", free=False),
-        ],
-        alignment,
-        scale,
-        views=[view, view],
-    )
-    obstacles = folder / "gallery_obstacles.png"
-    renders.render_sheet([second.picture("with an obstacle")], obstacles, scale)
+    _render_alignment(first, scale)
+    folder = report.figures_folder(scale)
+    renders.render_sheet([second.picture("with an obstacle")], folder / AVOIDED, scale)
     examples = _gallery(scale, generator)
     if not examples:
         raise SystemExit("No mesh has a ring of points with a curve for Fig. 15")
-    many = folder / "gallery.png"
-    renders.render_sheet([example.picture(example.name) for example in examples], many, scale)
-    body = (
-        f"Seed {SEED}, `{METHOD}`, {POINTS} control points on a ring about a random vertex of each "
-        f"mesh, obstacles on the free curve and lanes beside it (`lanes`).\n\n"
-        + report.figure(alignment, "Alignment (Fig. 13): without and with the blue region")
-        + "\n\n"
-        + report.figure(obstacles, "An obstacle (Fig. 14): white without it, blue with it")
-        + "\n\n"
-        + report.figure(
-            many, "Many meshes (Fig. 15): white without guidance, blue with obstacle or alignment"
-        )
-        + f"\n\n{_table([first, second, *examples])}\n\n{_findings([first, second, *examples])}"
+    renders.render_sheet(
+        [example.picture(example.name) for example in examples], folder / MANY, scale
     )
-    report.write_section("gallery", "Pictures (Fig. 13, 14, 15)", body, scale)
+    return {
+        "seed": SEED,
+        "method": METHOD,
+        "points": POINTS,
+        "examples": [example.results() for example in (first, second, *examples)],
+        "pictures": {"alignment": ALIGNED, "obstacle": AVOIDED, "many": MANY},
+    }
+
+
+def section(results: Results) -> str:
+    """The pictures, and what guidance did in each."""
+    pictures, examples = results["pictures"], results["examples"]
+    alignment = report.figure(
+        pictures["alignment"], "Alignment (Fig. 13): without and with the blue region"
+    )
+    obstacle = report.figure(
+        pictures["obstacle"], "An obstacle (Fig. 14): white without it, blue with it"
+    )
+    many = report.figure(
+        pictures["many"],
+        "Many meshes (Fig. 15): white without guidance, blue with obstacle or alignment",
+    )
+    return (
+        f"Seed {results['seed']}, `{results['method']}`, {results['points']} control points on a "
+        "ring about a random vertex of each mesh, obstacles on the free curve and lanes beside it "
+        f"(`lanes`).\n\n{alignment}\n\n{obstacle}\n\n{many}\n\n"
+        f"{_table(examples)}\n\n{_findings(examples)}"
+    )
+
+
+def _render_alignment(example: Example, scale: Scale) -> None:
+    """Without and with the region, from one side."""
+    view = renders.best_view(example.picture(""))
+    renders.render_sheet(
+        [
+            example.picture("without guidance", guided=False),
+            example.picture("with alignment", free=False),
+        ],
+        report.figures_folder(scale) / ALIGNED,
+        scale,
+        views=[view, view],
+    )
 
 
 def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
@@ -181,7 +221,7 @@ def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
     if scale is Scale.SMOKE:
         yield "disc", shapes.disc(16)
         return
-    folders = [collections.mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
+    folders = [mesh_files(folder) for folder in ("clean", "thingi10k", "shapes")]
     longest = max(len(files) for files in folders)
     for number in range(longest):
         for files in folders:
@@ -300,19 +340,18 @@ def _longest_stretch(curve: SurfaceCurve) -> FloatArray:
     return even[(starts[longest] + np.arange(lengths[longest])) % count]
 
 
-def _table(examples: list[Example]) -> str:
+def _table(examples: Sequence[Results]) -> str:
     rows = []
     for example in examples:
-        shares = example.shares
-        designs = [design for design in (example.free, example.guided) if design is not None]
+        shares = example["shares"]
         rows.append(
             (
-                example.name,
-                len(example.mesh.vertices),
-                "–" if example.region is None else example.region.kind,
-                "–" if shares is None else f"{100 * shares[0]:.0f} % → {100 * shares[1]:.0f} %",
-                designs[-1].status.name,
-                " and ".join(f"{design.seconds:.1f}" for design in designs),
+                example["mesh"],
+                example["vertices"],
+                example["guidance"] or "–",
+                "–" if shares is None else " → ".join(f"{100 * share:.0f} %" for share in shares),
+                example["status"],
+                " and ".join(f"{seconds:.1f}" for seconds in example["seconds"]),
             )
         )
     header = ("mesh", "vertices", "guidance", "share, without → with", "status", "seconds")
@@ -323,15 +362,11 @@ def _table(examples: list[Example]) -> str:
     )
 
 
-def _findings(examples: list[Example]) -> str:
+def _findings(examples: Sequence[Results]) -> str:
     """Whether guidance moved the curves the way it should."""
     text = ""
     for kind, claim in ((OBSTACLE, "avoids"), (ALIGNMENT, "follows")):
-        pairs = [
-            example.shares
-            for example in examples
-            if example.region is not None and example.region.kind == kind and example.shares
-        ]
+        pairs = [example["shares"] for example in examples if example["guidance"] == kind]
         if not pairs:
             continue
         works = sum(

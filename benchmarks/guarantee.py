@@ -8,23 +8,27 @@ from __future__ import annotations
 
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
-from tests.oracles.checker import Verdict, judge
+from tests.oracles.checker import judge
 from tests.oracles.named_curves import named_curves
 
 from . import collections, plots, report
 from .elastic_curve import NODES, elastic_curve
+from .evidence import Results
 from .measures import SAMPLES, bending, squared_curvature
 from .samples import point_sets
 from .scale import Scale
+
+TITLE = "The guarantee, and fairness, from outside"
 
 METHOD = "nicmm"
 SEED = 0
@@ -50,6 +54,8 @@ NAMED = "named curves"
 
 KIND = {True: "closed", False: "open"}
 
+PLOT = "guarantee.png"
+
 
 @dataclass(frozen=True)
 class Request:
@@ -71,64 +77,60 @@ class Job:
     compares: bool
 
 
-@dataclass(frozen=True)
-class Fairness:
-    """Of one curve with one number of samples; ratios are to elastic curves.
-
-    "Own" is the elastic curve that starts from the curve itself, "best" the fairest one known: the
-    other one starts from the variational method's curve. The last two are ∫ κ_g² ds alone.
-    """
-
-    bending: float
-    to_own: float = np.nan
-    to_best: float = np.nan
-    squared_to_own: float = np.nan
-    squared_to_best: float = np.nan
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What came of one request; the verdict is None where an error was raised."""
-
-    collection: str
-    name: str
-    closed: bool
-    verdict: Verdict | None
-    status: str = ""
-    error: str = ""
-    typed: bool = True
-    fairness: tuple[Fairness, ...] = ()
-    nearly_straight: bool = False
-
-    @property
-    def kept(self) -> bool:
-        """Whether it is what was asked for."""
-        return self.verdict is not None and not self.verdict.faults
-
-    @property
-    def words(self) -> str:
-        """The outcome in a few words."""
-        if self.verdict is None:
-            return self.error
-        return "; ".join(self.verdict.faults) or "kept"
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Ask for closed and open curves on every collection and judge them."""
-    outcomes = []
+    meshes = []
     for of_mesh in _measured(_jobs(scale), 1 if scale is Scale.SMOKE else WORKERS):
-        outcomes += of_mesh
-        first = of_mesh[0]
-        words = ", ".join(f"{KIND[one.closed]} {one.words}" for one in of_mesh)
-        print(f"  {first.collection}, {first.name}: {words}", flush=True)
-    body = (
-        f"Seed {SEED}; {SETS} sets of 3–5 random vertices a mesh, each closed and open, shortest "
-        f"order; named curves as `named_curves.py` asks for them; `{METHOD}`. The judge is "
-        "`tests/oracles/checker.py`, which knows only the public interface.\n\n"
-        f"{_table(outcomes)}\n\n{_faults(outcomes)}\n\n{_fairness(outcomes, scale)}\n\n"
-        f"{_figure(outcomes, scale)}"
+        meshes.append(of_mesh)
+        words = report.listed(f"{KIND[one['closed']]} {_words(one)}" for one in of_mesh["curves"])
+        print(f"  {of_mesh['collection']}, {of_mesh['mesh']}: {words}", flush=True)
+    return {
+        "seed": SEED,
+        "sets": SETS,
+        "method": METHOD,
+        "samplings": list(SAMPLINGS),
+        "compared_every": _compared_every(scale),
+        "nearly_straight": NEARLY_STRAIGHT,
+        "meshes": meshes,
+    }
+
+
+def section(results: Results) -> str:
+    """How many curves are what was asked for, and how fair they are."""
+    meshes = results["meshes"]
+    return (
+        f"Seed {results['seed']}; {results['sets']} sets of 3–5 random vertices a mesh, each "
+        "closed and open, shortest order; named curves as `named_curves.py` asks for them; "
+        f"`{results['method']}`. The judge is `tests/oracles/checker.py`, which knows only the "
+        f"public interface.\n\n{_table(meshes)}\n\n{_faults(meshes)}\n\n{_fairness(results)}\n\n"
+        + report.figure(PLOT, "Share of the sets at or below each ratio to the elastic curve")
     )
-    report.write_section("guarantee", "The guarantee, and fairness, from outside", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Share of the sets whose curve is at most so many times as far from fair."""
+    samplings = results["samplings"]
+    figure, axes = plots.labelled(
+        f"Fairness of {results['method']}",
+        f"L ∫ κ_g² ds relative to the elastic curve ({samplings[-1]} samples)",
+        "share of the sets",
+    )
+    lines = {"the fairest known": ("to_best", "-"), "from its own start": ("to_own", ":")}
+    for closed, colour in ((True, "tab:blue"), (False, "tab:orange")):
+        for label, (name, style) in lines.items():
+            values = _values(results["meshes"], closed, len(samplings) - 1, name)
+            shares = np.linspace(0.0, 1.0, len(values) + 1)
+            values = values[:1] + values
+            shares = shares[: len(values)]
+            axes.step(
+                values, shares, style, where="post", color=colour, label=f"{KIND[closed]}, {label}"
+            )
+    axes.axvline(1.0, color="0.6", linewidth=0.8)
+    axes.set_xscale("log")
+    plots.plain_ticks(axes.xaxis)
+    axes.set_ylim(0.0, 1.02)
+    axes.legend(fontsize=8, loc="lower right")
+    plots.save(figure, folder / PLOT)
 
 
 def _jobs(scale: Scale) -> Iterator[Job]:
@@ -162,54 +164,59 @@ def _compared_every(scale: Scale) -> int:
     return scale.choose(8, 4)
 
 
-def _measured(jobs: Iterable[Job], workers: int) -> Iterator[list[Outcome]]:
-    """Outcomes by mesh, in the order of the jobs."""
+def _measured(jobs: Iterable[Job], workers: int) -> Iterator[Results]:
+    """What came on every mesh, in the order of the jobs."""
     if workers == 1:
-        yield from map(_outcomes, jobs)
+        yield from map(_judged, jobs)
         return
     # A forked process would inherit the locks of PyTorch's threads.
     with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap(_outcomes, jobs)
+        yield from pool.imap(_judged, jobs)
 
 
-def _outcomes(job: Job) -> list[Outcome]:
+def _judged(job: Job) -> Results:
+    """All curves on one mesh."""
     designer = nicmm.Designer(job.mesh)
-    return [_outcome(job, designer, request) for request in job.requests]
+    curves = [_outcome(job, designer, request) for request in job.requests]
+    return {"collection": job.collection, "mesh": job.name, "curves": curves}
 
 
-def _outcome(job: Job, designer: nicmm.Designer, request: Request) -> Outcome:
+def _outcome(job: Job, designer: nicmm.Designer, request: Request) -> Results:
+    """What came of one request; what is as it should be is left out."""
     points, closed, order = request.points, request.closed, request.order
     try:
         design = designer.design(points, closed=closed, order=order, method=METHOD)
     # An error that is not the package's own is a finding, and must not end a long measurement.
     except Exception as error:
-        typed = isinstance(error, nicmm.NicmmError)
         words = f"{type(error).__name__}: {error}"
-        return Outcome(job.collection, job.name, closed, None, error=words, typed=typed)
+        return {"closed": closed, "error": words, "typed": isinstance(error, nicmm.NicmmError)}
     verdict = judge(job.mesh, design, points, closed, order)
-    fairness: tuple[Fairness, ...] = ()
-    straight = False
+    found: Results = {"closed": closed, "status": design.status.name}
+    if verdict.faults:
+        found["faults"] = list(verdict.faults)
+        found["chords_off_face"] = int(verdict.chords_off_face)
+        found["self_crossings"] = int(verdict.self_crossings)
+    missed = verdict.interpolation_error
+    if missed:
+        found["missed"] = float(f"{missed:.3g}") if np.isfinite(missed) else None
     if not verdict.faults:
-        curve = design.curves[0]
-        if job.compares:
-            fairness, straight = _compared(designer, curve, points)
-        else:
-            fairness = tuple(Fairness(bending(job.mesh, curve, each)) for each in SAMPLINGS)
-    return Outcome(
-        job.collection,
-        job.name,
-        closed,
-        verdict,
-        status=design.status.name,
-        fairness=fairness,
-        nearly_straight=straight,
-    )
+        compare = _compared if job.compares else _alone
+        found |= compare(designer, design.curves[0], points)
+    return found
 
 
-def _compared(
-    designer: nicmm.Designer, curve: nicmm.SurfaceCurve, points: IntArray
-) -> tuple[tuple[Fairness, ...], bool]:
-    """Fairness relative to the elastic curves, and whether these are nearly straight."""
+def _alone(designer: nicmm.Designer, curve: nicmm.SurfaceCurve, _: IntArray) -> Results:
+    """L ∫ κ_g² ds with every number of samples."""
+    return {"bending": [_rounded(bending(designer.mesh, curve, each)) for each in SAMPLINGS]}
+
+
+def _compared(designer: nicmm.Designer, curve: nicmm.SurfaceCurve, points: IntArray) -> Results:
+    """Fairness with every number of samples, also relative to elastic curves.
+
+    "Own" is the elastic curve that starts from the curve itself, "best" the fairest one known: the
+    other one starts from the variational method's curve. "Squared" is ∫ κ_g² ds alone. There are
+    no ratios where the elastic curve is nearly straight.
+    """
     mesh = designer.mesh
     fair = [elastic_curve(mesh, curve)]
     visited = points[_visiting_order(curve, mesh.vertices[points])]
@@ -220,15 +227,22 @@ def _compared(
     else:
         if not judge(mesh, other, visited, curve.closed).faults:
             fair.append(elastic_curve(mesh, other.curves[0]))
-    own, best = fair[0].curve, min(fair, key=lambda one: one.energies[-1]).curve
-    straight = min(one.energies[-1] for one in fair) < NEARLY_STRAIGHT
-    compared = []
-    for samples in SAMPLINGS:
-        bends = [bending(mesh, each, samples) for each in (curve, own, best)]
-        squares = [squared_curvature(mesh, each, samples) for each in (curve, own, best)]
-        ratios = [values[0] / value for values in (bends, squares) for value in values[1:]]
-        compared.append(Fairness(bends[0], *([np.nan] * 4 if straight else ratios)))
-    return tuple(compared), straight
+    found = _alone(designer, curve, points)
+    if min(one.energies[-1] for one in fair) < NEARLY_STRAIGHT:
+        return {**found, "nearly_straight": True}
+    yardsticks = {"own": fair[0], "best": min(fair, key=lambda one: one.energies[-1])}
+    for prefix, value in {"to": bending, "squared_to": squared_curvature}.items():
+        for name, yardstick in yardsticks.items():
+            found[f"{prefix}_{name}"] = [
+                _rounded(value(mesh, curve, each) / value(mesh, yardstick.curve, each))
+                for each in SAMPLINGS
+            ]
+    return found
+
+
+def _rounded(value: float) -> float | None:
+    """Six digits; None where it is not finite."""
+    return float(f"{value:.6g}") if np.isfinite(value) else None
 
 
 def _visiting_order(curve: nicmm.SurfaceCurve, positions: FloatArray) -> IntArray:
@@ -237,39 +251,54 @@ def _visiting_order(curve: nicmm.SurfaceCurve, positions: FloatArray) -> IntArra
     return np.linalg.norm(offset, axis=2).argmin(axis=1)
 
 
-def _table(outcomes: Sequence[Outcome]) -> str:
+def _words(curve: Results) -> str:
+    """The outcome in a few words."""
+    return str(curve.get("error") or "; ".join(curve.get("faults", ())) or "kept")
+
+
+def _is_kept(curve: Results) -> bool:
+    """Whether it is what was asked for."""
+    return "error" not in curve and "faults" not in curve
+
+
+def _table(meshes: Sequence[Results]) -> str:
     header = (
         "meshes", "curves", "sets", "one simple curve through all points, in order",
         "largest interpolation error, diagonals", "chords off a face", "self-crossings",
         "errors", "statuses",
     )  # fmt: skip
     rows = []
-    for collection in dict.fromkeys(one.collection for one in outcomes):
+    for collection in dict.fromkeys(each["collection"] for each in meshes):
+        curves = _curves(each for each in meshes if each["collection"] == collection)
         for closed in (True, False):
-            group = [o for o in outcomes if o.collection == collection and o.closed == closed]
+            group = [curve for curve in curves if curve["closed"] == closed]
             if group:
                 rows.append((collection, KIND[closed], *_counted(group)))
-    return report.table(header, [*rows, ("all", "", *_counted(outcomes))])
+    return report.table(header, [*rows, ("all", "", *_counted(_curves(meshes)))])
 
 
-def _counted(outcomes: Sequence[Outcome]) -> tuple[object, ...]:
-    verdicts = [one.verdict for one in outcomes if one.verdict is not None]
-    kept = sum(one.kept for one in outcomes)
+def _curves(meshes: Iterable[Results]) -> list[Results]:
+    return [curve for each in meshes for curve in each["curves"]]
+
+
+def _counted(curves: Sequence[Results]) -> tuple[object, ...]:
+    judged = [curve for curve in curves if "error" not in curve]
+    kept = sum(_is_kept(curve) for curve in curves)
     # A typed error is named; any other is a fault of the package.
     errors = Counter(
-        one.error.split(":")[0] + ("" if one.typed else " (untyped)")
-        for one in outcomes
-        if one.verdict is None
+        curve["error"].split(":")[0] + ("" if curve["typed"] else " (untyped)")
+        for curve in curves
+        if "error" in curve
     )
-    missed = max((verdict.interpolation_error for verdict in verdicts), default=0.0)
+    missed = [curve.get("missed", 0.0) for curve in judged]
     return (
-        len(outcomes),
-        f"{kept} ({100 * kept / len(outcomes):.1f} %)",
-        f"{missed:.1e}",
-        sum(verdict.chords_off_face for verdict in verdicts),
-        sum(verdict.self_crossings for verdict in verdicts),
+        len(curves),
+        f"{kept} ({100 * kept / len(curves):.1f} %)",
+        f"{max((np.inf if each is None else each for each in missed), default=0.0):.1e}",
+        sum(curve.get("chords_off_face", 0) for curve in judged),
+        sum(curve.get("self_crossings", 0) for curve in judged),
         _named_counts(errors),
-        _named_counts(Counter(one.status for one in outcomes if one.status)),
+        _named_counts(Counter(curve["status"] for curve in judged)),
     )
 
 
@@ -277,37 +306,40 @@ def _named_counts(counts: Counter[str]) -> str:
     return report.listed(f"{name} {count}" for name, count in sorted(counts.items())) or "none"
 
 
-def _faults(outcomes: Sequence[Outcome]) -> str:
-    wrong = [one for one in outcomes if not one.kept]
+def _faults(meshes: Sequence[Results]) -> str:
+    wrong = [
+        f"- {each['mesh']}, {KIND[curve['closed']]}: {_words(curve)}"
+        for each in meshes
+        for curve in each["curves"]
+        if not _is_kept(curve)
+    ]
     if not wrong:
         return "Every curve is what was asked for."
-    lines = [f"- {one.name}, {KIND[one.closed]}: {one.words}" for one in wrong[:LISTED_FAULTS]]
     more = f"\n\nand {len(wrong) - LISTED_FAULTS} more." if len(wrong) > LISTED_FAULTS else ""
-    return "Not what was asked for:\n\n" + "\n".join(lines) + more
+    return "Not what was asked for:\n\n" + "\n".join(wrong[:LISTED_FAULTS]) + more
 
 
-COLUMNS: dict[str, tuple[Callable[[Fairness], float], int]] = {
-    "L ∫ κ_g² ds": (lambda fairness: fairness.bending, 0),
-    "to the elastic curve from its own start": (lambda fairness: fairness.to_own, 2),
-    "to the fairest one known": (lambda fairness: fairness.to_best, 2),
-    "∫ κ_g² ds alone, own start": (lambda fairness: fairness.squared_to_own, 2),
-    "∫ κ_g² ds alone, fairest": (lambda fairness: fairness.squared_to_best, 2),
+COLUMNS = {
+    "L ∫ κ_g² ds": ("bending", 0),
+    "to the elastic curve from its own start": ("to_own", 2),
+    "to the fairest one known": ("to_best", 2),
+    "∫ κ_g² ds alone, own start": ("squared_to_own", 2),
+    "∫ κ_g² ds alone, fairest": ("squared_to_best", 2),
 }
 """Of the table of fairness: what is shown, with how many digits."""
 
 
-def _fairness(outcomes: Sequence[Outcome], scale: Scale) -> str:
+def _fairness(results: Results) -> str:
+    meshes = results["meshes"]
     rows = []
     for closed in (True, False):
-        for sampling, samples in enumerate(SAMPLINGS):
-            row = [KIND[closed], str(samples)]
-            for value, digits in COLUMNS.values():
-                values = _values(outcomes, closed, sampling, value)
-                row.append(_quantiles(values, digits))
-            rows.append(row)
-    straight = sum(one.nearly_straight for one in outcomes)
-    compared = len(_values(outcomes, None, 0, lambda fairness: fairness.to_own))
-    every = _compared_every(scale)
+        for sampling, samples in enumerate(results["samplings"]):
+            values = [_values(meshes, closed, sampling, name) for name, _ in COLUMNS.values()]
+            digits = [each for _, each in COLUMNS.values()]
+            rows.append((KIND[closed], samples, *map(_quantiles, values, digits)))
+    straight = sum(curve.get("nearly_straight", False) for curve in _curves(meshes))
+    compared = sum(len(_values(meshes, closed, 0, "to_own")) for closed in (True, False))
+    every = results["compared_every"]
     which = "every mesh" if every == 1 else f"every {every}th mesh of each collection"
     return (
         f"{report.table(('curves', 'samples', *COLUMNS), rows)}\n\n"
@@ -317,23 +349,17 @@ def _fairness(outcomes: Sequence[Outcome], scale: Scale) -> str:
         "it and the one that starts from the curve of `variational`. Their topology is free and "
         f"each is a local optimum. {straight} of {straight + compared} sets are left out of the "
         f"ratios because the elastic curve is nearly straight (L ∫ κ_g² ds below "
-        f"{NEARLY_STRAIGHT})."
+        f"{results['nearly_straight']})."
     )
 
 
-def _values(
-    outcomes: Sequence[Outcome],
-    closed: bool | None,
-    sampling: int,
-    value: Callable[[Fairness], float],
-) -> list[float]:
-    """A measure of all curves of a kind where it is known, sorted; closed None for both kinds."""
+def _values(meshes: Sequence[Results], closed: bool, sampling: int, name: str) -> list[float]:
+    """A measure of all curves of a kind where it is known, sorted."""
+    curves = _curves(each for each in meshes if each["collection"] != NAMED)
     values = [
-        value(one.fairness[sampling])
-        for one in outcomes
-        if one.fairness and one.collection != NAMED and closed in (None, one.closed)
+        curve[name][sampling] for curve in curves if curve["closed"] == closed and name in curve
     ]
-    return sorted(each for each in values if np.isfinite(each))
+    return sorted(value for value in values if value is not None)
 
 
 def _quantiles(values: Sequence[float], digits: int) -> str:
@@ -341,32 +367,3 @@ def _quantiles(values: Sequence[float], digits: int) -> str:
         return "–"
     text = " · ".join(f"{each:.{digits}f}" for each in np.quantile(values, SHARES))
     return f"{text} ({len(values)})"
-
-
-def _figure(outcomes: Sequence[Outcome], scale: Scale) -> str:
-    """Share of the sets whose curve is at most so many times as far from fair."""
-    figure, axes = plots.labelled(
-        f"Fairness of {METHOD}",
-        f"L ∫ κ_g² ds relative to the elastic curve ({SAMPLINGS[-1]} samples)",
-        "share of the sets",
-    )
-    lines: dict[str, tuple[Callable[[Fairness], float], str]] = {
-        "the fairest known": (lambda fairness: fairness.to_best, "-"),
-        "from its own start": (lambda fairness: fairness.to_own, ":"),
-    }
-    for closed, colour in ((True, "tab:blue"), (False, "tab:orange")):
-        for label, (value, style) in lines.items():
-            values = _values(outcomes, closed, len(SAMPLINGS) - 1, value)
-            shares = np.linspace(0.0, 1.0, len(values) + 1)
-            values = values[:1] + values
-            shares = shares[: len(values)]
-            axes.step(
-                values, shares, style, where="post", color=colour, label=f"{KIND[closed]}, {label}"
-            )
-    axes.axvline(1.0, color="0.6", linewidth=0.8)
-    axes.set_xscale("log")
-    plots.plain_ticks(axes.xaxis)
-    axes.set_ylim(0.0, 1.02)
-    axes.legend(fontsize=8, loc="lower right")
-    path = plots.save(figure, report.output_folder(scale) / "guarantee.png")
-    return report.figure(path, "Share of the sets at or below each ratio to the elastic curve")

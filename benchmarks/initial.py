@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,16 +22,22 @@ from nicmm_core.network.forward_pass import DISTANCE_CHANNEL
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
 
 from . import collections, plots, renders, report
+from .evidence import Results
 from .polylines import initial_path
 from .scale import Scale
 from .solving import (
+    PARTS_WITHOUT,
     Sample,
     designed_curve,
     level_set,
     random_field,
     random_samples,
     relative_distances,
+    significant,
 )
+
+TITLE = "Initial loops (Fig. 6)"
+WITHOUT = PARTS_WITHOUT
 
 SEED = 6
 RANDOM_SEED = 16
@@ -52,6 +59,7 @@ CLEARANCE = 0.06
 WAVES = 3
 """Times that the wavy loop swings out to both sides."""
 
+STILLS = "initial_curves.png"
 PICTURED = 2
 
 
@@ -76,63 +84,83 @@ class Outcome:
     loss: float
 
 
-@dataclass(frozen=True)
-class WithoutLoop:
-    """The level set when φ₀ does not come from a loop.
-
-    Attributes
-    ----------
-    pieces : int
-        Closed or open curves that it has.
-    one_loop : bool
-        Whether it is one closed curve through all control points.
-    distance : (float, float) or None
-        Mean and greatest distance to the curve from the shortest loop, if it is one curve.
-    """
-
-    pieces: int
-    one_loop: bool
-    distance: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """All results for one sample."""
-
-    sample: Sample
-    with_loop: dict[str, Outcome]
-    without_loop: dict[str, WithoutLoop]
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Compare curves through the same points from several initial loops, and from none."""
     network = load_network()
     meshes = collections.surfaces(scale, scale.choose(12, 1))
-    compared = []
+    compared: list[Results] = []
+    shown: list[tuple[Sample, dict[str, Outcome]]] = []
     for sample in random_samples(meshes, 1, SEED):
-        with_loop = _with_loops(network, sample)
-        without = _without_loops(network, sample, with_loop[SHORTEST].curve)
-        compared.append(Comparison(sample, with_loop, without))
-        print(f"  {sample.name}: {report.listed(with_loop)}", flush=True)
+        outcomes = _with_loops(network, sample)
+        base = outcomes[SHORTEST]
+        compared.append(
+            {
+                "mesh": sample.name,
+                "with_loop": {
+                    label: _compared(sample, outcome, base) for label, outcome in outcomes.items()
+                },
+                "without_loop": _without_loops(network, sample, base.curve),
+            }
+        )
+        shown.append((sample, outcomes))
+        print(f"  {sample.name}: {report.listed(outcomes)}", flush=True)
     if not compared:
         raise SystemExit("No set had a simple loop through its points; there is nothing to compare")
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, on {len(compared)} meshes "
-        f"({collections.label(scale)}: {report.listed(c.sample.name for c in compared)}), shipped "
+    _render(shown, scale)
+    return {
+        "seed": SEED,
+        "random_seed": RANDOM_SEED,
+        "collection": collections.label(scale),
+        "push": PUSH,
+        "loops": list(LOOPS),
+        "compared": compared,
+        "stills": STILLS,
+    }
+
+
+def section(results: Results) -> str:
+    """How much of the difference between loops remains in the curves."""
+    compared, loops = results["compared"], results["loops"]
+    plot = report.figure(
+        "initial.png", "Each dot is a mesh: distance to the shortest loop and its curve"
+    )
+    stills = report.figure(
+        results["stills"], "Initial loops (white) and the curves from them (blue) (Fig. 6)"
+    )
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, on {len(compared)} meshes "
+        f"({results['collection']}: {report.listed(one['mesh'] for one in compared)}), shipped "
         "weights, early stop, the same λ for all loops of a set. The other loops pass the same "
-        f"points in the same order and are pushed aside between them by {PUSH:g} √area or more, "
-        "by an obstacle that only the initial loop sees. Distances are to the shortest loop and "
-        "to the curve from it, in percent of the bounding box's diagonal; medians over the "
-        f"meshes.\n\n{_loop_table(compared)}\n\n{_loop_findings(compared)}\n\n"
-        f"{_plot(compared, scale)}\n\n{_stills(compared, scale)}\n\n"
+        f"points in the same order and are pushed aside between them by {results['push']:g} √area "
+        "or more, by an obstacle that only the initial loop sees. Distances are to the shortest "
+        "loop and to the curve from it, in percent of the bounding box's diagonal; medians over "
+        f"the meshes.\n\n{_loop_table(compared, loops)}\n\n{_loop_findings(compared, loops)}\n\n"
+        f"{plot}\n\n{stills}\n\n"
         "### Without an initial loop\n\nFig. 6 has one curve from a distance to the control "
         "points alone. It does not say how that has a sign, so two fields stand in for φ₀, in "
         "the input and under the network's correction: that distance, positive everywhere, and a "
-        f"random smooth field that is zero at the points (seed {RANDOM_SEED}). What is looked at "
-        "is the level set itself, since there is no loop whose topology could be held.\n\n"
-        f"{_none_table(compared)}\n\n{_none_findings(compared)}"
+        f"random smooth field that is zero at the points (seed {results['random_seed']}). What is "
+        "looked at is the level set itself, since there is no loop whose topology could be held."
+        f"\n\n{_none_table(compared)}\n\n{_none_findings(compared)}"
     )
-    report.write_section("initial", "Initial loops (Fig. 6)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw the distances of the curves against those of the loops."""
+    figure, axes = plots.labelled(
+        "Curves from different initial loops (Fig. 6)",
+        "mean distance of the loops (% of the diagonal)",
+        "mean distance of the curves (% of the diagonal)",
+    )
+    farthest = 0.0
+    for label in results["loops"][1:]:
+        pairs = np.array(_pairs(results["compared"], label)).reshape(-1, 2, 2)[:, :, 0]
+        axes.plot(pairs[:, 0], pairs[:, 1], "o", label=label)
+        farthest = max(farthest, float(pairs.max(initial=0.0)))
+    ends = [0.0, farthest]
+    axes.plot(ends, ends, "--", color="0.5", linewidth=1, label="no nearer than the loops")
+    axes.legend()
+    plots.save(figure, folder / "initial.png")
 
 
 def _with_loops(network: CurveNetwork, sample: Sample) -> dict[str, Outcome]:
@@ -158,6 +186,18 @@ def _outcome(network: CurveNetwork, sample: Sample) -> Outcome:
         finetuned.iterations,
         min(finetuned.losses),
     )
+
+
+def _compared(sample: Sample, outcome: Outcome, base: Outcome) -> Results:
+    """What results keep of an outcome; distances are those of the loop and of the curve."""
+    loops = relative_distances(sample, outcome.start, base.start)
+    curves = relative_distances(sample, outcome.curve, base.curve)
+    return {
+        "distances": [[significant(value) for value in pair] for pair in (loops, curves)],
+        "by_itself": bool(outcome.by_itself),
+        "iterations": outcome.iterations,
+        "loss": significant(outcome.loss),
+    }
 
 
 def _obstacles(sample: Sample) -> dict[str, FloatArray]:
@@ -197,7 +237,11 @@ def _problem_round(sample: Sample, obstacle: FloatArray) -> Problem:
 
 def _without_loops(
     network: CurveNetwork, sample: Sample, reference: SurfaceCurve
-) -> dict[str, WithoutLoop]:
+) -> dict[str, Results]:
+    """The level sets when φ₀ does not come from a loop.
+
+    One that is a single closed curve through all control points is compared with the reference.
+    """
     problem = sample.problem
     fields = {
         UNSIGNED: np.abs(
@@ -215,40 +259,52 @@ def _without_loops(
         curves = level_set(sample, found)
         one = is_one_curve(curves)
         distance = relative_distances(sample, curves[0], reference) if one else None
-        outcomes[label] = WithoutLoop(len(curves), one, distance)
+        outcomes[label] = {
+            "pieces": len(curves),
+            "one_loop": bool(one),
+            "distance": distance and [significant(value) for value in distance],
+        }
     return outcomes
 
 
-def _pairs(
-    compared: Sequence[Comparison], label: str
-) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+def _render(shown: Sequence[tuple[Sample, dict[str, Outcome]]], scale: Scale) -> None:
+    """Pictures of some meshes, each mesh from one side."""
+    pictures: list[renders.Picture] = []
+    views: list[FloatArray] = []
+    # Where the topology was held everywhere there is less to see of the method.
+    telling = sorted(shown, key=lambda one: -sum(o.by_itself for o in one[1].values()))
+    for sample, outcomes in telling[:PICTURED]:
+        row = [_picture(sample, label, outcome) for label, outcome in outcomes.items()]
+        pictures += row
+        # One camera for all, so that the curves can be compared.
+        views += [renders.best_view(row[0])] * len(row)
+    path = report.figures_folder(scale) / STILLS
+    renders.render_sheet(pictures, path, scale, columns=len(LOOPS), views=views)
+
+
+def _picture(sample: Sample, label: str, outcome: Outcome) -> renders.Picture:
+    curves = [(outcome.start, renders.WHITE), (outcome.curve, renders.BLUE)]
+    return renders.Picture(f"{sample.name}, {label}", sample.mesh, curves)
+
+
+def _pairs(compared: Sequence[Results], label: str) -> list[list[list[float]]]:
     """Distances of the loop and of the curve to those of the shortest loop, on every mesh."""
-    pairs = []
-    for one in compared:
-        if label in one.with_loop:
-            here, base = one.with_loop[label], one.with_loop[SHORTEST]
-            pairs.append(
-                (
-                    relative_distances(one.sample, here.start, base.start),
-                    relative_distances(one.sample, here.curve, base.curve),
-                )
-            )
-    return pairs
+    return [one["with_loop"][label]["distances"] for one in compared if label in one["with_loop"]]
 
 
-def _both_by_themselves(compared: Sequence[Comparison], label: str) -> list[bool]:
+def _both_by_themselves(compared: Sequence[Results], label: str) -> list[bool]:
     """For each of `_pairs`, whether neither topology had to be held."""
     return [
-        one.with_loop[label].by_itself and one.with_loop[SHORTEST].by_itself
+        one["with_loop"][label]["by_itself"] and one["with_loop"][SHORTEST]["by_itself"]
         for one in compared
-        if label in one.with_loop
+        if label in one["with_loop"]
     ]
 
 
-def _loop_table(compared: Sequence[Comparison]) -> str:
+def _loop_table(compared: Sequence[Results], labels: Sequence[str]) -> str:
     rows: list[tuple[object, ...]] = []
-    for label in LOOPS:
-        found = [one.with_loop[label] for one in compared if label in one.with_loop]
+    for label in labels:
+        found = [one["with_loop"][label] for one in compared if label in one["with_loop"]]
         if not found:
             rows.append((label, 0, *["–"] * 7))
             continue
@@ -259,9 +315,9 @@ def _loop_table(compared: Sequence[Comparison]) -> str:
                 label,
                 len(found),
                 *shown,
-                sum(outcome.by_itself for outcome in found),
-                f"{np.median([outcome.iterations for outcome in found]):.0f}",
-                f"{np.median([outcome.loss for outcome in found]):.3f}",
+                sum(outcome["by_itself"] for outcome in found),
+                f"{np.median([outcome['iterations'] for outcome in found]):.0f}",
+                f"{np.median([outcome['loss'] for outcome in found]):.3f}",
             )
         )
     header = (
@@ -271,13 +327,15 @@ def _loop_table(compared: Sequence[Comparison]) -> str:
     return report.table(header, rows)
 
 
-def _loop_findings(compared: Sequence[Comparison]) -> str:
+def _loop_findings(compared: Sequence[Results], labels: Sequence[str]) -> str:
     """What the table says, in words."""
-    pairs = [pair for label in LOOPS[1:] for pair in _pairs(compared, label)]
+    pairs = [pair for label in labels[1:] for pair in _pairs(compared, label)]
     if not pairs:
         return "No other loop could be made, so there is nothing to compare."
     loops, curves = np.array(pairs)[:, :, 0].T
-    whole = np.array([both for label in LOOPS[1:] for both in _both_by_themselves(compared, label)])
+    whole = np.array(
+        [both for label in labels[1:] for both in _both_by_themselves(compared, label)]
+    )
     kept = float(np.median(curves / loops))
     text = (
         "The paper says of Fig. 6, without numbers, that different loops give curves that differ "
@@ -307,17 +365,17 @@ def _loop_findings(compared: Sequence[Comparison]) -> str:
     )
 
 
-def _none_table(compared: Sequence[Comparison]) -> str:
+def _none_table(compared: Sequence[Results]) -> str:
     rows = []
     for label in (UNSIGNED, RANDOM):
-        found = [one.without_loop[label] for one in compared]
-        apart = [outcome.distance for outcome in found if outcome.distance is not None]
+        found = [one["without_loop"][label] for one in compared]
+        apart = [outcome["distance"] for outcome in found if outcome["distance"] is not None]
         middle = [f"{value:.2f}" for value in np.median(apart, axis=0)] if apart else ["–"] * 2
         rows.append(
             (
                 label,
-                f"{sum(outcome.one_loop for outcome in found)} of {len(found)}",
-                f"{np.median([outcome.pieces for outcome in found]):.0f}",
+                f"{sum(outcome['one_loop'] for outcome in found)} of {len(found)}",
+                f"{np.median([outcome['pieces'] for outcome in found]):.0f}",
                 *middle,
             )
         )
@@ -328,11 +386,11 @@ def _none_table(compared: Sequence[Comparison]) -> str:
     return report.table(header, rows)
 
 
-def _none_findings(compared: Sequence[Comparison]) -> str:
+def _none_findings(compared: Sequence[Results]) -> str:
     """What the table says, in words."""
     text = ""
     for label in (UNSIGNED, RANDOM):
-        share = float(np.mean([one.without_loop[label].one_loop for one in compared]))
+        share = float(np.mean([one["without_loop"][label]["one_loop"] for one in compared]))
         text += f"From the {label}, {100 * share:.0f} % of the sets give a usable curve"
         text += (
             ", which contradicts Fig. 6, where a distance to the points alone gives a curve. "
@@ -340,42 +398,3 @@ def _none_findings(compared: Sequence[Comparison]) -> str:
             else ". "
         )
     return text + "The shipped weights have seen φ₀ from loops only."
-
-
-def _plot(compared: Sequence[Comparison], scale: Scale) -> str:
-    figure, axes = plots.labelled(
-        "Curves from different initial loops (Fig. 6)",
-        "mean distance of the loops (% of the diagonal)",
-        "mean distance of the curves (% of the diagonal)",
-    )
-    farthest = 0.0
-    for label in LOOPS[1:]:
-        pairs = np.array(_pairs(compared, label)).reshape(-1, 2, 2)[:, :, 0]
-        axes.plot(pairs[:, 0], pairs[:, 1], "o", label=label)
-        farthest = max(farthest, float(pairs.max(initial=0.0)))
-    ends = [0.0, farthest]
-    axes.plot(ends, ends, "--", color="0.5", linewidth=1, label="no nearer than the loops")
-    axes.legend()
-    path = plots.save(figure, report.output_folder(scale) / "initial.png")
-    return report.figure(path, "Each dot is a mesh: distance to the shortest loop and its curve")
-
-
-def _stills(compared: Sequence[Comparison], scale: Scale) -> str:
-    """Pictures of some meshes, each mesh from one side."""
-    pictures: list[renders.Picture] = []
-    views: list[FloatArray] = []
-    # Where the topology was held everywhere there is less to see of the method.
-    telling = sorted(compared, key=lambda one: -sum(o.by_itself for o in one.with_loop.values()))
-    for one in telling[:PICTURED]:
-        row = [_picture(one.sample, label, outcome) for label, outcome in one.with_loop.items()]
-        pictures += row
-        # One camera for all, so that the curves can be compared.
-        views += [renders.best_view(row[0])] * len(row)
-    path = report.output_folder(scale) / "initial_curves.png"
-    renders.render_sheet(pictures, path, scale, columns=len(LOOPS), views=views)
-    return report.figure(path, "Initial loops (white) and the curves from them (blue) (Fig. 6)")
-
-
-def _picture(sample: Sample, label: str, outcome: Outcome) -> renders.Picture:
-    curves = [(outcome.start, renders.WHITE), (outcome.curve, renders.BLUE)]
-    return renders.Picture(f"{sample.name}, {label}", sample.mesh, curves)

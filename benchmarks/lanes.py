@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +21,13 @@ from nicmm_core.relaxation.noded_curve import shifted
 from tests.oracles.checker import judge
 
 from . import collections, report
+from .evidence import Results
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Lanes to follow"
+WITHOUT = ("outputs",)
 
 SEED = 4
 
@@ -65,65 +69,78 @@ class Lane:
         return float(cKDTree(even).query(self.line)[0].mean())
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Lanes of weight 1 on closed meshes and on people and animals."""
     if scale is Scale.SMOKE:
         meshes = collections.creatures(2)
     else:
         some = collections.bodies(scale.choose(12, 2))
         meshes = itertools.chain(collections.clean(scale.choose(36, 4)), some)
-    ratios, bends, times, lengths, faults, n_sets = [], [], [], [], 0, 0
-    for name, mesh, points in random_sets(meshes, 1, SEED):
-        n_sets += 1
-        free, _ = _timed(lambda mesh=mesh, points=points: _design(mesh, points, None))
-        lane = lane_beside(mesh, free.curves[0])
-        if lane is None:
-            print(f"  {name}: no room for a lane", flush=True)
-            continue
-        free, before = _timed(lambda mesh=mesh, points=points: _design(mesh, points, None))
-        led, after = _timed(
-            lambda mesh=mesh, points=points, lane=lane: _design(mesh, points, lane.weights)
-        )
-        curve, other = free.curves[0], led.curves[0]
-        ratios.append(lane.distance(other) / lane.distance(curve))
-        bends.append(bending(mesh, other, SAMPLES) / bending(mesh, curve, SAMPLES))
-        lengths.append(other.length / curve.length)
-        times.append(after / before)
-        wrong = judge(mesh, led, points, True, "shortest").faults
-        faults += bool(wrong)
-        print(
-            f"  {name}: lane {ratios[-1]:.2f}, bending {bends[-1]:.2f}, time {times[-1]:.2f} "
-            f"({before:.2f} s) {wrong or ''}",
-            flush=True,
-        )
+    return {
+        "seed": SEED,
+        "width": WIDTH,
+        "least_width": LEAST_WIDTH,
+        "offset": OFFSET,
+        "sets": [
+            {"mesh": name, "led": _led(name, mesh, points)}
+            for name, mesh, points in random_sets(meshes, 1, SEED)
+        ],
+    }
+
+
+def section(results: Results) -> str:
+    """The curve that is led, relative to the free one."""
+    sets = results["sets"]
+    led = [each["led"] for each in sets if each["led"] is not None]
+    kept = sum(not each["faults"] for each in led)
     rows = [
-        ("distance of the lane to the curve", *_quartiles(ratios)),
-        ("bending L ∮ κ_g² ds", *_quartiles(bends)),
-        ("length", *_quartiles(lengths)),
-        ("CPU time", *_quartiles(times)),
+        ("distance of the lane to the curve", *_quartiles(led, "distance")),
+        ("bending L ∮ κ_g² ds", *_quartiles(led, "bending")),
+        ("length", *_quartiles(led, "length")),
+        ("CPU time", *_quartiles(led, "time")),
     ]
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order. Lanes of weight 1, "
-        f"{2 * WIDTH:.0%} of the diagonal or {2 * LEAST_WIDTH:g} edges wide, beside the middle "
-        "half of the longest stretch between two control points of the free curve, "
-        f"{OFFSET:.1%} of the diagonal away on the surface; {n_sets - len(ratios)} of {n_sets} "
-        "meshes have no room for one. Everything relative to the free curve; the map's own making "
-        "is in the time.\n\n"
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order. Lanes of "
+        f"weight 1, {2 * results['width']:.0%} of the diagonal or {2 * results['least_width']:g} "
+        "edges wide, beside the middle half of the longest stretch between two control points of "
+        f"the free curve, {results['offset']:.1%} of the diagonal away on the surface; "
+        f"{len(sets) - len(led)} of {len(sets)} meshes have no room for one. Everything relative "
+        "to the free curve; the map's own making is in the time.\n\n"
         + report.table(("with the lane, relative", "25 %", "median", "75 %", "90 %"), rows)
-        + f"\n\n{len(ratios) - faults} of {len(ratios)} curves are one simple loop through their "
+        + f"\n\n{kept} of {len(led)} curves are one simple loop through their "
         "points in order, by the guarantee's judge."
     )
-    report.write_section("lanes", "Lanes to follow", body, scale)
 
 
-def _design(mesh: Mesh, points: IntArray, weights: FloatArray | None) -> nicmm.Design:
-    return nicmm.design_curve(mesh, points, order="shortest", alignment=weights)
+def _led(name: str, mesh: Mesh, points: IntArray) -> Results | None:
+    """A curve with a lane relative to the free one; None where there is no room for a lane."""
+    free, _ = _timed(mesh, points, None)
+    lane = lane_beside(mesh, free.curves[0])
+    if lane is None:
+        print(f"  {name}: no room for a lane", flush=True)
+        return None
+    free, before = _timed(mesh, points, None)
+    led, after = _timed(mesh, points, lane.weights)
+    curve, other = free.curves[0], led.curves[0]
+    found = {
+        "distance": round(lane.distance(other) / lane.distance(curve), 6),
+        "bending": round(bending(mesh, other, SAMPLES) / bending(mesh, curve, SAMPLES), 6),
+        "length": round(other.length / curve.length, 6),
+        "time": round(after / before, 4),
+        "faults": list(judge(mesh, led, points, True, "shortest").faults),
+    }
+    print(
+        f"  {name}: lane {found['distance']:.2f}, bending {found['bending']:.2f}, "
+        f"time {found['time']:.2f} ({before:.2f} s) {found['faults'] or ''}",
+        flush=True,
+    )
+    return found
 
 
-def _timed(work: Callable[[], nicmm.Design]) -> tuple[nicmm.Design, float]:
+def _timed(mesh: Mesh, points: IntArray, weights: FloatArray | None) -> tuple[nicmm.Design, float]:
     """A design and the seconds of processor time that it took."""
     started = time.process_time()
-    design = work()
+    design = nicmm.design_curve(mesh, points, order="shortest", alignment=weights)
     return design, time.process_time() - started
 
 
@@ -159,5 +176,6 @@ def _painted(mesh: Mesh, line: FloatArray, normals: FloatArray) -> FloatArray:
     return ((distance < width) & facing).astype(np.float64)
 
 
-def _quartiles(ratios: list[float]) -> list[str]:
+def _quartiles(led: Sequence[Results], name: str) -> list[str]:
+    ratios = [each[name] for each in led]
     return [f"{value:.2f}" for value in np.quantile(ratios, [0.25, 0.5, 0.75, 0.9])]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -17,48 +18,69 @@ from nicmm_core.network.trainable_network import build_network
 from nicmm_core.network.training_maps import random_maps
 from nicmm_core.network.weights_file import shipped_weights
 
-from . import collections, report
+from . import collections, plots, report
+from .evidence import Results
 from .samples import random_sets
 from .scale import Scale
-from .solving import Sample, least_losses_figure, run_networks
+from .solving import PARTS_WITHOUT, Sample, run_networks
+
+TITLE = "The ninth channel (section 3.3)"
+WITHOUT = PARTS_WITHOUT
 
 SEED = 17
 ITERATIONS = 50
 CHANNEL = 8
 
-SEEN, NEUTRAL, WITHOUT = "with φ_fea", "the same, φ_fea neutral", "trained without maps"
+SEEN, NEUTRAL, WITHOUT_MAPS = "with φ_fea", "the same, φ_fea neutral", "trained without maps"
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Predict sets with maps by networks that see φ_fea and by those that do not."""
     with_maps, without = shipped_weights(CHANNEL + 1), shipped_weights(CHANNEL)
     networks = {
         SEEN: build_network(with_maps),
         NEUTRAL: build_network(blind(with_maps)),
-        WITHOUT: build_network(_padded(without)),
+        WITHOUT_MAPS: build_network(_padded(without)),
     }
-    runs = run_networks(networks, _samples(scale), ITERATIONS)
-    figure = least_losses_figure(runs, "The ninth channel, φ_fea", "ninth_channel", scale)
-    best = runs[SEEN].least_losses
+    return {
+        "seed": SEED,
+        "collection": collections.label(scale),
+        "iterations": ITERATIONS,
+        "runs": run_networks(networks, _samples(scale), ITERATIONS),
+    }
+
+
+def section(results: Results) -> str:
+    """The losses of each network."""
+    runs, iterations = results["runs"], results["iterations"]
+    best = runs[SEEN]["last_losses"]
     rows = []
-    for label, one in runs.items():
-        losses = one.least_losses
-        worse = "–" if label == SEEN else f"{np.mean(losses[:, -1] > best[:, -1]):.0%}"
-        means = [f"{losses[:, place].mean():.4f}" for place in (0, 10, ITERATIONS)]
+    for label, run in runs.items():
+        worse = "–" if label == SEEN else f"{np.greater(run['last_losses'], best).mean():.0%}"
+        means = [f"{run['mean_losses'][place]:.4f}" for place in (0, 10, iterations)]
         rows.append((label, *means, worse))
     header = (
-        "network", "loss at the start", "after 10 iterations", f"after {ITERATIONS}",
+        "network", "loss at the start", "after 10 iterations", f"after {iterations}",
         "higher than with φ_fea",
     )  # fmt: skip
-    body = (
-        f"{len(best)} sets on {collections.label(scale)} (seed {SEED}), 3–5 random vertices, "
-        "shortest order, each with one to three random obstacles or lanes. The energy of Eq. 2 "
-        "with Eq. 7, means, least so far. The network with nine channels was pretrained on sets "
-        "with maps; in the second row it is shown the neutral value everywhere, in the third "
+    return (
+        f"{len(best)} sets on {results['collection']} (seed {results['seed']}), 3–5 random "
+        "vertices, shortest order, each with one to three random obstacles or lanes. The energy of "
+        "Eq. 2 with Eq. 7, means, least so far. The network with nine channels was pretrained on "
+        "sets with maps; in the second row it is shown the neutral value everywhere, in the third "
         "stands the network that ships for curves without maps.\n\n"
-        f"{report.table(header, rows)}\n\n{figure}"
+        f"{report.table(header, rows)}\n\n"
+        f"{report.figure('ninth_channel.png', plots.LEAST_LOSSES)}"
     )
-    report.write_section("ninth_channel", "The ninth channel (section 3.3)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw the losses by iteration."""
+    plots.least_losses(
+        {label: run["mean_losses"] for label, run in results["runs"].items()},
+        "The ninth channel, φ_fea",
+        folder / "ninth_channel.png",
+    )
 
 
 def _samples(scale: Scale) -> Iterator[Sample]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,9 +15,14 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.checker import judge
 
 from . import collections, report
+from .evidence import Results
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Obstacles"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 3
 RADIUS = 0.04
@@ -25,42 +31,65 @@ RADIUS = 0.04
 SAMPLES = 128
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Obstacles of weight 1 on closed meshes and on people and animals."""
     if scale is Scale.SMOKE:
         meshes = collections.creatures(2)
     else:
         some = collections.bodies(scale.choose(12, 2))
         meshes = itertools.chain(collections.clean(scale.choose(36, 4)), some)
-    outcomes: Counter[str] = Counter()
-    bends, times = [], []
-    for name, mesh, points in random_sets(meshes, 1, SEED):
-        free = nicmm.design_curve(mesh, points, order="shortest")
-        weights = _disc(mesh, free.curves[0])
-        try:
-            design = nicmm.design_curve(mesh, points, order="shortest", obstacles=weights)
-        except nicmm.UnreachableError as error:
-            outcomes["said to leave no way"] += 1
-            print(f"  {name}: {error}", flush=True)
-            continue
-        curve = design.curves[0]
-        faults = judge(mesh, design, points, True, "shortest").faults
-        entered = _length_inside(mesh, curve, weights) > 0.0
-        outcomes["entered or at fault" if entered or faults else "gone round"] += 1
-        bends.append(bending(mesh, curve, SAMPLES) / bending(mesh, free.curves[0], SAMPLES))
-        times.append(design.seconds / free.seconds)
-        print(f"  {name}: {'entered' if entered else 'kept out'} {faults or ''}", flush=True)
-    rows = [(what, count) for what, count in sorted(outcomes.items())]
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, shortest order; discs of weight 1, "
-        f"{2 * RADIUS:.0%} of the diagonal across, round the point of the free curve that is "
-        "farthest from its control points. A curve has entered if it has any length in faces "
-        "whose three corners are painted; faults are those of the guarantee's judge.\n\n"
-        + report.table(("outcome", "sets"), rows)
-        + f"\n\nRelative to the free curve, quartiles: bending {_quartiles(bends)}, time "
-        f"{_quartiles(times)}."
+    return {
+        "seed": SEED,
+        "radius": RADIUS,
+        "sets": [
+            {"mesh": name, "round": _gone_round(name, mesh, points)}
+            for name, mesh, points in random_sets(meshes, 1, SEED)
+        ],
+    }
+
+
+def section(results: Results) -> str:
+    """How many curves go round their disc, and at what price."""
+    outcomes = Counter(_outcome(each["round"]) for each in results["sets"])
+    found = [each["round"] for each in results["sets"] if each["round"] is not None]
+    bends, times = (_quartiles([each[name] for each in found]) for name in ("bending", "time"))
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order; discs of "
+        f"weight 1, {2 * results['radius']:.0%} of the diagonal across, round the point of the "
+        "free curve that is farthest from its control points. A curve has entered if it has any "
+        "length in faces whose three corners are painted; faults are those of the guarantee's "
+        "judge.\n\n"
+        + report.table(("outcome", "sets"), sorted(outcomes.items()))
+        + f"\n\nRelative to the free curve, quartiles: bending {bends}, time {times}."
     )
-    report.write_section("obstacles", "Obstacles", body, scale)
+
+
+def _gone_round(name: str, mesh: Mesh, points: IntArray) -> Results | None:
+    """The curve with a disc on the free one's way; None where it is said to leave no way."""
+    free = nicmm.design_curve(mesh, points, order="shortest")
+    weights = _disc(mesh, free.curves[0])
+    try:
+        design = nicmm.design_curve(mesh, points, order="shortest", obstacles=weights)
+    except nicmm.UnreachableError as error:
+        print(f"  {name}: {error}", flush=True)
+        return None
+    curve = design.curves[0]
+    faults = list(judge(mesh, design, points, True, "shortest").faults)
+    entered = _length_inside(mesh, curve, weights) > 0.0
+    print(f"  {name}: {'entered' if entered else 'kept out'} {faults or ''}", flush=True)
+    bends = [bending(mesh, each, SAMPLES) for each in (curve, free.curves[0])]
+    return {
+        "entered": entered,
+        "faults": faults,
+        "bending": round(bends[0] / bends[1], 6),
+        "time": round(design.seconds / free.seconds, 4),
+    }
+
+
+def _outcome(found: Results | None) -> str:
+    if found is None:
+        return "said to leave no way"
+    return "entered or at fault" if found["entered"] or found["faults"] else "gone round"
 
 
 def _disc(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
@@ -76,5 +105,5 @@ def _length_inside(mesh: Mesh, curve: SurfaceCurve, weights: FloatArray) -> floa
     return float(lengths[(weights[faces] >= 1.0).all(axis=1)].sum())
 
 
-def _quartiles(ratios: list[float]) -> str:
+def _quartiles(ratios: Sequence[float]) -> str:
     return " · ".join(f"{value:.2f}" for value in np.quantile(ratios, [0.25, 0.5, 0.75]))

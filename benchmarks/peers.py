@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,12 +15,17 @@ from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.level_set.problem import build_problem
 
 from . import collections, renders, report
+from .evidence import Results
 from .measures import bending
 from .methods import METHODS
-from .peer_systems import SYSTEMS, SystemsProcess, Task, missing_packages
+from .peer_systems import SYSTEMS, Answer, SystemsProcess, Task, missing_packages
 from .polylines import NearestPoints, misses
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Other systems (Fig. 9)"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 7
 
@@ -37,37 +42,19 @@ PEER_COLOURS = dict(
     zip(SYSTEMS, (renders.YELLOW, renders.BLACK, renders.OBSTACLE, renders.WHITE), strict=True)
 )
 
+CURVES = "peers.png"
+"""The picture of the first meshes."""
 
-@dataclass
-class Marks:
-    """What one system did on all sets.
-
-    Attributes
-    ----------
-    outcomes : list of str
-        "one curve" or what there is instead.
-    miss : list of float
-        Greatest distance of a control point to all that was drawn, relative to the diagonal.
-    off : list of float
-        Greatest distance of single curves to the surface, relative to the diagonal.
-    bend : dict of int to float
-        L ∮ κ_g² ds of single curves, by the number of the set.
-    seconds : list of float
-    """
-
-    outcomes: list[str] = field(default_factory=list)
-    miss: list[float] = field(default_factory=list)
-    off: list[float] = field(default_factory=list)
-    bend: dict[int, float] = field(default_factory=dict)
-    seconds: list[float] = field(default_factory=list)
+ONE_CURVE = "one curve"
+"""What a system is asked for; other outcomes are in words too."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Ask every system for a curve through the same points in the same order."""
-    systems = _available()
-    marks = {name: Marks() for name in (*METHODS, *systems)}
+    missing = missing_packages()
+    systems = [name for name, (package, _) in SYSTEMS.items() if package not in missing]
+    sets: list[Results] = []
     pictures: list[renders.Picture] = []
-    names = []
     process = SystemsProcess()
     surfaces = collections.surfaces(scale, scale.choose(40, 3))
     for name, mesh, points in random_sets(surfaces, 1, SEED):
@@ -76,42 +63,43 @@ def run(scale: Scale) -> None:
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
-        names.append(name)
         curves: dict[str, SurfaceCurve] = {}
-        for method in METHODS:
-            _ask_ours(mesh, points, method, marks[method], curves)
+        answers = {method: _ours(mesh, points, method, curves) for method in METHODS}
         for system in systems:
             reply = process.ask(system, task, PATIENCE)
             if isinstance(reply, str):
                 print(f"  {name}: {system}: {reply}", flush=True)
-                marks[system].outcomes.append("failed")
-                continue
-            polylines, seconds = reply
-            curve = _marked(mesh, polylines, task, marks[system])
-            marks[system].seconds.append(seconds)
-            if curve is not None:
-                curves[system] = curve
-        if len(pictures) < min(4, len(names)):
+                answers[system] = {"outcome": "failed"}
+            else:
+                answers[system] = _theirs(mesh, task, system, reply, curves)
+        sets.append({"mesh": name, "answers": answers})
+        if len(pictures) < min(4, len(sets)):
             pictures.append(_picture(name, mesh, curves))
     process.end()
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh on {len(names)} meshes "
-        f"({collections.label(scale)}: {report.listed(names)}), visited by all in the same order. "
+    return {
+        "seed": SEED,
+        "collection": collections.label(scale),
+        "methods": list(METHODS),
+        "systems": systems,
+        "missing": missing,
+        "sets": sets,
+        "picture": _rendered(pictures, scale),
+    }
+
+
+def section(results: Results) -> str:
+    """What every system gave."""
+    names = [each["mesh"] for each in results["sets"]]
+    missing = ""
+    if results["missing"]:
+        missing = f" Not installed, so left out: {report.listed(results['missing'])}."
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh on {len(names)} meshes "
+        f"({results['collection']}: {report.listed(names)}), visited by all in the same order. "
         "Systems that start from a path of edges get ours, on our split mesh. Seconds include "
-        f"every system's preparation of the mesh.{_missing()}\n\n"
-        f"{_table(marks)}\n\n{_findings(marks, systems)}\n\n{_stills(pictures, scale)}"
+        f"every system's preparation of the mesh.{missing}\n\n"
+        f"{_table(results)}\n\n{_findings(results)}\n\n{_shown_picture(results['picture'])}"
     )
-    report.write_section("peers", "Other systems (Fig. 9)", body, scale)
-
-
-def _available() -> list[str]:
-    missing = missing_packages()
-    return [name for name, (package, _) in SYSTEMS.items() if package not in missing]
-
-
-def _missing() -> str:
-    missing = missing_packages()
-    return f" Not installed, so left out: {report.listed(missing)}." if missing else ""
 
 
 def task_on(mesh: Mesh, points: IntArray) -> Task:
@@ -127,39 +115,50 @@ def task_on(mesh: Mesh, points: IntArray) -> Task:
     )
 
 
-def _ask_ours(
-    mesh: Mesh, points: IntArray, method: str, marks: Marks, curves: dict[str, SurfaceCurve]
-) -> None:
+def _ours(mesh: Mesh, points: IntArray, method: str, curves: dict[str, SurfaceCurve]) -> Results:
+    """What one of our methods drew; its curve is added where it is a single one.
+
+    "miss" is the greatest distance of a control point to all that was drawn, "off" that of a single
+    curve to the surface, both relative to the diagonal; "bending" is L ∮ κ_g² ds of that.
+    """
     design = nicmm.design_curve(mesh, points, order="shortest", method=method)
-    marks.outcomes.append("one curve" if len(design.curves) == 1 else "in pieces")
+    one = len(design.curves) == 1
     drawn = [curve.points for curve in design.curves]
-    marks.miss.append(_greatest_miss(drawn, mesh.vertices[points]) / mesh.diagonal)
-    marks.seconds.append(design.seconds)
-    if len(design.curves) == 1:
+    answer = {
+        "outcome": ONE_CURVE if one else "in pieces",
+        "seconds": round(design.seconds, 6),
+        "miss": _relative(_greatest_miss(drawn, mesh.vertices[points]), mesh),
+    }
+    if one:
         curves[method] = design.curves[0]
         off = NearestPoints(mesh).greatest_distance(design.curves[0].points)
-        marks.off.append(off / mesh.diagonal)
-        marks.bend[len(marks.outcomes)] = bending(mesh, design.curves[0])
+        answer["off"] = _relative(off, mesh)
+        answer["bending"] = round(bending(mesh, design.curves[0]), 4)
+    return answer
 
 
-def _marked(
-    mesh: Mesh, polylines: Sequence[FloatArray], task: Task, marks: Marks
-) -> SurfaceCurve | None:
-    """Note what a system drew; its curve where it is a single one."""
-    polylines = [line for line in polylines if len(line)]
+def _theirs(
+    mesh: Mesh, task: Task, system: str, reply: Answer, curves: dict[str, SurfaceCurve]
+) -> Results:
+    """The same of another system."""
+    polylines = [line for line in reply[0] if len(line)]
+    answer: Results = {"outcome": "nothing", "seconds": round(reply[1], 6)}
     if not polylines:
-        marks.outcomes.append("nothing")
-        return None
-    marks.miss.append(_greatest_miss(polylines, task.vertices[task.controls]) / mesh.diagonal)
+        return answer
+    answer["miss"] = _relative(_greatest_miss(polylines, task.vertices[task.controls]), mesh)
     if len(polylines) > 1 or len(polylines[0]) < 3:
-        marks.outcomes.append("in pieces" if len(polylines) > 1 else "shrunk to a point")
-        return None
-    marks.outcomes.append("one curve")
+        answer["outcome"] = "in pieces" if len(polylines) > 1 else "shrunk to a point"
+        return answer
     surface = NearestPoints(mesh)
-    marks.off.append(surface.greatest_distance(polylines[0]) / mesh.diagonal)
-    curve = surface.curve(polylines[0], np.zeros(0, dtype=np.int64))
-    marks.bend[len(marks.outcomes)] = bending(mesh, curve)
-    return curve
+    answer["outcome"] = ONE_CURVE
+    answer["off"] = _relative(surface.greatest_distance(polylines[0]), mesh)
+    curves[system] = surface.curve(polylines[0], np.zeros(0, dtype=np.int64))
+    answer["bending"] = round(bending(mesh, curves[system]), 4)
+    return answer
+
+
+def _relative(length: float, mesh: Mesh) -> float:
+    return float(f"{length / mesh.diagonal:.6g}")
 
 
 def _greatest_miss(polylines: Sequence[FloatArray], places: FloatArray) -> float:
@@ -167,22 +166,32 @@ def _greatest_miss(polylines: Sequence[FloatArray], places: FloatArray) -> float
     return float(each.min(axis=0).max())
 
 
-def _table(marks: Mapping[str, Marks]) -> str:
+def _values(results: Results, system: str, name: str) -> list[float]:
+    """What is known of one system, over the sets."""
+    answers = [each["answers"][system] for each in results["sets"]]
+    return [answer[name] for answer in answers if name in answer]
+
+
+def _table(results: Results) -> str:
     rows = []
-    for name, mark in marks.items():
-        sets = len(mark.outcomes)
-        others = sorted(set(mark.outcomes) - {"one curve"})
+    sets = len(results["sets"])
+    for system in (*results["methods"], *results["systems"]):
+        outcomes = Counter(each["answers"][system]["outcome"] for each in results["sets"])
+        others = sorted(set(outcomes) - {ONE_CURVE})
+        miss, off, bends, seconds = (
+            _values(results, system, name) for name in ("miss", "off", "bending", "seconds")
+        )
         rows.append(
             (
-                name,
-                f"{mark.outcomes.count('one curve')} of {sets}",
-                report.listed(f"{mark.outcomes.count(o)} {o}" for o in others) or "–",
-                f"{sum(value <= PASSES for value in mark.miss)} of {sets}",
-                _percent(mark.miss),
-                f"{sum(value <= ON_SURFACE for value in mark.off)} of {sets}",
-                _percent(mark.off),
-                f"{np.median(list(mark.bend.values())):.0f}" if mark.bend else "–",
-                f"{np.median(mark.seconds):.3f}" if mark.seconds else "–",
+                system,
+                f"{outcomes[ONE_CURVE]} of {sets}",
+                report.listed(f"{outcomes[other]} {other}" for other in others) or "–",
+                f"{sum(value <= PASSES for value in miss)} of {sets}",
+                _percent(miss),
+                f"{sum(value <= ON_SURFACE for value in off)} of {sets}",
+                _percent(off),
+                f"{np.median(bends):.0f}" if bends else "–",
+                f"{np.median(seconds):.3f}" if seconds else "–",
             )
         )
     header = (
@@ -200,27 +209,37 @@ def _percent(values: Sequence[float]) -> str:
     return f"{100 * np.median(values):.3f}" if values else "–"
 
 
-def _findings(marks: Mapping[str, Marks], systems: Sequence[str]) -> str:
+def _findings(results: Results) -> str:
     """Who bends less and who is faster, as measured."""
-    ours = marks[METHODS[0]]
+    ours = results["methods"][0]
     text = (
         "B/surf, which the paper compares with, is an interactive program whose segments are "
         "joined by hand, and is not measured here. "
     )
-    if not ours.bend:
-        return text + f"`{METHODS[0]}` gave no single curve to compare with."
-    for system in systems:
-        mark = marks[system]
-        complete = sum(value <= PASSES for value in mark.miss)
-        faster = np.median(ours.seconds) / np.median(mark.seconds) if mark.seconds else np.nan
-        text += f"{system} passes all points in {complete} of {len(mark.outcomes)} sets"
-        ratios = [mark.bend[one] / ours.bend[one] for one in mark.bend.keys() & ours.bend.keys()]
+    if not _values(results, ours, "bending"):
+        return text + f"`{ours}` gave no single curve to compare with."
+    for system in results["systems"]:
+        complete = sum(value <= PASSES for value in _values(results, system, "miss"))
+        text += f"{system} passes all points in {complete} of {len(results['sets'])} sets"
+        ratios = _bending_ratios(results, system, ours)
         if ratios:
-            text += f", bends {np.median(ratios):.2f} times as much as `{METHODS[0]}`"
+            text += f", bends {np.median(ratios):.2f} times as much as `{ours}`"
             if np.median(ratios) < 1.0:
                 text += " (less than ours)"
+        seconds = _values(results, system, "seconds")
+        faster = np.median(_values(results, ours, "seconds")) / np.median(seconds) if seconds else 0
         text += f" and takes 1/{faster:.0f} of its time. " if faster > 1.0 else ". "
     return text.strip()
+
+
+def _bending_ratios(results: Results, system: str, ours: str) -> list[float]:
+    """How much more a system's curve bends, on the sets where both have one."""
+    pairs = [(each["answers"][system], each["answers"][ours]) for each in results["sets"]]
+    return [
+        theirs["bending"] / own["bending"]
+        for theirs, own in pairs
+        if "bending" in theirs and "bending" in own
+    ]
 
 
 def _picture(name: str, mesh: Mesh, curves: Mapping[str, SurfaceCurve]) -> renders.Picture:
@@ -230,14 +249,20 @@ def _picture(name: str, mesh: Mesh, curves: Mapping[str, SurfaceCurve]) -> rende
     return renders.Picture(name, mesh, shown)
 
 
-def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
+def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
+    """The picture's name; None where there is no curve."""
     shown = [picture for picture in pictures if picture.curves]
     if not shown:
+        return None
+    renders.render_sheet(shown, report.figures_folder(scale) / CURVES, scale)
+    return CURVES
+
+
+def _shown_picture(name: str | None) -> str:
+    if name is None:
         return "No system gave a single curve, so there is no picture."
-    path = report.output_folder(scale) / "peers.png"
-    renders.render_sheet(shown, path, scale)
     return report.figure(
-        path,
+        name,
         "nicmm (blue), nicmm-paper (orange), variational (green), MeshLib's projected spline "
         "(yellow), edge-flip loop (black) and signed heat (red) through the same points (Fig. 9)",
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -15,8 +15,6 @@ from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: E402
 
-from nicmm_core.geometry.array_types import FloatArray  # noqa: E402
-
 METHOD_COLOURS = {
     "nicmm-paper": "tab:orange",
     "nicmm": "tab:blue",
@@ -25,6 +23,9 @@ METHOD_COLOURS = {
     "elastic curve": "black",
 }
 """Of methods, in every plot the same."""
+
+LEAST_LOSSES = "Least loss so far against the iteration, mean of the sets"
+"""Caption of `least_losses`."""
 
 
 def labelled(
@@ -83,18 +84,11 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def least_losses(runs: Mapping[str, FloatArray], title: str, path: Path) -> Path:
-    """Mean over the sets of the least loss so far, against the iteration, on a log axis.
-
-    Parameters
-    ----------
-    runs : mapping of str to (sets, iterations + 1) float array
-    title : str
-    path : Path
-    """
+def least_losses(runs: Mapping[str, Sequence[float]], title: str, path: Path) -> Path:
+    """The mean of the least loss so far, against the iteration, on a log axis, for each network."""
     figure, axes = labelled(title, "iteration", "least loss so far, mean of the sets")
     for label, losses in runs.items():
-        axes.plot(losses.mean(axis=0), label=label, linewidth=1.6)
+        axes.plot(losses, label=label, linewidth=1.6)
     axes.set_yscale("log")
     # The losses often stay within one decade, where a logarithmic locator finds hardly any tick.
     axes.yaxis.set_major_locator(MaxNLocator(7))

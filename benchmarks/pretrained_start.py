@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
-from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.array_types import BoolArray, FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set.features import BASE_CHANNELS
 from nicmm_core.level_set.problem import Problem
@@ -33,11 +33,16 @@ from nicmm_core.network.weights_file import shipped_weights
 from nicmm_core.status import Status
 
 from . import collections, plots, report
+from .evidence import Results
 from .guarantee import NEARLY_STRAIGHT
 from .measures import bending
 from .samples import random_sets
 from .scale import Scale
-from .solving import random_field, untrained
+from .solving import random_field, significant, untrained
+
+TITLE = "Starts of the relaxation"
+TIMED = True
+WITHOUT = ("outputs", "splines")
 
 SEED = 21
 DISTURBANCE_SEED = 22
@@ -48,7 +53,7 @@ FIRST_UNSEEN_BODY = 1000
 DISTURBANCE = 0.1
 """Mean slope of what is added to φ₀, whose own is 1: it moves the curve by about an edge length."""
 
-WITHOUT, UNTRAINED = "φ₀, without a network", "network before training"
+NO_NETWORK, UNTRAINED = "φ₀, without a network", "network before training"
 SHIPPED, DISTURBED = "shipped weights", "φ₀ with random waves"
 
 KINDS = {
@@ -71,57 +76,62 @@ Field = Callable[[Problem], FloatArray]
 """What stands in the network's place."""
 
 
-@dataclass(frozen=True)
-class Rest:
-    """What came of one start; bending is L ∫ κ_g² ds.
-
-    Attributes
-    ----------
-    repaired : bool
-        Whether the topology of φ₀ had to be restored somewhere.
-    start, end : float
-        Bending before and after relaxation.
-    iterations : int
-    status : Status
-    seconds : float
-        CPU time of the design.
-    """
-
-    repaired: bool
-    start: float
-    end: float
-    iterations: int
-    status: nicmm.Status
-    seconds: float
-
-    @property
-    def failed(self) -> bool:
-        """Whether there is no relaxed curve."""
-        return self.status in (nicmm.Status.NOT_ONE_CURVE, nicmm.Status.UNRELAXED)
+Rests = dict[str, list[Results]]
+"""By start, what came of it, one entry a set."""
 
 
-Results = dict[str, list[Rest]]
-"""By start, one entry a set."""
-
-
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Relax from every start on meshes that the weights were not trained on."""
     meshes = [*_meshes(scale)]
-    results = _relaxed(random_sets(meshes, 1, SEED))
-    pooled = {start: [one for each in results.values() for one in each[start]] for start in STARTS}
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices a mesh, asked for as three curves, on "
-        f"{len(meshes)} meshes that the shipped weights have not seen: {_names(scale)}. Designs by "
-        "`nicmm`, with another φ in the network's place, by a Designer that knows the mesh. "
-        f"“{DISTURBED}” adds a random smooth function of mean slope {DISTURBANCE:g} to φ₀ (seed "
-        f"{DISTURBANCE_SEED}). Time is the CPU time of the whole design.\n\n"
-        f"{_table(results)}\n\nBending is L ∫ κ_g² ds; what is "
-        f"below {NEARLY_STRAIGHT} counts as that. The best known is the least of these "
-        f"{len(STARTS)} ends. “To φ₀” is the geometric mean of the ratio of the ends, with its "
-        f"standard error; fairer and less fair by more than {100 * CLEARLY:.0f} %.\n\n"
-        f"{_findings(pooled)}\n\n{_figure(pooled, scale)}"
+    return {
+        "seed": SEED,
+        "disturbance_seed": DISTURBANCE_SEED,
+        "disturbance": DISTURBANCE,
+        "meshes": len(meshes),
+        "collection": _names(scale),
+        "sets": _relaxed(random_sets(meshes, 1, SEED)),
+    }
+
+
+def section(results: Results) -> str:
+    """What each start costs and where it ends."""
+    by_kind = {
+        kind: _rests([each for each in results["sets"] if each["curve"] == kind])
+        for kind in dict.fromkeys(each["curve"] for each in results["sets"])
+    }
+    pooled = _rests(results["sets"])
+    figure = report.figure(
+        "pretrained_start.png", "Share of the sets at or below each ratio to the best known"
     )
-    report.write_section("pretrained_start", "Starts of the relaxation", body, scale)
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, asked for as three "
+        f"curves, on {results['meshes']} meshes that the shipped weights have not seen: "
+        f"{results['collection']}. Designs by "
+        "`nicmm`, with another φ in the network's place, by a Designer that knows the mesh. "
+        f"“{DISTURBED}” adds a random smooth function of mean slope {results['disturbance']:g} to "
+        f"φ₀ (seed {results['disturbance_seed']}). Time is the CPU time of the whole design.\n\n"
+        f"{_table(by_kind)}\n\nBending is L ∫ κ_g² ds; what is "
+        f"below {NEARLY_STRAIGHT} counts as that. The best known is the least of these "
+        f"{len(pooled)} ends. “To φ₀” is the geometric mean of the ratio of the ends, with its "
+        f"standard error; fairer and less fair by more than {100 * CLEARLY:.0f} %.\n\n"
+        f"{_findings(pooled)}\n\n{figure}"
+    )
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw how far from the best known the curves of each start end."""
+    figure, axes = plots.labelled(
+        "Curves at rest from several starts",
+        "L ∫ κ_g² ds relative to the best known",
+        "share of the sets",
+    )
+    for label, ratios in _to_best(_rests(results["sets"])).items():
+        shares = (np.arange(len(ratios)) + 1.0) / len(ratios)
+        axes.step(np.sort(ratios), shares, where="post", label=label)
+    axes.set_xscale("log")
+    plots.plain_ticks(axes.xaxis)
+    axes.legend(fontsize=8, loc="lower right")
+    plots.save(figure, folder / "pretrained_start.png")
 
 
 def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
@@ -145,7 +155,7 @@ def _network(weights: NetworkWeights) -> Field:
 
 
 STARTS: dict[str, Callable[[], Field]] = {
-    WITHOUT: lambda: lambda problem: problem.initial_distance,
+    NO_NETWORK: lambda: lambda problem: problem.initial_distance,
     UNTRAINED: lambda: _network(network_weights(untrained())),
     SHIPPED: lambda: _network(shipped_weights(BASE_CHANNELS)),
     DISTURBED: lambda: _disturbed,
@@ -153,10 +163,10 @@ STARTS: dict[str, Callable[[], Field]] = {
 """What makes a start, for a run."""
 
 
-def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> dict[str, Results]:
-    """Results by the kind of curve; a set that cannot be asked for is named and left out."""
+def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> list[Results]:
+    """What came of every set and kind of curve; what cannot be asked for is named and left out."""
     fields = {label: make() for label, make in STARTS.items()}
-    results: dict[str, Results] = {kind: {label: [] for label in fields} for kind in KINDS}
+    found: list[Results] = []
     for name, mesh, points in sets:
         designer = nicmm.Designer(mesh)
         for kind, (order, closed) in KINDS.items():
@@ -166,34 +176,40 @@ def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> dict[str, Results]:
             except nicmm.UnreachableError as error:
                 print(f"  {name}, {kind}: {error}", flush=True)
                 continue
-            for label, field in fields.items():
-                rest = _rest(designer, points, closed, order, field)
-                results[kind][label].append(rest)
-            ends = ", ".join(f"{results[kind][label][-1].end:.1f}" for label in fields)
+            rests = {
+                label: _rest(designer, points, closed, order, field)
+                for label, field in fields.items()
+            }
+            found.append({"mesh": name, "curve": kind, "rests": rests})
+            ends = ", ".join(f"{rest['end']:.1f}" for rest in rests.values())
             print(f"  {name}, {kind}: {ends}", flush=True)
-    found = {kind: of_kind for kind, of_kind in results.items() if of_kind[WITHOUT]}
     if not found:
         raise SystemExit("No set had a simple path through its points; there is nothing to measure")
-    return found
+    return sorted(found, key=lambda each: [*KINDS].index(each["curve"]))
 
 
 def _rest(
     designer: nicmm.Designer, points: IntArray, closed: bool, order: str, field: Field
-) -> Rest:
+) -> Results:
+    """What came of one start.
+
+    It is repaired if the topology of φ₀ had to be restored somewhere. Start and end are the bending
+    L ∫ κ_g² ds before and after relaxation, and seconds the CPU time of the design.
+    """
     with _instead_of_the_network(field) as level_sets:
         began = time.process_time()
         design = designer.design(points, closed=closed, order=order)
         seconds = time.process_time() - began
     # The last of them is the one that gave a curve.
     mesh, zeros = level_sets[-1]
-    return Rest(
-        repaired=zeros.breaking_vertices > 0,
-        start=bending(mesh, zeros.curves[0]),
-        end=bending(designer.mesh, design.curves[0]),
-        iterations=design.iterations,
-        status=design.status,
-        seconds=seconds,
-    )
+    return {
+        "repaired": bool(zeros.breaking_vertices > 0),
+        "start": significant(bending(mesh, zeros.curves[0])),
+        "end": significant(bending(designer.mesh, design.curves[0])),
+        "iterations": design.iterations,
+        "status": design.status.name,
+        "seconds": round(seconds, 4),
+    }
 
 
 @contextmanager
@@ -216,29 +232,38 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
         yield level_sets
 
 
-def _ends(results: Results) -> dict[str, FloatArray]:
+def _rests(sets: Sequence[Results]) -> Rests:
+    return {label: [each["rests"][label] for each in sets] for label in sets[0]["rests"]}
+
+
+def _failed(rest: Results) -> bool:
+    """Whether there is no relaxed curve."""
+    return rest["status"] in (nicmm.Status.NOT_ONE_CURVE.name, nicmm.Status.UNRELAXED.name)
+
+
+def _ends(rests: Rests) -> dict[str, FloatArray]:
     """Bending of the ends, by start; ratios between nearly straight curves say nothing."""
     return {
-        label: np.maximum([one.end for one in rests], NEARLY_STRAIGHT)
-        for label, rests in results.items()
+        label: np.maximum([one["end"] for one in of_start], NEARLY_STRAIGHT)
+        for label, of_start in rests.items()
     }
 
 
-def _to_best(results: Results) -> dict[str, FloatArray]:
+def _to_best(rests: Rests) -> dict[str, FloatArray]:
     """Bending relative to the best known of each set, by start."""
-    ends = _ends(results)
+    ends = _ends(rests)
     best = np.min(list(ends.values()), axis=0)
     return {label: values / best for label, values in ends.items()}
 
 
-def _gain(results: Results, label: str) -> tuple[float, float]:
+def _gain(rests: Rests, label: str) -> tuple[float, float]:
     """Mean of the logarithm of the ratio to the ends from φ₀, and its standard error."""
-    ends = _ends(results)
-    logarithm = np.log(ends[label] / ends[WITHOUT])
+    ends = _ends(rests)
+    logarithm = np.log(ends[label] / ends[NO_NETWORK])
     return float(logarithm.mean()), float(logarithm.std() / np.sqrt(len(logarithm)))
 
 
-def _table(results: Mapping[str, Results]) -> str:
+def _table(by_kind: Mapping[str, Rests]) -> str:
     header = (
         "curves", "start", "sets", "topology repaired", "failed", "bending of the start",
         "iterations, median · mean", "at the cap", "design (ms), mean", "bending of the end",
@@ -246,49 +271,51 @@ def _table(results: Mapping[str, Results]) -> str:
         f"above {FAR:g}", "to φ₀", "fairer · less fair",
     )  # fmt: skip
     rows = []
-    for kind, of_kind in results.items():
+    for kind, of_kind in by_kind.items():
         to_best, ends = _to_best(of_kind), _ends(of_kind)
         for label, rests in of_kind.items():
             mean, error = _gain(of_kind, label)
-            against = ends[label] / ends[WITHOUT]
+            against = ends[label] / ends[NO_NETWORK]
             wins = (against < 1.0 - CLEARLY).sum(), (against > 1.0 + CLEARLY).sum()
-            iterations = [one.iterations for one in rests]
+            iterations = [one["iterations"] for one in rests]
             quantiles = np.quantile(to_best[label], SHARES)
             rows.append(
                 (
                     kind,
                     label,
                     len(rests),
-                    _percent([one.repaired for one in rests]),
-                    sum(one.failed for one in rests),
-                    f"{np.median([one.start for one in rests]):.0f}",
+                    _percent([one["repaired"] for one in rests]),
+                    sum(_failed(one) for one in rests),
+                    f"{np.median([one['start'] for one in rests]):.0f}",
                     f"{np.median(iterations):.0f} · {np.mean(iterations):.1f}",
-                    sum(one.status is nicmm.Status.ITERATION_LIMIT for one in rests),
-                    f"{1000 * np.mean([one.seconds for one in rests]):.0f}",
+                    sum(one["status"] == nicmm.Status.ITERATION_LIMIT.name for one in rests),
+                    f"{1000 * np.mean([one['seconds'] for one in rests]):.0f}",
                     f"{np.median(ends[label]):.1f}",
                     " · ".join(f"{value:.2f}" for value in quantiles),
                     _percent(to_best[label] > FAR),
-                    "–" if label == WITHOUT else f"{np.exp(mean):.3f} ± {error:.3f}",
-                    "–" if label == WITHOUT else f"{wins[0]} · {wins[1]}",
+                    "–" if label == NO_NETWORK else f"{np.exp(mean):.3f} ± {error:.3f}",
+                    "–" if label == NO_NETWORK else f"{wins[0]} · {wins[1]}",
                 )
             )
     return report.table(header, rows)
 
 
-def _percent(flags: Sequence[bool] | FloatArray) -> str:
+def _percent(flags: Sequence[bool] | BoolArray) -> str:
     return f"{100 * np.mean(flags):.0f} %"
 
 
-def _findings(pooled: Results) -> str:
+def _findings(pooled: Rests) -> str:
     """What the table says of all kinds together, in words."""
-    means = {label: np.mean([one.iterations for one in rests]) for label, rests in pooled.items()}
-    seconds = {label: np.mean([one.seconds for one in rests]) for label, rests in pooled.items()}
-    starts = {label: np.median([one.start for one in rests]) for label, rests in pooled.items()}
+    means = {
+        label: np.mean([one["iterations"] for one in rests]) for label, rests in pooled.items()
+    }
+    seconds = {label: np.mean([one["seconds"] for one in rests]) for label, rests in pooled.items()}
+    starts = {label: np.median([one["start"] for one in rests]) for label, rests in pooled.items()}
     text = (
-        f"Over all {len(pooled[WITHOUT])} sets, the shipped weights start with "
-        f"{starts[SHIPPED] / starts[WITHOUT]:.2f} times the bending of φ₀ (medians), take "
-        f"{means[SHIPPED] / means[WITHOUT]:.2f} times its iterations and "
-        f"{seconds[SHIPPED] / seconds[WITHOUT]:.2f} times its time (means). "
+        f"Over all {len(pooled[NO_NETWORK])} sets, the shipped weights start with "
+        f"{starts[SHIPPED] / starts[NO_NETWORK]:.2f} times the bending of φ₀ (medians), take "
+        f"{means[SHIPPED] / means[NO_NETWORK]:.2f} times its iterations and "
+        f"{seconds[SHIPPED] / seconds[NO_NETWORK]:.2f} times its time (means). "
     )
     for label in (SHIPPED, DISTURBED):
         mean, error = _gain(pooled, label)
@@ -305,19 +332,3 @@ def _findings(pooled: Results) -> str:
         "So pretraining does not choose a fairer course than chance does: it is another start, and "
         "any other start finds another local optimum on some sets."
     )
-
-
-def _figure(pooled: Results, scale: Scale) -> str:
-    figure, axes = plots.labelled(
-        "Curves at rest from several starts",
-        "L ∫ κ_g² ds relative to the best known",
-        "share of the sets",
-    )
-    for label, ratios in _to_best(pooled).items():
-        shares = (np.arange(len(ratios)) + 1.0) / len(ratios)
-        axes.step(np.sort(ratios), shares, where="post", label=label)
-    axes.set_xscale("log")
-    plots.plain_ticks(axes.xaxis)
-    axes.legend(fontsize=8, loc="lower right")
-    path = plots.save(figure, report.output_folder(scale) / "pretrained_start.png")
-    return report.figure(path, "Share of the sets at or below each ratio to the best known")

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from nicmm_core.network.trainable_network import load_network
 
-from . import collections, report
+from . import collections, plots, report
+from .evidence import Results
 from .scale import Scale
-from .solving import (
-    Runs,
-    Trained,
-    least_losses_figure,
-    random_samples,
-    run_networks,
-    train,
-    untrained,
-)
+from .solving import PARTS_WITHOUT, random_samples, run_networks, train, untrained
+
+TITLE = "Pretraining (Table 1)"
+WITHOUT = PARTS_WITHOUT
 
 SEED = 7
 TEST_SEED = 8
@@ -35,7 +31,7 @@ PAPER_TRAINING = 1000 * 10
 """Sets that the paper's shortest pretraining sees: 1,000 sets, about 10 epochs."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Pretrain for several durations and fine-tune for sets of the same mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets = scale.choose(250, 10, 4)
@@ -46,19 +42,45 @@ def run(scale: Scale) -> None:
         SHIPPED: load_network(),
     }
     samples = random_samples([(name, mesh)], scale.choose(50, 2, 2), TEST_SEED)
-    runs = run_networks(networks, samples, ITERATIONS)
-    figure = least_losses_figure(
-        runs, "Prediction after different pretraining (Table 1)", "pretraining", scale
+    return {
+        "collection": collections.label(scale),
+        "mesh": name,
+        "vertices": len(mesh.vertices),
+        "seed": SEED,
+        "test_seed": TEST_SEED,
+        "sets": sets,
+        "iterations": ITERATIONS,
+        "trained": {
+            label: {
+                "epochs": len(one.losses),
+                "preparing_seconds": round(one.preparing_seconds, 2),
+                "training_seconds": round(one.training_seconds, 2),
+            }
+            for label, one in trained.items()
+        },
+        "runs": run_networks(networks, samples, ITERATIONS),
+    }
+
+
+def section(results: Results) -> str:
+    """The loss after each duration, and whether it falls as in the paper."""
+    return (
+        f"Mesh {results['mesh']} ({results['collection']}), {results['vertices']} vertices; "
+        f"pretraining on {results['sets']} sets (seed {results['seed']}), test on "
+        f"{len(results['runs'][UNTRAINED]['seconds'])} others (seed {results['test_seed']}), 3–5 "
+        "random vertices each, shortest order. Losses are the least so far, averaged over the test "
+        f"sets.\n\n{_table(results)}\n\n{_findings(results)}\n\n"
+        f"{report.figure('pretraining.png', plots.LEAST_LOSSES)}"
     )
-    body = (
-        f"Mesh {name} ({collections.label(scale)}), {len(mesh.vertices)} vertices; pretraining "
-        f"on {sets} sets (seed {SEED}), test on {len(runs[UNTRAINED].seconds)} others (seed "
-        f"{TEST_SEED}), 3–5 random vertices each, shortest order. Losses are the least so far, "
-        "averaged over the test sets.\n\n"
-        f"{_table(runs, trained)}\n\n{_findings(runs, trained, sets)}\n\n"
-        f"{figure}"
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Draw the losses by iteration."""
+    plots.least_losses(
+        {label: run["mean_losses"] for label, run in results["runs"].items()},
+        "Prediction after different pretraining (Table 1)",
+        folder / "pretraining.png",
     )
-    report.write_section("pretraining", "Pretraining (Table 1)", body, scale)
 
 
 def _epochs(scale: Scale) -> tuple[int, ...]:
@@ -69,12 +91,13 @@ def _label(sets: int, epochs: int) -> str:
     return f"{sets * epochs:,} sets seen"
 
 
-def _table(runs: Mapping[str, Runs], trained: Mapping[str, Trained]) -> str:
+def _table(results: Results) -> str:
     rows: list[tuple[object, ...]] = []
-    reference = _mean(runs[UNTRAINED], ITERATIONS)
-    for label, one in runs.items():
-        duration = f"{trained[label].training_seconds:.0f} s" if label in trained else "–"
-        means = [_mean(one, iteration) for iteration in (0, ALSO_AFTER, ITERATIONS)]
+    runs, trained, iterations = results["runs"], results["trained"], results["iterations"]
+    reference = runs[UNTRAINED]["mean_losses"][iterations]
+    for label, run in runs.items():
+        duration = f"{trained[label]['training_seconds']:.0f} s" if label in trained else "–"
+        means = [run["mean_losses"][place] for place in (0, ALSO_AFTER, iterations)]
         values = [f"{mean:.3f}" for mean in means]
         rows.append((label, duration, *values, f"{means[-1] / reference:.2f}"))
     for label, loss in PAPER.items():
@@ -82,25 +105,20 @@ def _table(runs: Mapping[str, Runs], trained: Mapping[str, Trained]) -> str:
         rows.append((f"paper, {label}", "–", "", "", f"{loss:.1f}", share))
     header = (
         "network", "training", "loss at the start", f"after {ALSO_AFTER} iterations",
-        f"after {ITERATIONS} iterations", "relative to no pretraining",
+        f"after {iterations} iterations", "relative to no pretraining",
     )  # fmt: skip
     return report.table(header, rows)
 
 
-def _mean(runs: Runs, iteration: int) -> float:
-    return float(runs.least_losses[:, iteration].mean())
-
-
-def _findings(runs: Mapping[str, Runs], trained: Mapping[str, Trained], sets: int) -> str:
+def _findings(results: Results) -> str:
     """What the table says, in words."""
-    share = {
-        label: _mean(one, ITERATIONS) / _mean(runs[UNTRAINED], ITERATIONS)
-        for label, one in runs.items()
-    }
+    runs, trained, sets = results["runs"], results["trained"], results["sets"]
+    last = {label: run["mean_losses"][results["iterations"]] for label, run in runs.items()}
+    share = {label: loss / last[UNTRAINED] for label, loss in last.items()}
     durations = list(trained)
     values = [share[label] for label in durations]
-    most = max(len(one.losses) for one in trained.values()) * sets
-    preparing = float(np.mean([one.preparing_seconds for one in trained.values()]))
+    most = max(one["epochs"] for one in trained.values()) * sets
+    preparing = float(np.mean([one["preparing_seconds"] for one in trained.values()]))
     text = (
         "Absolute losses cannot be compared with the paper's, whose λ carry another unit; the "
         f"last column can. The paper's 2 minutes lower the loss to "

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
 
 import igl
 import numpy as np
@@ -17,73 +18,96 @@ from nicmm_core.geometry.mesh import Mesh
 from tests.oracles.distances import distances
 
 from . import collections, plots, renders, report
+from .evidence import Results
 from .measures import bending
 from .methods import METHODS
 from .polylines import NearestPoints
 from .samples import random_sets
 from .scale import Scale
 
+TITLE = "Resolution (bottom of Fig. 12)"
+TIMED = True
+WITHOUT = ("outputs",)
+
 SEED = 4
 
 REMARKABLE = 0.02
 """Distance, relative to the diagonal, beyond which curves are plainly different to the eye."""
 
+PLOT = "resolution.png"
 
-@dataclass(frozen=True)
-class Result:
-    """One method on one mesh after some subdivisions.
-
-    Attributes
-    ----------
-    vertices : int
-    curve : SurfaceCurve
-    design : Design
-    offset : (mean, greatest) or None
-        Distances to the finest mesh's curve relative to the diagonal, of the curve projected to
-        the finest mesh; None for that one itself.
-    bend : float
-        L ∮ κ_g² ds.
-    """
-
-    vertices: int
-    curve: SurfaceCurve
-    design: nicmm.Design
-    offset: tuple[float, float] | None
-    bend: float
+CURVES = "resolution_curves.png"
+"""The picture of the first mesh."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Subdivide meshes, ask for the same points on all, and compare with the finest."""
-    results: dict[tuple[int, str], list[Result]] = {}
-    names = []
-    pictures: list[renders.Picture] = []
+    names, answers = [], []
+    picture = None
     for number, (name, coarse, points) in enumerate(_sets(scale)):
         # 64k vertices take minutes, so only one mesh is that fine, as in the paper.
         levels = scale.choose(4 if number == 0 else 3, 3, 1)
         meshes = [_subdivided(coarse, level) for level in range(levels + 1)]
         names.append(f"{name} (up to {len(meshes[-1].vertices)} vertices)")
         for method in METHODS:
-            of_method = _results(name, meshes, points, method)
-            for level, result in of_method.items():
-                results.setdefault((level, method), []).append(result)
+            designs = dict(_designs(name, meshes, points, method))
+            answers += [
+                {"mesh": name, "method": method, **answer} for answer in _compared(meshes, designs)
+            ]
             if number == 0 and method == METHODS[0]:
-                pictures = [
-                    renders.Picture(
-                        f"{result.vertices} vertices",
-                        meshes[level],
-                        [(result.curve, renders.METHOD_COLOURS[method])],
-                    )
-                    for level, result in of_method.items()
-                ]
-    body = (
-        f"Seed {SEED}, one set of 3–5 random vertices of each coarse mesh, shortest order; Loop "
-        f"subdivision keeps their numbers and moves them a little. {_source(scale)}: "
-        f"{report.listed(names)}. Distances are those of the curve, projected to the finest mesh, "
-        "to that mesh's curve, relative to its diagonal.\n\n"
-        f"{_table(results)}\n\n{_findings(results)}\n\n{_plot(results, scale)}\n\n"
-        f"{_stills(pictures, scale)}"
+                picture = _rendered(meshes, designs, scale)
+    return {
+        "seed": SEED,
+        "collection": _source(scale),
+        "meshes": names,
+        "methods": list(METHODS),
+        "answers": answers,
+        "picture": picture,
+    }
+
+
+def section(results: Results) -> str:
+    """How far curves on coarser meshes are from those on the finest."""
+    return (
+        f"Seed {results['seed']}, one set of 3–5 random vertices of each coarse mesh, shortest "
+        "order; Loop subdivision keeps their numbers and moves them a little. "
+        f"{results['collection']}: {report.listed(results['meshes'])}. Distances are those of the "
+        "curve, projected to the finest mesh, to that mesh's curve, relative to its diagonal.\n\n"
+        f"{_table(results['answers'])}\n\n{_findings(results)}\n\n"
+        + report.figure(PLOT, "Every mesh and method by number of vertices")
+        + f"\n\n{_shown_picture(results)}"
     )
-    report.write_section("resolution", "Resolution (bottom of Fig. 12)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Distances and seconds against the number of vertices."""
+    answers = results["answers"]
+    figure, (left, right) = plots.labelled_pair(
+        ("Distance to the finest mesh's curve", "Time"),
+        "vertices",
+        ("greatest distance, % of the diagonal", "seconds"),
+    )
+    for method in results["methods"]:
+        of_method = [each for each in answers if each["method"] == method]
+        compared = [each for each in of_method if each["offset"] is not None]
+        for axes, shown, values in (
+            (left, compared, [each["offset"][1] for each in compared]),
+            (right, of_method, [each["seconds"] for each in of_method]),
+        ):
+            vertices = [each["vertices"] for each in shown]
+            colour = plots.METHOD_COLOURS[method]
+            axes.plot(vertices, values, "o", alpha=0.7, color=colour, label=method)
+    left.set_ylim(bottom=0.0)
+    right.set_yscale("log")
+    plots.plain_ticks(right.yaxis)
+    for axes in (left, right):
+        axes.set_xscale("log")
+        plots.plain_ticks(axes.xaxis)
+        axes.set_xticks(sorted({each["vertices"] for each in answers}))
+        axes.tick_params(axis="x", which="major", labelrotation=30)
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.legend()
+    plots.save(figure, folder / PLOT)
 
 
 def _sets(scale: Scale) -> list[tuple[str, Mesh, IntArray]]:
@@ -102,11 +126,11 @@ def _subdivided(coarse: Mesh, level: int) -> Mesh:
     return Mesh(*igl.loop(coarse.vertices, coarse.faces, level)) if level else coarse
 
 
-def _results(name: str, meshes: Sequence[Mesh], points: IntArray, method: str) -> dict[int, Result]:
-    """Results by level, without those levels where there is no single curve."""
-    finest = len(meshes) - 1
-    results: dict[int, Result] = {}
-    for level in range(finest, -1, -1):
+def _designs(
+    name: str, meshes: Sequence[Mesh], points: IntArray, method: str
+) -> Iterator[tuple[int, nicmm.Design]]:
+    """Designs by level, finest first, without those levels where there is no single curve."""
+    for level in range(len(meshes) - 1, -1, -1):
         mesh = meshes[level]
         label = f"{name}, {len(mesh.vertices)} vertices, {method}"
         try:
@@ -116,35 +140,51 @@ def _results(name: str, meshes: Sequence[Mesh], points: IntArray, method: str) -
             continue
         print(f"  {label}: {design.status.name}, {design.seconds:.1f} s", flush=True)
         if is_one_curve(design.curves):
-            curve = design.curves[0]
-            offset = None
-            if level != finest and finest in results:
-                offset = _offset(meshes[finest], curve, results[finest].curve)
-            results[level] = Result(len(mesh.vertices), curve, design, offset, bending(mesh, curve))
-    return dict(sorted(results.items()))
+            yield level, design
 
 
-def _offset(finest: Mesh, curve: SurfaceCurve, reference: SurfaceCurve) -> tuple[float, float]:
+def _compared(meshes: Sequence[Mesh], designs: Mapping[int, nicmm.Design]) -> Iterator[Results]:
+    """What the designs are, coarse to fine, with their distances to the finest one's curve."""
+    finest = len(meshes) - 1
+    for level, design in sorted(designs.items()):
+        curve = design.curves[0]
+        offset = None
+        if level != finest and finest in designs:
+            offset = _offset(meshes[finest], curve, designs[finest].curves[0])
+        yield {
+            "level": level,
+            "vertices": len(meshes[level].vertices),
+            "offset": offset,
+            "bending": round(bending(meshes[level], curve), 4),
+            "iterations": int(design.iterations),
+            "seconds": round(design.seconds, 4),
+        }
+
+
+def _offset(finest: Mesh, curve: SurfaceCurve, reference: SurfaceCurve) -> list[float]:
+    """Mean and greatest distance in percent of the diagonal, projected to the finest mesh."""
     projected = NearestPoints(finest).curve(curve.points, curve.control_index)
-    mean, greatest = distances(projected, reference)
-    return mean / finest.diagonal, greatest / finest.diagonal
+    return [
+        round(100.0 * float(each) / finest.diagonal, 6) for each in distances(projected, reference)
+    ]
 
 
-def _table(results: Mapping[tuple[int, str], Sequence[Result]]) -> str:
+def _table(answers: Sequence[Results]) -> str:
     rows = []
-    for (level, method), of_level in sorted(results.items()):
-        offsets = [100 * np.array(r.offset) for r in of_level if r.offset is not None]
-        mean, greatest = np.median(offsets, axis=0) if offsets else (np.nan, np.nan)
+    for (level, method), grouped in groupby(sorted(answers, key=_level_method), key=_level_method):
+        of_level = list(grouped)
+        offsets = [each["offset"] for each in of_level if each["offset"] is not None]
+        mean, greatest = np.median(offsets, axis=0) if offsets else (None, None)
         rows.append(
             (
                 level,
-                f"{np.median([r.vertices for r in of_level]):.0f}",
+                f"{_median(of_level, 'vertices'):.0f}",
                 method,
                 len(of_level),
                 f"{mean:.2f}, {greatest:.2f}" if offsets else "–",
-                f"{np.median([r.bend for r in of_level]):.0f}",
-                f"{np.median([r.design.iterations for r in of_level]):.0f}",
-                f"{np.median([r.design.seconds for r in of_level]):.2f}",
+                f"{_median(of_level, 'bending'):.0f}",
+                f"{_median(of_level, 'iterations'):.0f}",
+                f"{_median(of_level, 'seconds'):.2f}",
             )
         )
     header = (
@@ -154,19 +194,26 @@ def _table(results: Mapping[tuple[int, str], Sequence[Result]]) -> str:
     return report.table(header, rows) + "\n\nMedians over the meshes."
 
 
-def _findings(results: Mapping[tuple[int, str], Sequence[Result]]) -> str:
+def _level_method(answer: Results) -> tuple[int, str]:
+    return answer["level"], answer["method"]
+
+
+def _median(answers: Sequence[Results], name: str) -> float:
+    return float(np.median([each[name] for each in answers]))
+
+
+def _findings(results: Results) -> str:
     text = ""
-    for method in METHODS:
+    for method in results["methods"]:
         greatest = [
-            result.offset[1]
-            for (_, one), of_level in results.items()
-            for result in of_level
-            if one == method and result.offset is not None
+            each["offset"][1]
+            for each in results["answers"]
+            if each["method"] == method and each["offset"] is not None
         ]
         if not greatest:
             text += f"`{method}` has nothing to compare. "
             continue
-        apart = sum(value > REMARKABLE for value in greatest)
+        apart = sum(value > 100 * REMARKABLE for value in greatest)
         text += (
             f"Of {len(greatest)} curves of `{method}` on coarser meshes, {apart} are somewhere "
             f"farther than {100 * REMARKABLE:g} % of the diagonal from the finest mesh's"
@@ -180,52 +227,30 @@ def _findings(results: Mapping[tuple[int, str], Sequence[Result]]) -> str:
     return text.strip()
 
 
-def _plot(results: Mapping[tuple[int, str], Sequence[Result]], scale: Scale) -> str:
-    figure, (left, right) = plots.labelled_pair(
-        ("Distance to the finest mesh's curve", "Time"),
-        "vertices",
-        ("greatest distance, % of the diagonal", "seconds"),
-    )
-    for method in METHODS:
-        of_method = [r for (_, one), of_level in results.items() if one == method for r in of_level]
-        colour = plots.METHOD_COLOURS[method]
-        compared = [r for r in of_method if r.offset is not None]
-        left.plot(
-            [r.vertices for r in compared],
-            [100 * r.offset[1] for r in compared if r.offset is not None],
-            "o",
-            alpha=0.7,
-            color=colour,
-            label=method,
+def _rendered(
+    meshes: Sequence[Mesh], designs: Mapping[int, nicmm.Design], scale: Scale
+) -> str | None:
+    """The curves of one method on one mesh, coarse to fine; the picture's name."""
+    if not designs:
+        return None
+    pictures = [
+        renders.Picture(
+            f"{len(meshes[level].vertices)} vertices",
+            meshes[level],
+            [(design.curves[0], renders.METHOD_COLOURS[METHODS[0]])],
         )
-        right.plot(
-            [r.vertices for r in of_method],
-            [r.design.seconds for r in of_method],
-            "o",
-            alpha=0.7,
-            color=colour,
-            label=method,
-        )
-    left.set_ylim(bottom=0.0)
-    right.set_yscale("log")
-    plots.plain_ticks(right.yaxis)
-    for axes in (left, right):
-        axes.set_xscale("log")
-        plots.plain_ticks(axes.xaxis)
-        axes.set_xticks(sorted({r.vertices for of_level in results.values() for r in of_level}))
-        axes.tick_params(axis="x", which="major", labelrotation=30)
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.legend()
-    path = plots.save(figure, report.output_folder(scale) / "resolution.png")
-    return report.figure(path, "Every mesh and method by number of vertices")
-
-
-def _stills(pictures: Sequence[renders.Picture], scale: Scale) -> str:
-    if not pictures:
-        return "The first mesh has no curve, so there is no picture of it."
-    path = report.output_folder(scale) / "resolution_curves.png"
+        for level, design in sorted(designs.items())
+    ]
+    path = report.figures_folder(scale) / CURVES
     view = renders.best_view(pictures[-1])
     renders.render_sheet(pictures, path, scale, columns=5, views=[view] * len(pictures))
+    return CURVES
+
+
+def _shown_picture(results: Results) -> str:
+    if results["picture"] is None:
+        return "The first mesh has no curve, so there is no picture of it."
     return report.figure(
-        path, f"The first mesh with {METHODS[0]}, coarse to fine (bottom of Fig. 12)"
+        results["picture"],
+        f"The first mesh with {results['methods'][0]}, coarse to fine (bottom of Fig. 12)",
     )

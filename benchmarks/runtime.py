@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -12,10 +13,15 @@ from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 
 from . import collections, plots, report
+from .evidence import Results
 from .measures import bending
 from .methods import METHODS
 from .samples import random_sets
 from .scale import Scale
+
+TITLE = "Running time (Table 5)"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 5
 
@@ -25,49 +31,78 @@ REPEATED = tuple(method for method in METHODS if method != "nicmm-paper")
 PAPER = {"nicmm-paper": (398, 62, 262, 697), "variational": (102, 106, 24, 538)}
 """Average, standard deviation, least and greatest milliseconds of the paper's Table 5."""
 
+PLOT = "runtime.png"
 
-def run(scale: Scale) -> None:
+
+def measure(scale: Scale) -> Results:
     """Time every method on every set, in turn, so that a busy machine slows all alike."""
     repetitions = scale.choose(3, 1)
-    seconds: dict[str, list[FloatArray]] = {method: [] for method in METHODS}
-    iterations: dict[str, list[int]] = {method: [] for method in METHODS}
-    several = dict.fromkeys(METHODS, 0)
-    bends: list[float] = []  # relative to the variational method
-    names: list[str] = []
-    sizes: list[int] = []
+    sets: list[Results] = []
     meshes = collections.surfaces(scale, scale.choose(40, 4))
     for name, mesh, points in random_sets(meshes, 1, SEED):
         try:
-            if not names:
+            if not sets:
                 _timed(mesh, points)  # Imports, weights and caches of the first solve.
             runs = [_timed(mesh, points)]
             runs += [_timed(mesh, points, REPEATED) for _ in range(repetitions - 1)]
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
-        names.append(name)
-        sizes.append(len(mesh.vertices))
-        for method in METHODS:
-            times = np.array([designs[method].seconds for designs in runs if method in designs])
-            seconds[method].append(times)
-            iterations[method].append(runs[0][method].iterations)
-            several[method] += not is_one_curve(runs[0][method].curves)
+        answers = {method: _answer(runs, method) for method in METHODS}
         ours, theirs = (runs[0][method].curves[0] for method in ("nicmm", "variational"))
-        bends.append(bending(mesh, ours) / bending(mesh, theirs))
-        text = ", ".join(f"{method} {seconds[method][-1].mean():.2f} s" for method in METHODS)
+        ratio = round(bending(mesh, ours) / bending(mesh, theirs), 6)
+        sets.append(
+            {"mesh": name, "vertices": len(mesh.vertices), "answers": answers, "bending": ratio}
+        )
+        text = ", ".join(
+            f"{method} {np.mean(answer['seconds']):.2f} s" for method, answer in answers.items()
+        )
         print(f"  {name}: {text}", flush=True)
-    averages = {method: np.array([t.mean() for t in times]) for method, times in seconds.items()}
-    body = (
-        f"Seed {SEED}, {len(names)} sets of 3–5 random vertices, shortest order, one a mesh "
-        f"({collections.label(scale)}: {report.listed(names)}), {min(sizes)} to {max(sizes)} "
-        f"vertices; {repetitions} repetitions, one of `nicmm-paper`, each method in turn in one "
+    return {
+        "seed": SEED,
+        "collection": collections.label(scale),
+        "repetitions": repetitions,
+        "methods": list(METHODS),
+        "sets": sets,
+    }
+
+
+def section(results: Results) -> str:
+    """Seconds by method, beside the paper's."""
+    sets = results["sets"]
+    sizes = [each["vertices"] for each in sets]
+    names = report.listed(each["mesh"] for each in sets)
+    averages = _averages(results)
+    return (
+        f"Seed {results['seed']}, {len(sets)} sets of 3–5 random vertices, shortest order, one a "
+        f"mesh ({results['collection']}: {names}), {min(sizes)} to {max(sizes)} vertices; "
+        f"{results['repetitions']} repetitions, one of `nicmm-paper`, each method in turn in one "
         "process after one warm-up, everything included from the mesh to the polyline, and each "
         "with its own stopping criterion, where the paper stops both by the change of the loss. "
         "Statistics are over the sets, of each set's average.\n\n"
-        f"{_table(averages, iterations, several)}\n\n{_findings(averages, bends)}\n\n"
-        f"{_plot(averages, scale)}"
+        f"{_table(averages, sets)}\n\n"
+        f"{_findings(averages, [each['bending'] for each in sets])}\n\n"
+        + report.figure(PLOT, "Seconds of every set by method; dashed: the paper's averages")
     )
-    report.write_section("runtime", "Running time (Table 5)", body, scale)
+
+
+def draw(results: Results, folder: Path) -> None:
+    """Every set's time, sorted, with the paper's averages as dashed lines."""
+    figure, axes = plots.labelled(
+        "Running time (Table 5)", "share of the sets that take less", "seconds"
+    )
+    for method, times in _averages(results).items():
+        share = (np.arange(len(times)) + 0.5) / len(times)
+        colour = plots.METHOD_COLOURS[method]
+        axes.plot(share, np.sort(times), ".-", color=colour, label=method)
+        if method in PAPER:
+            axes.axhline(PAPER[method][0] / 1000, color=colour, linestyle="--", linewidth=1)
+            axes.text(0.0, PAPER[method][0] / 1000, f"{method}, paper's average", va="bottom")
+    axes.set_yscale("log")
+    plots.plain_ticks(axes.yaxis)
+    axes.set_xlim(0.0, 1.0)
+    axes.legend()
+    plots.save(figure, folder / PLOT)
 
 
 def _timed(
@@ -82,15 +117,32 @@ def _timed(
     }
 
 
-def _table(
-    averages: Mapping[str, FloatArray],
-    iterations: Mapping[str, Sequence[int]],
-    several: Mapping[str, int],
-) -> str:
+def _answer(runs: Sequence[Mapping[str, nicmm.Design]], method: str) -> Results:
+    """A method's seconds in all runs, and what it did in the first."""
+    first = runs[0][method]
+    return {
+        "seconds": [round(designs[method].seconds, 6) for designs in runs if method in designs],
+        "iterations": int(first.iterations),
+        "one_curve": bool(is_one_curve(first.curves)),
+    }
+
+
+def _averages(results: Results) -> dict[str, FloatArray]:
+    """Mean seconds of every set, by method."""
+    return {
+        method: np.array([np.mean(each["answers"][method]["seconds"]) for each in results["sets"]])
+        for method in results["methods"]
+    }
+
+
+def _table(averages: Mapping[str, FloatArray], sets: Sequence[Results]) -> str:
     rows: list[tuple[object, ...]] = []
     for method, times in averages.items():
         own = [f"{1000 * value:.0f}" for value in _statistics(times)]
-        rows.append((method, *own, f"{np.median(iterations[method]):.0f}", several[method]))
+        answers = [each["answers"][method] for each in sets]
+        iterations = np.median([answer["iterations"] for answer in answers])
+        several = sum(not answer["one_curve"] for answer in answers)
+        rows.append((method, *own, f"{iterations:.0f}", several))
         if method in PAPER:
             rows.append((f"{method}, paper", *PAPER[method], "", ""))
     header = (
@@ -131,23 +183,3 @@ def _against_the_paper(slow: str, ratio: float) -> str:
     if slow == "variational":
         return f", which contradicts the paper, where it is {published:.2f} times as fast"
     return f"; in the paper the ratio is {published:.2f}"
-
-
-def _plot(averages: Mapping[str, FloatArray], scale: Scale) -> str:
-    """Every set's time, sorted, with the paper's averages as dashed lines."""
-    figure, axes = plots.labelled(
-        "Running time (Table 5)", "share of the sets that take less", "seconds"
-    )
-    for method, times in averages.items():
-        share = (np.arange(len(times)) + 0.5) / len(times)
-        colour = plots.METHOD_COLOURS[method]
-        axes.plot(share, np.sort(times), ".-", color=colour, label=method)
-        if method in PAPER:
-            axes.axhline(PAPER[method][0] / 1000, color=colour, linestyle="--", linewidth=1)
-            axes.text(0.0, PAPER[method][0] / 1000, f"{method}, paper's average", va="bottom")
-    axes.set_yscale("log")
-    plots.plain_ticks(axes.yaxis)
-    axes.set_xlim(0.0, 1.0)
-    axes.legend()
-    path = plots.save(figure, report.output_folder(scale) / "runtime.png")
-    return report.figure(path, "Seconds of every set by method; dashed: the paper's averages")

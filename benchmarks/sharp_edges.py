@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy import sparse
@@ -20,7 +20,11 @@ from tests.oracles.checker import judge_curve
 
 from . import collections, report
 from .cad_shapes import cad_shapes
+from .evidence import Results
 from .scale import Scale
+
+TITLE = "Sharp edges to follow"
+WITHOUT = ("outputs",)
 
 SEEDS = (6, 7, 8, 9)
 """Of generated bodies and their lines; third-party meshes have the first."""
@@ -55,62 +59,86 @@ LINES = 3
 """Lines of a mesh."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Open curves beside lines of sharp edges, without and with the map."""
     seeds = SEEDS[: scale.choose(len(SEEDS), 1)]
-    groups = [("generated", _generated(seeds, scale.choose(12, 8, 2)))]
+    groups = {"generated": _generated(seeds, scale.choose(12, 8, 2))}
     if scale is not Scale.SMOKE:
-        groups.append(("third-party", _mechanical(scale.choose(40, 12))))
-    rows = []
-    for label, meshes in groups:
-        before, after, faults = [], [], 0
-        for name, mesh, generator in meshes:
-            weights = nicmm.sharp_edge_map(mesh)
-            for line, points, free in itertools.islice(_close(name, mesh, generator), LINES):
-                try:
-                    led = nicmm.design_curve(mesh, points, closed=False, alignment=weights)
-                except nicmm.NicmmError as error:
-                    print(f"  {name}: {error}", flush=True)
-                    continue
-                edge_length = np.linalg.norm(np.diff(line, axis=0), axis=1).mean()
-                pair = [_away(line, curve) / edge_length for curve in (free, led.curves[0])]
-                before.append(pair[0])
-                after.append(pair[1])
-                where = points.positions(mesh)
-                faults += bool(judge_curve(mesh, led.curves[0], where, closed=False).faults)
-                print(f"  {name}: {pair[0]:.2f} -> {pair[1]:.2f} edges", flush=True)
-        if after:
-            on_edge = np.mean(np.array(after) <= WANTED)
-            rows.append(
-                (
-                    label,
-                    len(after),
-                    f"{np.median(before):.2f}",
-                    *(f"{value:.2f}" for value in np.quantile(after, [0.5, 0.75, 0.9])),
-                    f"{on_edge:.0%}",
-                    f"{len(after) - faults} of {len(after)}",
-                )
-            )
-    if not rows:
+        groups["third-party"] = _mechanical(scale.choose(40, 12))
+    lines = {
+        label: [line for each in meshes for line in _beside_lines(*each)]
+        for label, meshes in groups.items()
+    }
+    if not any(lines.values()):
         raise SystemExit("No mesh has a line of sharp edges with room beside it")
+    return {
+        "seeds": list(seeds),
+        "most_lines": LINES,
+        "lengths": [LEAST_LENGTH, MOST_LENGTH],
+        "offset": OFFSET,
+        "near": NEAR,
+        "as_short": AS_SHORT,
+        "mechanical": list(MECHANICAL),
+        "lines": lines,
+    }
+
+
+def section(results: Results) -> str:
+    """How near the curves come to the edges."""
     header = (
         "meshes", "lines", "free curve", "with the map: median", "75 %", "90 %",
         f"within {WANTED:g} edges", "simple, through its points",
     )  # fmt: skip
-    body = (
-        f"Seeds {', '.join(map(str, seeds))}; up to {LINES} lines of sharp edges a mesh, "
-        f"{LEAST_LENGTH:g} to {MOST_LENGTH:g} diagonals long. An open curve joins two points "
-        f"beside the ends of a line, {OFFSET:.0%} of the diagonal away from it on one side; lines "
-        f"count where the free curve is no more than {NEAR:g} times as far away by the mean. Left "
-        "out are lines that are not the only ones to follow: another is nearer than the points, or "
-        f"another way along sharp edges between the ends is at most {AS_SHORT:g} times as long, as "
-        "round a circle, or a face beside the line has its third corner on another line, so that "
-        "the map makes one of both. The map is "
-        "`sharp_edge_map(mesh)`. Mean distance of the middle half of the line to the curve, in "
-        "mean edge lengths of the line. Third-party meshes are those of which 2 to 20 % of the "
-        "vertices are on sharp edges.\n\n" + report.table(header, rows)
+    rows = [_row(label, lines) for label, lines in results["lines"].items() if lines]
+    least, most = results["lengths"]
+    low, high = results["mechanical"]
+    return (
+        f"Seeds {report.listed(map(str, results['seeds']))}; up to {results['most_lines']} lines "
+        f"of sharp edges a mesh, {least:g} to {most:g} diagonals long. An open curve joins two "
+        f"points beside the ends of a line, {results['offset']:.0%} of the diagonal away from it "
+        "on one side; lines count where the free curve is no more than "
+        f"{results['near']:g} times as far away by the mean. Left out are lines that are not the "
+        "only ones to follow: another is nearer than the points, or another way along sharp edges "
+        f"between the ends is at most {results['as_short']:g} times as long, as round a circle, or "
+        "a face beside the line has its third corner on another line, so that the map makes one "
+        "of both. The map is `sharp_edge_map(mesh)`. Mean distance of the middle half of the line "
+        "to the curve, in mean edge lengths of the line. Third-party meshes are those of which "
+        f"{100 * low:g} to {100 * high:g} % of the vertices are on sharp edges.\n\n"
+        + report.table(header, rows)
     )
-    report.write_section("sharp_edges", "Sharp edges to follow", body, scale)
+
+
+def _row(label: str, lines: Sequence[Results]) -> tuple[object, ...]:
+    after = [line["led"] for line in lines]
+    return (
+        label,
+        len(lines),
+        f"{np.median([line['free'] for line in lines]):.2f}",
+        *(f"{value:.2f}" for value in np.quantile(after, [0.5, 0.75, 0.9])),
+        f"{np.mean(np.array(after) <= WANTED):.0%}",
+        f"{sum(not line['faults'] for line in lines)} of {len(lines)}",
+    )
+
+
+def _beside_lines(name: str, mesh: Mesh, generator: np.random.Generator) -> Iterator[Results]:
+    """Distances of the free curve and of the one with the map, beside lines of a mesh."""
+    weights = nicmm.sharp_edge_map(mesh)
+    for line, points, free in itertools.islice(_close(name, mesh, generator), LINES):
+        try:
+            led = nicmm.design_curve(mesh, points, closed=False, alignment=weights)
+        except nicmm.NicmmError as error:
+            print(f"  {name}: {error}", flush=True)
+            continue
+        edge_length = np.linalg.norm(np.diff(line, axis=0), axis=1).mean()
+        before, after = (_away(line, curve) / edge_length for curve in (free, led.curves[0]))
+        verdict = judge_curve(mesh, led.curves[0], points.positions(mesh), closed=False)
+        print(f"  {name}: {before:.2f} -> {after:.2f} edges", flush=True)
+        yield {
+            "mesh": name,
+            "free": round(float(before), 6),
+            "led": round(float(after), 6),
+            "faults": list(verdict.faults),
+        }
 
 
 def _generated(

@@ -27,10 +27,15 @@ from nicmm_core.network.trainable_network import CurveNetwork, load_network
 from nicmm_core.path.band_refinement import PIECES
 from tests.oracles.distances import distances
 
-from . import plots, report
+from .evidence import Results
 from .measures import diagonal
 from .samples import random_sets
-from .scale import Scale
+
+PARTS_WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "repair", "splines")
+"""Rooms of the core of which nothing here uses anything, for the `WITHOUT` of a measurement."""
+
+DIGITS = 6
+"""Significant ones that results keep."""
 
 FREQUENCY = 4.0
 """Of a random field: standard deviation of its wave numbers, in 1/√area."""
@@ -142,34 +147,23 @@ def without_early_stop(iterations: int) -> FinetuningConfig:
     return FinetuningConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
 
 
-@dataclass(frozen=True)
-class Runs:
-    """Predictions with one network.
-
-    Attributes
-    ----------
-    least_losses : (samples, iterations + 1) float array
-        Least loss so far, from before the first step to after the last one.
-    seconds : (samples,) float array
-        Of all fine-tuning.
-    smooth : (samples,) float array
-        λ_smooth of the energy, as a design takes it.
-    """
-
-    least_losses: FloatArray
-    seconds: FloatArray
-    smooth: FloatArray
-
-
 def run_networks(
     networks: Mapping[str, CurveNetwork], samples: Iterable[Sample], iterations: int
-) -> dict[str, Runs]:
-    """Predict every sample with every network, in turn, so that a busy machine slows all alike."""
+) -> Results:
+    """Predict every sample with every network, in turn, so that a busy machine slows all alike.
+
+    Returns
+    -------
+    Results
+        By network: for each sample its mesh, the seconds of all fine-tuning, and the least loss
+        before the first step and after the last one; for all samples together the mean of the least
+        loss so far, by iteration.
+    """
+    meshes: list[str] = []
     losses: dict[str, list[FloatArray]] = {label: [] for label in networks}
     seconds: dict[str, list[float]] = {label: [] for label in networks}
-    smooth = []
     for sample in samples:
-        smooth.append(sample.weights.smooth)
+        meshes.append(sample.name)
         for label, network in networks.items():
             started = time.perf_counter()
             finetuned = finetune(
@@ -177,24 +171,29 @@ def run_networks(
             )
             seconds[label].append(time.perf_counter() - started)
             losses[label].append(_least_so_far(finetuned.losses, iterations + 1))
-        last = ", ".join(f"{label} {losses[label][-1][-1]:.3f}" for label in networks)
+        last = ", ".join(
+            f"{label} {of_network[-1][-1]:.3f}" for label, of_network in losses.items()
+        )
         print(f"  {sample.name}: {last}", flush=True)
-    if not smooth:
+    if not meshes:
         raise SystemExit("No set had a simple loop through its points; there is nothing to measure")
+    return {label: _run(meshes, np.array(losses[label]), seconds[label]) for label in networks}
+
+
+def _run(meshes: list[str], least_losses: FloatArray, seconds: list[float]) -> Results:
+    """What results keep of (samples, iterations + 1) losses: all of them would be too many."""
     return {
-        label: Runs(np.array(losses[label]), np.array(seconds[label]), np.array(smooth))
-        for label in networks
+        "meshes": meshes,
+        "seconds": [significant(value) for value in seconds],
+        "first_losses": [significant(value) for value in least_losses[:, 0]],
+        "last_losses": [significant(value) for value in least_losses[:, -1]],
+        "mean_losses": [significant(value) for value in least_losses.mean(axis=0)],
     }
 
 
-def least_losses_figure(runs: Mapping[str, Runs], title: str, name: str, scale: Scale) -> str:
-    """Plot the least losses of several networks as ``name``.png; the picture in Markdown."""
-    path = plots.least_losses(
-        {label: one.least_losses for label, one in runs.items()},
-        title,
-        report.output_folder(scale) / f"{name}.png",
-    )
-    return report.figure(path, "Least loss so far against the iteration, mean of the sets")
+def significant(value: float, digits: int = DIGITS) -> float | None:
+    """A number with so many digits; None if it is not finite."""
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def _least_so_far(losses: list[float], length: int) -> FloatArray:

@@ -24,7 +24,12 @@ from nicmm_core.level_set import problem, zero_set
 from nicmm_core.network import single_pass
 
 from . import report
+from .evidence import Results
 from .scale import Scale
+
+TITLE = "Where the time goes"
+TIMED = True
+WITHOUT = ("outputs",)
 
 SEED = 0
 SIZES = ((500, 2), (1000, 3), (1500, 5))
@@ -77,35 +82,49 @@ Times = dict[str, float]
 """Milliseconds by stage."""
 
 
-def run(scale: Scale) -> None:
+def measure(scale: Scale) -> Results:
     """Measure generated bodies of three sizes."""
     sizes = ((200, 1),) if scale is Scale.SMOKE else SIZES[: scale.choose(3, 2)]
-    columns: list[tuple[str, Times]] = []
-    memory = []
+    bodies = []
     for faces, subdivisions in sizes:
         mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
-        label = f"{len(mesh.faces):,}"
-        print(f"  {label} faces", flush=True)
-        columns += [(f"{label}, {kind}", times) for kind, times in _measured(mesh).items()]
-        memory.append((label, _bytes_a_vertex(faces, subdivisions)))
+        print(f"  {len(mesh.faces):,} faces", flush=True)
+        runs = _measured(mesh)
+        memory = round(_bytes_a_vertex(faces, subdivisions), 1)
+        bodies.append({"faces": len(mesh.faces), "milliseconds": runs, "bytes_a_vertex": memory})
+    return {"seed": SEED, "sets": SETS, "points": POINTS, "drags": DRAGS, "bodies": bodies}
+
+
+def section(results: Results) -> str:
+    """Medians of every stage, and the memory."""
+    bodies = results["bodies"]
+    columns = {
+        f"{body['faces']:,}, {kind}": {stage: np.median(each) for stage, each in stages.items()}
+        for body in bodies
+        for kind, stages in body["milliseconds"].items()
+    }
+    stages = next(iter(columns.values()))
     rows = [
-        (stage, *(f"{times[stage]:.1f}" if times[stage] else "–" for _, times in columns))
-        for stage in (*STAGES, REST, TOTAL)
+        (stage, *(f"{times[stage]:.1f}" if times[stage] else "–" for times in columns.values()))
+        for stage in stages
     ]
-    bytes_each = ", ".join(f"{count:,.0f} with {label} faces" for label, count in memory)
-    body = (
-        f"Seed {SEED}, {SETS} sets of {POINTS} random vertices on a generated body of each size, "
-        "shortest order; medians in milliseconds. *First*: the first curve on a mesh, whose arrays "
-        "have been checked and no more. *Another*: through other points on the same Designer. "
-        f"*Dragged*: after a point has moved to a neighbouring vertex, {DRAGS} times a set.\n\n"
-        + report.table(("stage", *(label for label, _ in columns)), rows)
+    bytes_each = report.listed(
+        f"{body['bytes_a_vertex']:,.0f} with {body['faces']:,} faces" for body in bodies
+    )
+    return (
+        f"Seed {results['seed']}, {results['sets']} sets of {results['points']} random vertices on "
+        "a generated body of each size, shortest order; medians in milliseconds. *First*: the "
+        "first curve on a mesh, whose arrays have been checked and no more. *Another*: through "
+        "other points on the same Designer. *Dragged*: after a point has moved to a neighbouring "
+        f"vertex, {results['drags']} times a set.\n\n"
+        + report.table(("stage", *columns), rows)
         + "\n\nGreatest memory that a first curve takes beyond what the process had with the "
         f"mesh's arrays, in bytes a vertex: {bytes_each}."
     )
-    report.write_section("stages", "Where the time goes", body, scale)
 
 
-def _measured(mesh: Mesh) -> dict[str, Times]:
+def _measured(mesh: Mesh) -> dict[str, dict[str, list[float]]]:
+    """Milliseconds of all runs, by kind of run and stage."""
     generator = np.random.default_rng(SEED)
     runs: dict[str, list[Times]] = {"first": [], "another": [], "dragged": []}
     for _ in range(SETS):
@@ -120,7 +139,7 @@ def _measured(mesh: Mesh) -> dict[str, Times]:
             times, design = _timed(designer, points, design)
             runs["dragged"].append(times)
     return {
-        kind: {stage: float(np.median([one[stage] for one in times])) for stage in times[0]}
+        kind: {stage: [round(one[stage], 3) for one in times] for stage in (*STAGES, REST, TOTAL)}
         for kind, times in runs.items()
     }
 

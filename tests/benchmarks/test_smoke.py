@@ -1,20 +1,23 @@
-"""Every measurement runs at the smallest scale and writes its section with its figures."""
+"""Every measurement runs at the smallest scale, keeps its data and writes its section from them."""
 
 import dataclasses
 import importlib
 import re
+import sys
+from pathlib import Path
 
 import matplotlib.image
 import pytest
 
-from benchmarks import report
-from benchmarks.__main__ import MEASUREMENTS
+from benchmarks import evidence, report
+from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core.network.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
 
 FEW_ITERATIONS = 40
+CORE = evidence.ROOT / "nicmm_core"
 
 
 @pytest.fixture(autouse=True)
@@ -27,23 +30,55 @@ def short_finetuning(monkeypatch):
     monkeypatch.setattr(FinetuningConfig.__init__, "__defaults__", defaults)
 
 
-@pytest.mark.parametrize("name", MEASUREMENTS)
-def test_measurement_writes_its_section_and_figures(name, tmp_path, monkeypatch):
+@pytest.fixture
+def quick_output(tmp_path, monkeypatch):
+    for module in (evidence, report):
+        monkeypatch.setattr(module, "QUICK_OUTPUT", tmp_path / "quick")
+    monkeypatch.setattr(evidence, "DATA", tmp_path / "full" / "data")
     monkeypatch.setattr(report, "RESULTS", tmp_path / "full" / "RESULTS.md")
     monkeypatch.setattr(report, "FIGURES", tmp_path / "full" / "figures")
-    monkeypatch.setattr(report, "QUICK_OUTPUT", tmp_path / "quick")
+    return tmp_path / "quick"
 
-    importlib.import_module(f"benchmarks.{name}").run(Scale.SMOKE)
+
+@pytest.fixture
+def rooms_entered():
+    """Rooms of the core with functions that were called; modules that were only imported do not
+    count."""
+    files = set()
+
+    def note(frame, event, _argument):
+        if event == "call" and frame.f_code.co_name != "<module>":
+            files.add(frame.f_code.co_filename)
+
+    def rooms():
+        paths = [Path(name) for name in files if name.startswith(str(CORE))]
+        return {path.relative_to(CORE).parts[0] for path in paths}
+
+    sys.setprofile(note)
+    yield rooms
+    sys.setprofile(None)
+
+
+@pytest.mark.parametrize("name", MEASUREMENTS)
+def test_measurement_keeps_its_data_and_writes_its_section(
+    name, tmp_path, quick_output, rooms_entered
+):
+    without = getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
+    if not without:
+        sys.setprofile(None)
+    measure_one(name, Scale.SMOKE)
+    sys.setprofile(None)
 
     assert not (tmp_path / "full").exists()
-    text = (tmp_path / "quick" / "RESULTS.md").read_text()
-    section = re.search(rf"<!-- {name} -->\n## (.+?)<!-- /{name} -->", text, flags=re.S)
-    assert section is not None
-    assert f"python -m benchmarks {name} --smoke" in section[1]
-    assert "nan" not in section[1].lower().split()
-    shown = re.findall(r"!\[[^\]]*\]\(figures/([^)]+)\)", section[1])
-    written = sorted(path.name for path in (tmp_path / "quick").glob("figures/*"))
+    record = evidence.load(name, Scale.SMOKE)
+    section = report.section_text(name, record)
+    assert f"`python -m benchmarks {name} --smoke`" in section
+    assert "nan" not in section.lower().split()
+    shown = re.findall(r"!\[[^\]]*\]\(figures/([^)]+)\)", section)
+    written = sorted(path.name for path in quick_output.glob("figures/*"))
     assert sorted(shown) == written
     for figure in written:
-        height, width = matplotlib.image.imread(tmp_path / "quick" / "figures" / figure).shape[:2]
+        height, width = matplotlib.image.imread(quick_output / "figures" / figure).shape[:2]
         assert min(height, width) > 100
+    assert not rooms_entered() & set(without)
+    assert set(without) <= {path.name for path in CORE.iterdir() if path.is_dir()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,10 +48,11 @@ REQUESTS = ((True, True), (True, False), (False, True), (False, False))
 
 @dataclass(frozen=True)
 class Outcome:
-    """Which of the four it is, and why."""
+    """Which of the four it is, why, and how many faces the mesh has."""
 
     verdict: str
     words: str = ""
+    faces: int = 0
 
 
 def outcome(item: Item) -> Outcome:
@@ -63,6 +64,10 @@ def outcome(item: Item) -> Outcome:
         return Outcome(DECLINED, f"{type(error).__name__}: {error}")
     except Exception as error:
         return Outcome(WRONG, f"untyped {type(error).__name__}: {error}")
+    return replace(_answer(item, mesh, designer), faces=len(mesh.faces))
+
+
+def _answer(item: Item, mesh: nicmm.Mesh, designer: nicmm.Designer) -> Outcome:
     of_one_part, closed = REQUESTS[item.request]
     generator = np.random.default_rng([SEED, zlib.crc32(item.name.encode()), item.request])
     points = _points(mesh, of_one_part, closed, generator)

@@ -9,6 +9,9 @@ from nicmm_core.io.files import MESH_FORMATS
 COLLECTIONS = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 """Third-party meshes are no part of the project; each has its own licence."""
 
+INDEX = COLLECTIONS / "index.csv"
+"""The list of them."""
+
 
 def mesh_files(folder: str) -> list[Path]:
     """Mesh files of a collection, sorted; stops with a word where there is none."""

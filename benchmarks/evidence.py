@@ -1,0 +1,240 @@
+"""Data files: what a measurement found, on which code, meshes and machine.
+
+`benchmarks/data/NAME.json` holds the results of a measurement and a fingerprint of every statement
+that they depend on. RESULTS.md and the figures in other documents are generated from these files,
+and `python -m benchmarks stale` lists those that other code would have to confirm.
+"""
+
+from __future__ import annotations
+
+import ast
+import datetime
+import hashlib
+import importlib
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy
+import scipy
+import torch
+
+from tests.oracles.mesh_files import INDEX
+
+from .scale import Scale
+
+Results = dict[str, Any]
+"""What a measurement found, in types of JSON."""
+
+Record = dict[str, Any]
+"""A data file."""
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT / "benchmarks" / "data"
+QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
+"""Where quick and smoke runs write instead; not under version control."""
+
+WEIGHTS = "nicmm_core/network/weights"
+PRESENTATION = tuple(
+    f"benchmarks/{name}.py" for name in ("__init__", "evidence", "report", "scale")
+)
+"""Modules that only write down what was measured."""
+
+Read = Callable[[Path], bytes]
+
+
+def folder_of(scale: Scale) -> Path:
+    """Where the data of a run are kept."""
+    return DATA if scale is Scale.FULL else QUICK_OUTPUT / "data"
+
+
+def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
+    """Write the data file of a measurement and return its content."""
+    record = {
+        "command": f"python -m benchmarks {name}"
+        + ("" if scale is Scale.FULL else f" --{scale.value}"),
+        "date": datetime.date.today().isoformat(),
+        "machine": machine(),
+        "seconds": round(seconds),
+        "code": code_behind(name),
+        "meshes": meshes_behind(name),
+        "results": results,
+    }
+    path = folder_of(scale) / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return load(name, scale)
+
+
+def load(name: str, scale: Scale = Scale.FULL) -> Record:
+    """Read the data file of a measurement; FileNotFoundError if it was never made."""
+    text = (folder_of(scale) / f"{name}.json").read_text(encoding="utf-8")
+    record: Record = json.loads(text)
+    return record
+
+
+def is_kept(name: str) -> bool:
+    """Whether there is a data file of a full run."""
+    return (DATA / f"{name}.json").exists()
+
+
+def machine() -> str:
+    """The machine and the libraries, in one line."""
+    return (
+        f"{os.cpu_count()} cores {platform.machine()}, "
+        f"Python {platform.python_version()}, NumPy {numpy.__version__}, "
+        f"SciPy {scipy.__version__}, PyTorch {torch.__version__.split('+')[0]}"
+    )
+
+
+def what_changed(name: str, read: Read = Path.read_bytes) -> list[str]:
+    """What has changed since a measurement: files, or words; empty if it is fresh."""
+    if not is_kept(name):
+        return ["never measured"]
+    record = load(name)
+    if record["code"] is None:
+        return ["measured before the code was recorded"]
+    now, before = code_behind(name, read), record["code"]
+    changed = sorted(path for path in now | before if now.get(path) != before.get(path))
+    if INDEX.exists() and meshes_behind(name) != record["meshes"]:
+        changed.append("the list of meshes")
+    return changed
+
+
+def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
+    """A digest of each file whose statements decide what a measurement finds.
+
+    Of the measurement's own module only what `measure` reaches counts, so that a new wording does
+    not ask for a new measurement; of other modules all statements, without comments and docstrings.
+    Modules that it imports count, but not rooms of the core in its `WITHOUT`.
+    """
+    own = ROOT / "benchmarks" / f"{name}.py"
+    statements, imports = _reached(_parsed(read(own)), "measure")
+    excluded = getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
+    digests = {_relative(own): _digest(statements)}
+    waiting = list(_files(imports, own))
+    while waiting:
+        path = waiting.pop()
+        relative = _relative(path)
+        room = relative.split("/")[1] if relative.startswith("nicmm_core/") else ""
+        if relative in digests or relative in PRESENTATION or room in excluded:
+            continue
+        digests[relative], imported = _whole(read(path))
+        waiting += _files(imported, path)
+    if "network" not in excluded:
+        for path in sorted((ROOT / WEIGHTS).iterdir()):
+            if path.is_file() and path.suffix != ".py":
+                digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
+    return dict(sorted(digests.items()))
+
+
+def meshes_behind(name: str) -> str | None:
+    """A digest of the list of third-party meshes; None if a measurement uses none of them."""
+    modules = {"tests/oracles/mesh_files.py", "benchmarks/collections.py"}
+    if not INDEX.exists() or not modules & set(code_behind(name)):
+        return None
+    return hashlib.sha256(INDEX.read_bytes()).hexdigest()[:16]
+
+
+IMPORTS = (ast.Import, ast.ImportFrom)
+
+
+@cache
+def _whole(content: bytes) -> tuple[str, list[ast.stmt]]:
+    """The digest of all statements of a file, and its imports."""
+    tree = _parsed(content)
+    return _digest([tree]), [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
+
+
+def _parsed(content: bytes) -> ast.Module:
+    """The statements of a file, without docstrings; comments are not part of them."""
+    tree = ast.parse(content)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
+    return tree
+
+
+def _is_text(node: ast.stmt) -> bool:
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def _digest(statements: Sequence[ast.AST]) -> str:
+    text = "\n".join(ast.dump(statement) for statement in statements)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _reached(tree: ast.Module, start: str) -> tuple[list[ast.stmt], list[ast.stmt]]:
+    """Statements of a module that a function of it uses, in their order, and their imports."""
+    defined: dict[str, list[ast.stmt]] = {}
+    for statement in tree.body:
+        for name in _names_defined(statement):
+            defined.setdefault(name, []).append(statement)
+    found: set[ast.stmt] = set()
+    waiting = [start]
+    seen = set()
+    while waiting:
+        name = waiting.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        for statement in defined.get(name, ()):
+            found.add(statement)
+            waiting += [node.id for node in ast.walk(statement) if isinstance(node, ast.Name)]
+    statements = [each for each in tree.body if each in found and not isinstance(each, IMPORTS)]
+    inner = [n for each in statements for n in ast.walk(each) if isinstance(n, IMPORTS)]
+    outer = [each for each in tree.body if each in found and isinstance(each, IMPORTS)]
+    used = [_only(node, seen) for node in outer]
+    return statements, [*used, *inner]
+
+
+def _only(node: ast.stmt, names: set[str]) -> ast.stmt:
+    """An import of those names only that are used."""
+    assert isinstance(node, IMPORTS)
+    kept = [each for each in node.names if (each.asname or each.name).split(".")[0] in names]
+    if isinstance(node, ast.Import):
+        return ast.Import(kept)
+    return ast.ImportFrom(node.module, kept, node.level)
+
+
+def _names_defined(statement: ast.stmt) -> list[str]:
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return [statement.name]
+    if isinstance(statement, IMPORTS):
+        return [(each.asname or each.name).split(".")[0] for each in statement.names]
+    nodes = [node for node in ast.walk(statement) if isinstance(node, ast.Name)]
+    return [node.id for node in nodes if isinstance(node.ctx, ast.Store)]
+
+
+def _files(imports: Iterable[ast.stmt], importer: Path) -> list[Path]:
+    """The project's files that statements import, with the packages that they stand in."""
+    found = []
+    package = _relative(importer).split("/")[:-1]
+    for node in imports:
+        if isinstance(node, ast.Import):
+            wanted = [each.name.split(".") for each in node.names]
+        else:
+            assert isinstance(node, ast.ImportFrom)
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base = base + (node.module.split(".") if node.module else [])
+            wanted = [base, *([*base, each.name] for each in node.names)]
+        for parts in wanted:
+            for count in range(1, len(parts) + 1):
+                place = ROOT.joinpath(*parts[:count])
+                found += [
+                    p for p in (place / "__init__.py", place.with_suffix(".py")) if p.exists()
+                ]
+    return found
+
+
+def _relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
