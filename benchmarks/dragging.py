@@ -17,8 +17,7 @@ from tests.oracles.checker import judge
 from . import collections, report
 from .evidence import Results
 from .measures import bending
-from .peer_systems import later_signed_heat
-from .peers import task_on
+from .peer_systems import later_signed_heat, task_on
 from .samples import random_sets
 from .scale import Scale
 
@@ -95,7 +94,7 @@ def _beside_signed_heat(scale: Scale) -> Results | None:
     for _ in range(scale.choose(PEER_SETS, 3)):
         points = generator.choice(len(mesh.vertices), PEER_POINTS, replace=False)
         ours.append(_dragged(mesh, points, rival=False)["dragged"])
-        theirs.append(round(later_signed_heat(task_on(mesh, points)), 6))
+        theirs.append(round(later_signed_heat(task_on(mesh, points))[1], 6))
     return {"faces": len(mesh.faces), "points": PEER_POINTS, "ours": ours, "theirs": theirs}
 
 

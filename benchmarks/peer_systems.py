@@ -19,6 +19,9 @@ from typing import cast
 import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray, IntArray
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.geometry.surface_points import locate_control_points
+from nicmm_core.level_set.problem import build_problem
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,19 @@ class Task:
     path: IntArray
     controls: IntArray
     spacing: float
+
+
+def task_on(mesh: Mesh, points: IntArray) -> Task:
+    """What other systems are asked for through some vertices in the shortest order."""
+    problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
+    working, loop = problem.working, problem.loop
+    return Task(
+        working.vertices,
+        working.faces,
+        loop.vertices,
+        loop.control_vertices,
+        mesh.mean_edge_length,
+    )
 
 
 Answer = tuple[list[FloatArray], float]
@@ -92,6 +108,8 @@ SYSTEMS: dict[str, tuple[str, Callable[[Task], Answer]]] = {
 }
 """Package and function of each system."""
 
+LATER = "potpourri3d, signed heat, later"
+
 
 def missing_packages() -> list[str]:
     """Packages of the systems that are not installed."""
@@ -113,7 +131,7 @@ class SystemsProcess:
         Parameters
         ----------
         name : str
-            Key of `SYSTEMS`.
+            Key of `SYSTEMS`, or `LATER`.
         task : Task
         patience : float
             Seconds that it may take.
@@ -147,7 +165,8 @@ def _serve(connection: Connection) -> None:
     while True:
         name, task = connection.recv()
         try:
-            connection.send(SYSTEMS[name][1](task))
+            system = later_signed_heat if name == LATER else SYSTEMS[name][1]
+            connection.send(system(task))
         except Exception as error:  # whatever a foreign package raises is its answer
             connection.send(f"{type(error).__name__}: {error}")
 
@@ -167,8 +186,8 @@ def _signed_heat(task: Task, constraint: str) -> Answer:
     return [_positions(task.vertices, edges, piece) for piece in pieces], seconds
 
 
-def later_signed_heat(task: Task) -> float:
-    """Seconds of potpourri3d's signed heat method for a distance, its factorisations being kept."""
+def later_signed_heat(task: Task) -> Answer:
+    """potpourri3d: a later signed distance, the factorisations being kept, without its zero set."""
     potpourri3d = importlib.import_module("potpourri3d")
     solver = potpourri3d.MeshSignedHeatSolver(task.vertices, task.faces)
     path: list[tuple[int, list[float]]] = [
@@ -177,7 +196,7 @@ def later_signed_heat(task: Task) -> float:
     solver.compute_distance([path])
     started = time.perf_counter()
     solver.compute_distance([path])
-    return time.perf_counter() - started
+    return [], time.perf_counter() - started
 
 
 def _positions(

@@ -11,14 +11,13 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.problem import build_problem
 
 from . import collections, renders, report
 from .evidence import Results
 from .measures import bending
 from .methods import METHODS
-from .peer_systems import SYSTEMS, Answer, SystemsProcess, Task, missing_packages
+from .peer_sizes import measured_sizes, sizes_section
+from .peer_systems import SYSTEMS, Answer, SystemsProcess, Task, missing_packages, task_on
 from .polylines import NearestPoints, misses
 from .samples import random_sets
 from .scale import Scale
@@ -83,6 +82,7 @@ def measure(scale: Scale) -> Results:
         "systems": systems,
         "missing": missing,
         "sets": sets,
+        "sizes": measured_sizes(scale, systems),
         "picture": _rendered(pictures, scale),
     }
 
@@ -98,20 +98,8 @@ def section(results: Results) -> str:
         f"({results['collection']}: {report.listed(names)}), visited by all in the same order. "
         "Systems that start from a path of edges get ours, on our split mesh. Seconds include "
         f"every system's preparation of the mesh.{missing}\n\n"
-        f"{_table(results)}\n\n{_findings(results)}\n\n{_shown_picture(results['picture'])}"
-    )
-
-
-def task_on(mesh: Mesh, points: IntArray) -> Task:
-    """What other systems are asked for through some vertices in the shortest order."""
-    problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
-    working, loop = problem.working, problem.loop
-    return Task(
-        working.vertices,
-        working.faces,
-        loop.vertices,
-        loop.control_vertices,
-        mesh.mean_edge_length,
+        f"{_table(results)}\n\n{_findings(results)}\n\n{sizes_section(results['sizes'])}\n\n"
+        f"{_shown_picture(results['picture'])}"
     )
 
 
