@@ -31,7 +31,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
     kept_meshes: IntProperty(
         name="Meshes Kept in Memory",
         description="Number of recently used meshes to keep in memory, so that further curves "
-        "on them are faster. Each mesh takes about a kilobyte per vertex",
+        "on them are faster. Each mesh takes some 400 bytes per vertex",
         default=KEPT_MESHES,
         min=0,
         max=64,
