@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
 from . import curve_record, designers
 from .curve_record import Asked
 from .messages import InputError, in_words
@@ -76,10 +77,19 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
     )
 
 
+def for_drawing(mesh_object, surface, points, asked: Asked) -> DesignRequest:
+    """A request for a curve that is drawn point by point: two points are joined by an open one."""
+    request = for_points(mesh_object, surface, points, "given", asked)
+    closed = asked.closed and len(points) >= FEWEST_CLOSED
+    return replace(request, options={**request.options, "closed": closed})
+
+
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
     """A request to design a curve again on the present surface, along the same course."""
     points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
-    request = for_points(mesh_object, surface, points, "given", asked)
+    if len(points) < FEWEST_OPEN:
+        raise InputError(curve_record.without_curve(curve_object))
+    request = for_drawing(mesh_object, surface, points, asked)
     start = None
     if asked.method == "NICMM" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.recall(curve_object, surface)

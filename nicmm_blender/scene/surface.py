@@ -19,6 +19,9 @@ from .messages import InputError
 FLAT = 1e-6
 """Least scale along an axis relative to the largest one, limited by single precision."""
 
+MODES_THAT_HIDE = {"EDIT", "SCULPT", "WEIGHT_PAINT"}
+"""Modes of the object in which hidden faces are not shown."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -35,7 +38,7 @@ class Surface:
     polygons : (F,) int array
         The face of the mesh that each triangle is a part of.
     hidden : (F,) bool array
-        Which triangles the user has hidden in Edit Mode.
+        Which triangles the user has hidden; in Object Mode all are shown.
     linear : (3, 3) float array
         The map from the local space to the other.
     placement : (4, 4) float array
@@ -95,7 +98,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
         loops = _array(triangles, "loops", 3, np.int32).astype(np.int64)
         polygons = _array(triangles, "polygon_index", 1, np.int32).astype(np.int64)
         hidden = np.zeros(len(faces), dtype=bool)
-        if mesh_object.mode == "EDIT":
+        if mesh_object.mode in MODES_THAT_HIDE:
             hidden = _array(mesh.polygons, "hide", 1, bool)[polygons]
         cage = trace(mesh_object, mesh, cage_mesh) if use_modifiers and traced else None
     linear = np.array(matrix.to_3x3(), dtype=np.float64)
