@@ -326,7 +326,10 @@ def live_between(blender: Blender) -> None:
     )
     rotation = "list(helper.area().spaces.active.region_3d.view_rotation)"
     turned = blender.do(f"value = {rotation}")
-    drag(blender, (region[0] - 60, region[1] + 100), 10, (4.0, 1.0))
+    gizmo = (region[0] - 52, region[1] + 112)
+    blender.move(gizmo)
+    time.sleep(HOLD)  # the gizmo is highlighted first
+    drag(blender, gizmo, 10, (4.0, 1.0))
     blender.mouse("mouseup", 1)
     time.sleep(1.0)
     check(blender.do(f"value = {rotation}") != turned, "the navigation gizmo turns the view")
@@ -436,6 +439,7 @@ def ridge(blender: Blender) -> None:
     """A tube whose centre line is hidden by a ridge, and views of other kinds."""
     step("A tube just over a ridge is met where it is seen")
     blender.do("helper.ridge()")
+    choose_tool(blender)
     blender.do("helper.look(0.0, -1.0, 0.25, 6.0)")
     blender.shot("13-ridge")
     name = blender.do("value = helper.curve().name")
