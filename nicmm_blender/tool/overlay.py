@@ -117,7 +117,7 @@ def _draw_lines() -> None:
     if mesh_object is None:
         return
     colours = _Colours(context)
-    nearer = _towards_the_eye(context.region_data, mesh_object, drawn)
+    nearer = _towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
     if len(drawn.line):
         colour = colours.problem if drawn.problem else colours.line
         _draw_line(context, nearer, _line_batch(drawn.line), colour)
@@ -125,6 +125,9 @@ def _draw_lines() -> None:
     if hit is not None and hit.kind is Kind.CURVE and _state.dragged is None:
         for line in picking.other_lines(context):
             if line.name == hit.name and len(line.positions) > 1:
+                nearer = _towards_the_eye(
+                    context.region_data, mesh_object, drawn.surface, line.radius
+                )
                 _draw_line(context, nearer, _batch(line.positions), colours.hover)
 
 
@@ -236,13 +239,13 @@ def _disc() -> np.ndarray:
 _DISC = _disc()
 
 
-def _towards_the_eye(region_3d, mesh_object, drawn: _Drawn):
+def _towards_the_eye(region_3d, mesh_object, surface, radius: float):
     """The model-view matrix, moved slightly towards the eye: lines lie in front of mesh and tube.
 
     In perspective it scales about the eye, so that no point moves on the screen.
     """
     world = mesh_object.matrix_world
-    step = (OFFSET * drawn.surface.diagonal + drawn.radius) * max(world.to_scale(), key=abs)
+    step = (OFFSET * surface.diagonal + radius) * max(world.to_scale(), key=abs)
     if region_3d.is_perspective:
         distance = (region_3d.view_matrix @ world.translation).length
         nearer = Matrix.Scale(1.0 - min(abs(step) / max(distance, abs(step)), 0.5), 4)

@@ -208,7 +208,7 @@ def click_places(blender: Blender, places, name: str = "Suzanne") -> list:
 
 def undo_and_redo(blender: Blender, states: list, why: str) -> None:
     """Undo one step at a time back to the first state, and redo, with the keys."""
-    blender.move(blender.do("value = helper.pixels([0, 0, 1.4])")[0])
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
     for expected in states[-2::-1]:
         blender.key("ctrl+z")
         blender.wait(f"helper.state() == {expected!r}", f"undo {why}")
@@ -273,7 +273,7 @@ def draw(blender: Blender) -> None:
     blender.mouse("mouseup", 1)
     blender.wait(f"helper.state() != {before!r}", "the dragged curve")
     after = state(blender)
-    blender.move(blender.do("value = helper.pixels([0, 0, 1.4])")[0])
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
     blender.key("ctrl+z")
     blender.wait(f"helper.state() == {before!r}", "undo of the drag")
     blender.key("ctrl+shift+z")
@@ -342,7 +342,7 @@ def live_between(blender: Blender) -> None:
     blender.wait(f"abs({smoothness} - 1.0) > 0.01", "the header changes the smoothness")
     blender.shot("6-header")
     after = state(blender)
-    blender.move(blender.do("value = helper.pixels([0, 0, 1.4])")[0])
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
     blender.key("ctrl+z")
     blender.wait(f"helper.state() == {before!r}", "undo of a setting")
     blender.key("ctrl+shift+z")
@@ -386,7 +386,7 @@ def picking(blender: Blender) -> None:
     step(
         "Enter ends the curve; a click on the mesh begins another, a click on a curve activates it"
     )
-    blender.move(blender.do("value = helper.pixels([0, 0, 1.4])")[0])
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
     first = blender.do("value = helper.curve().name")
     blender.key("Return")
     blender.wait("helper.curve() is None", "the end")
@@ -531,7 +531,7 @@ def convert(blender: Blender) -> None:
     blender.do("helper.look()")
     choose_tool(blender)
     click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
-    blender.move(blender.do("value = helper.pixels([0, 0, 1.4])")[0])
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
     blender.key("Return")
     blender.wait("helper.curve() is None", "the end")
     path = str(blender.folder / "again.blend")

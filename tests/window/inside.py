@@ -32,7 +32,13 @@ class Helper:
 
     @classmethod
     def region(cls):
-        return next(region for region in cls.area().regions if region.type == "WINDOW")
+        """The region of the viewport; in a quad view that of the perspective."""
+        view = cls.area().spaces.active.region_3d
+        return next(
+            region
+            for region in cls.area().regions
+            if region.type == "WINDOW" and region.data.as_pointer() == view.as_pointer()
+        )
 
     @classmethod
     def in_view(cls):
