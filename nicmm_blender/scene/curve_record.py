@@ -183,7 +183,9 @@ def _with_settings(curve_object):
     """The record of a curve, if its version is supported and its settings can be used."""
     record = curve_object[KEY]
     version = record.get("version", 0)
-    if isinstance(version, int | float) and version > VERSION:
+    if not isinstance(version, int):
+        _refuse(curve_object, f"its version is {version!r}")
+    if version > VERSION:
         raise InputError(
             f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
             "Update the extension to use it"

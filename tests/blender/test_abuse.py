@@ -120,6 +120,8 @@ class Abuse(RuleBasedStateMachine):
         try:
             if operator.poll():
                 operator(*(arguments or ("EXEC_DEFAULT", True)), **named)
+        except TypeError as error:  # a mode that this object does not have
+            assert "mode" in named and "not found in" in str(error), (self.done[-12:], str(error))
         except RuntimeError as error:
             assert "Traceback" not in str(error), (self.done[-12:], str(error))
         if str(operator).startswith("<function bpy.ops.nicmm") or "nicmm" in repr(operator):

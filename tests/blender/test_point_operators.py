@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.test_abuse import DAMAGES
 
 ROUNDING = 2e-6
 
@@ -265,6 +266,62 @@ def test_an_impossible_setting_is_explained(empty_scene, curve, sphere):
 def test_settings_of_what_is_no_curve(sphere):
     sphere.nicmm_settings.closed = False
     assert sphere.nicmm_settings.closed and sphere.nicmm_settings.radius == 0.0
+
+
+ANOTHER_MESH = 2
+"""The damage whose triangles are those of another mesh: the points are still known."""
+
+
+@pytest.mark.parametrize("number", [n for n in range(len(DAMAGES)) if n != ANOTHER_MESH])
+def test_a_damaged_record_gets_a_message(empty_scene, curve, places, number):
+    """Every operator and every reader explains it and changes nothing."""
+    DAMAGES[number](curve["nicmm_curve"])
+    before = repr(curve["nicmm_curve"].to_dict())
+    splines = [scenes.get(spline.points, "co", 4).tobytes() for spline in curve.data.splines]
+    words = (
+        "is damaged",
+        "newer version",
+        "is not in this scene",
+        "Make a mesh",
+        "no longer exist",
+    )
+    calls = (
+        ("add_point", {"position": places[0]}),
+        ("move_point", {"index": 1, "position": places[0]}),
+        ("remove_point", {"index": 1}),
+        ("convert_curve", {"output": "STICKY"}),
+    )
+    for name, arguments in calls:
+        text = (
+            refusal(name, curve=curve.name, **arguments)
+            if "index" in arguments
+            else refusal(name, **arguments)
+        )
+        assert any(each in text for each in words), (name, text)
+        assert "Traceback" not in text
+    for name in ("closed", "smoothness", "spline", "offset", "radius"):
+        getattr(curve.nicmm_settings, name)
+    curve.nicmm_settings.smoothness = 2.0
+    assert module(empty_scene, "operators.curve_settings").problem_of(curve)
+    assert repr(curve["nicmm_curve"].to_dict()) == before
+    assert splines == [
+        scenes.get(spline.points, "co", 4).tobytes() for spline in curve.data.splines
+    ]
+
+
+def test_a_record_of_another_mesh(curve, places):
+    DAMAGES[ANOTHER_MESH](curve["nicmm_curve"])
+    assert "no longer exist" in refusal("convert_curve", output="STICKY")
+    call("update_curves")
+    np.testing.assert_allclose(controls(curve), places, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("value", [5, "x", [1.0, 2.0]])
+def test_another_property_of_that_name_is_no_record(curve, value, sphere):
+    curve["nicmm_curve"] = value
+    assert "Make a" in refusal("remove_point")
+    assert curve.nicmm_settings.closed
+    assert "No curve was designed" in refusal("update_curves")
 
 
 # A drag, by the methods of the operator.

@@ -326,17 +326,23 @@ def live_between(blender: Blender) -> None:
     )
     rotation = "list(helper.area().spaces.active.region_3d.view_rotation)"
     turned = blender.do(f"value = {rotation}")
-    gizmo = (region[0] - 52, region[1] + 112)
-    blender.move(gizmo)
-    time.sleep(HOLD)  # the gizmo is highlighted first
-    drag(blender, gizmo, 10, (4.0, 1.0))
-    blender.mouse("mouseup", 1)
-    time.sleep(1.0)
-    check(blender.do(f"value = {rotation}") != turned, "the navigation gizmo turns the view")
+    gizmo = (region[0] - 55, region[1] + 115)
+    now = turned
+    for _ in range(3):  # the gizmo is highlighted first, which takes a redraw
+        for pixel in ((gizmo[0] - 1, gizmo[1]), gizmo):
+            blender.move(pixel)
+            time.sleep(HOLD)
+        drag(blender, gizmo, 10, (8.0, 3.0))
+        blender.mouse("mouseup", 1)
+        time.sleep(1.0)
+        now = blender.do(f"value = {rotation}")
+        if now != turned:
+            break
+    check(now != turned, "the navigation gizmo turns the view")
     blender.do("helper.look()")
     before = state(blender)
     smoothness = "helper.curve().nicmm_settings.smoothness"
-    field = (660, 62)
+    field = (150, 68)
     drag(blender, field, 12, (6.0, 0.0))
     blender.mouse("mouseup", 1)
     blender.wait(f"abs({smoothness} - 1.0) > 0.01", "the header changes the smoothness")
