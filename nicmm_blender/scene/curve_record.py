@@ -384,6 +384,8 @@ def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
 
+    if not len(surface.faces):
+        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
     points, positions = recall_controls(curve_object, surface)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
     lost = faces < 0
@@ -448,5 +450,7 @@ def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray,
     known = dict(zip(sides, candidates.tolist(), strict=True))
     keys = map(tuple, np.sort(corners, axis=1).tolist())
     found = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
+    if not len(faces):
+        return found, np.tile(np.arange(3), (len(found), 1))
     order = (faces[found][:, :, None] == corners[:, None, :]).argmax(axis=2)
     return found, order

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
-from . import curve_record, designers
+from . import curve_record, designers, shown_surfaces
 from .curve_record import Asked
 from .messages import InputError, in_words
 from .surface import Surface, group_weights, read
@@ -46,6 +46,8 @@ class DesignRequest:
     def check_unchanged(self) -> None:
         """Raise an error if the mesh has changed since it was read."""
         found = self.mesh_object()
+        if found and shown_surfaces.known(found, self.surface.with_modifiers) is self.surface:
+            return
         now = found and read(found, self.surface.with_modifiers, traced=False)
         if not now or not (
             np.array_equal(now.solved, self.surface.solved)

@@ -12,7 +12,10 @@ from ..scene.design_request import DesignRequest
 from ..scene.messages import in_words
 
 ITERATIONS = 3
-"""Iterations for a move, which take one or two frames."""
+"""Iterations for a move at most, which take one or two frames."""
+
+POINTS = 3000
+"""Points of the curve times iterations for a move: an iteration takes time for every point."""
 
 MOST_STEPS = 60
 """Steps after a move before the curve is designed from scratch; most need fewer than five."""
@@ -68,7 +71,8 @@ class LiveCurve:
         self.steps_left -= 1
         request, surface = self.request, self.request.surface
         designer = designers.designer_for(surface.solved, surface.faces)
-        bounds = {"order": "given", "max_iterations": ITERATIONS, "start": request.start}
+        iterations = min(max(POINTS // len(self.curve.faces), 1), ITERATIONS)
+        bounds = {"order": "given", "max_iterations": iterations, "start": request.start}
         try:
             design = designer.design(request.points, **bounds, **request.options)
         except nicmm.CurveError:

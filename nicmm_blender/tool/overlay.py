@@ -134,6 +134,7 @@ def _draw_lines() -> None:
 def _draw_line(context, matrix, batch, colour) -> None:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region, scale = context.region, context.preferences.system.ui_scale
+    hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_mask_set(False)
     with gpu.matrix.push_pop():
@@ -142,7 +143,7 @@ def _draw_line(context, matrix, batch, colour) -> None:
         shader.uniform_float("viewportSize", (region.width, region.height))
         for width, shade in ((LINE_WIDTH + 2.0 * OUTLINE_WIDTH, OUTLINE), (LINE_WIDTH, colour)):
             shader.uniform_float("lineWidth", width * scale)
-            for test, opacity in (("GREATER", HIDDEN), ("LESS_EQUAL", 1.0)):
+            for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", 1.0)):
                 gpu.state.depth_test_set(test)
                 shader.uniform_float("color", (*shade[:3], opacity))
                 batch.draw(shader)

@@ -225,9 +225,12 @@ class Abuse(RuleBasedStateMachine):
     def edit_curve(self):
         self.call(bpy.ops.nicmm.edit_curve)
 
-    @rule()
-    def design_curve(self):
-        self.call(bpy.ops.nicmm.design_curve)
+    @rule(first=NUMBERS)
+    def design_curve(self, first):
+        mesh = bpy.context.active_object
+        if mesh is not None and mesh.type == "MESH" and len(mesh.data.vertices):
+            vertices = [(first * step) % len(mesh.data.vertices) for step in (1, 3, 7, 11)]
+            self.call(bpy.ops.nicmm.design_curve, points=", ".join(map(str, vertices)))
 
     @rule(output=st.sampled_from(["CURVE", "STICKY", "REGION"]))
     def set_panel(self, output):

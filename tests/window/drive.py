@@ -530,6 +530,105 @@ def other_modes(blender: Blender) -> None:
         blender.do("helper.switch('Suzanne', 'OBJECT')")
 
 
+def keys(blender: Blender) -> None:
+    """The keymap editor, the Industry Compatible keymap, and Emulate 3 Button Mouse."""
+    step("The tool's keys are in the keymap editor, without letters")
+    found = blender.do(
+        "maps = bpy.context.window_manager.keyconfigs.user.keymaps\n"
+        "value = [[each.name, [[item.idname, item.type, item.value] for item in each.keymap_items]]"
+        " for each in maps if each.name.endswith('Surface Curve')]"
+    )
+    check(len(found) == 3, "a keymap for each mode")
+    for name, items in found:
+        check(len(items) == 5, f"five items in {name}")
+        check(not any(len(kind) == 1 for _, kind, _ in items), f"no letters in {name}")
+    for config in ("Industry_Compatible", "Blender"):
+        step(f"The keymap {config}")
+        blender.do(f"helper.keymap({config!r})")
+        blender.do("helper.suzanne()")
+        blender.do("helper.look()")
+        choose_tool(blender)
+        blender.do('bpy.ops.ed.undo_push(message="Start")')
+        states = click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
+        undo_and_redo(blender, states, f"with {config}")
+        drag(blender, pixel_of(blender, 2), 10, (1.0, -2.0))
+        blender.mouse("mouseup", 1)
+        blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
+        blender.click(pixel_of(blender, 3), "ctrl")
+        count_points(blender, 4)
+        blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+        blender.key("Return")
+        blender.wait("helper.curve() is None", "Enter")
+    step("Emulate 3 Button Mouse: Alt-drag turns the view")
+    blender.do("bpy.context.preferences.inputs.use_mouse_emulate_3_button = True")
+    before = state(blender)
+    rotation = "list(helper.area().spaces.active.region_3d.view_rotation)"
+    turned = blender.do(f"value = {rotation}")
+    (middle,) = blender.do("value = helper.pixels(helper.in_front([(0.0, 0.5)]))")
+    blender.move(middle)
+    blender.mouse("keydown", "alt")
+    time.sleep(HOLD)
+    drag(blender, middle, 10, (8.0, 3.0))
+    time.sleep(HOLD)
+    blender.mouse("mouseup", 1)
+    blender.mouse("keyup", "alt")
+    time.sleep(1.0)
+    check(blender.do(f"value = {rotation}") != turned, "the view is turned")
+    check(state(blender) == before, "no point is added")
+    blender.do("bpy.context.preferences.inputs.use_mouse_emulate_3_button = False")
+
+
+def large(blender: Blender) -> None:
+    """Moves on 126k faces, and the first clicks on 2M faces."""
+    step("126k faces: the moves of a drag")
+    print(f"   {blender.do('value = helper.suzanne(4)')} triangles")
+    blender.do("helper.look()")
+    choose_tool(blender)
+    click_places(blender, blender.do(f"value = helper.in_front({PLACES})"))
+    before = state(blender)
+    blender.do("helper.frames.clear()")
+    drag(blender, pixel_of(blender, DRAGGED), 40, (0.5, -1.5))
+    blender.mouse("mouseup", 1)
+    blender.wait(f"helper.state() != {before!r}", "the dragged curve")
+    report_moves(blender)
+
+    step("2M quads: the first clicks")
+    print(f"   {blender.do('value = helper.suzanne(6)')} triangles")
+    blender.do("helper.look()")
+    pixels = blender.do(f"value = helper.pixels(helper.in_front({PLACES}))")
+    time.sleep(10.0)  # drawn
+    for number, pixel in enumerate(pixels[:3], start=1):
+        blender.click(pixel)
+        gaps, started, shown = [], time.monotonic(), False
+        while blender.do("value = helper.count()") != number:
+            before = time.monotonic()
+            blender.do("pass")
+            gaps.append(time.monotonic() - before)
+            if not shown and number < 3 and time.monotonic() - started > 3.0:
+                shown = True
+                blender.shot(f"17-large-{number}")
+        print(
+            f"   click {number}: {time.monotonic() - started:.1f} s, the window blocked for at most "
+            f"{max(gaps, default=0.0):.1f} s"
+        )
+        time.sleep(0.6)
+    step("2M quads: Esc")
+    blender.do("helper.suzanne(6)")
+    pixels = blender.do(f"value = helper.pixels(helper.in_front({PLACES}))")
+    time.sleep(10.0)
+    blender.click(pixels[0])
+    count_points(blender, 1)
+    time.sleep(1.0)
+    blender.click(pixels[1])
+    time.sleep(3.0)
+    pressed = time.monotonic()
+    blender.key("Escape")
+    blender.wait("not helper.is_modal()", "Esc")
+    print(f"   Esc is heard within {time.monotonic() - pressed:.1f} s")
+    left = blender.do("value = helper.count()")
+    check(left == 1, f"Esc leaves the first point ({left})")
+
+
 def convert(blender: Blender) -> None:
     """Save, open again, edit again; every output."""
     step("Save, open again, and edit again")
@@ -597,6 +696,8 @@ PARTS = {
     "bodies": other_bodies,
     "modes": other_modes,
     "convert": convert,
+    "keys": keys,
+    "large": large,
 }
 """Parts of the drive; `live` and `picking` go on with the curve of `draw`."""
 

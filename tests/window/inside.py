@@ -45,15 +45,15 @@ class Helper:
         return bpy.context.temp_override(area=cls.area(), region=cls.region())
 
     @staticmethod
-    def suzanne():
-        """The monkey in the middle of an empty scene, 15,744 triangles, seen from the front."""
+    def suzanne(levels=2):
+        """The monkey in the middle of an empty scene; at two levels it has 15,744 triangles."""
         if bpy.context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         for found in list(bpy.data.objects):
             bpy.data.objects.remove(found)
         bpy.ops.mesh.primitive_monkey_add()
         monkey = bpy.context.active_object
-        monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        monkey.modifiers.new("Subdivision", "SUBSURF").levels = levels
         bpy.ops.object.modifier_apply(modifier="Subdivision")
         bpy.ops.object.shade_smooth()
         monkey.data.calc_loop_triangles()
@@ -305,6 +305,17 @@ class Helper:
                 ]
                 found.append((each.name, sorted(record.items()), splines))
         return hashlib.sha1(repr(found).encode()).hexdigest()
+
+    @staticmethod
+    def keymap(name):
+        """Choose a keymap of Blender's."""
+        bpy.utils.keyconfig_set(bpy.utils.preset_find(name, "keyconfig"))
+
+    @staticmethod
+    def is_modal():
+        """Whether an operator of the extension runs."""
+        running = bpy.context.window.modal_operators
+        return any(each.bl_idname.startswith("NICMM") for each in running)
 
     @staticmethod
     def tool():
