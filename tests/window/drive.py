@@ -608,8 +608,8 @@ def large(blender: Blender) -> None:
                 shown = True
                 blender.shot(f"17-large-{number}")
         print(
-            f"   click {number}: {time.monotonic() - started:.1f} s, the window blocked for at most "
-            f"{max(gaps, default=0.0):.1f} s"
+            f"   click {number}: {time.monotonic() - started:.1f} s, the window blocked for at "
+            f"most {max(gaps, default=0.0):.1f} s"
         )
         time.sleep(0.6)
     step("2M quads: Esc")
