@@ -172,7 +172,19 @@ class PointDrag:
     def _keep(self, context, requests: list, design):
         if design is not None:
             return self.finish(context, requests, [design])
-        return self.answer(context, requests)
+        # The points stay visible while a long computation goes on.
+        overlay.show_dragged(self._opened, self._points, self._opened.curve)
+        result = set()
+        try:
+            result = self.answer(context, requests)
+        finally:
+            if "RUNNING_MODAL" not in result:
+                overlay.show_dragged(None)
+        return result
+
+    def _tidy(self, context):
+        overlay.show_dragged(None)
+        super()._tidy(context)
 
     def _stop_scratch(self) -> None:
         if self._scratch is not None:

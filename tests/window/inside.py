@@ -312,6 +312,11 @@ class Helper:
         bpy.utils.keyconfig_set(bpy.utils.preset_find(name, "keyconfig"))
 
     @staticmethod
+    def forget():
+        """Forget what the core knows of meshes."""
+        import_module(f"{MODULE}.scene.designers").forget()
+
+    @staticmethod
     def is_modal():
         """Whether an operator of the extension runs."""
         running = bpy.context.window.modal_operators
