@@ -11,6 +11,7 @@ from . import command_line, preferences, settings
 from .interface import curve_list, map_rows, menus, panels
 from .operators import (
     convert_curve,
+    curve_settings,
     design_curve,
     live_update,
     long_solves,
@@ -18,19 +19,34 @@ from .operators import (
     turns,
     update_curves,
 )
-from .scene import designers
-from .tool import edit_operator, toolbar
+from .scene import designers, shown_surfaces
+from .tool import (
+    draw_operator,
+    edit_operator,
+    hover,
+    overlay,
+    picking,
+    point_operators,
+    toolbar,
+)
 
 MODULES = (
     preferences,
     settings,
+    shown_surfaces,
     turns,
     design_curve,
     convert_curve,
     update_curves,
     maps,
     live_update,
+    curve_settings,
     edit_operator,
+    point_operators,
+    draw_operator,
+    picking,
+    overlay,
+    hover,
     toolbar,
     curve_list,
     map_rows,

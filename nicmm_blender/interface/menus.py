@@ -6,6 +6,7 @@ import bpy
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
 from ..scene import curve_record
+from ..tool import modes
 from ..tool.edit_operator import NICMM_OT_edit_curve
 from . import icons
 
@@ -17,7 +18,12 @@ def draw_in_menu(menu, context) -> None:
 
 
 def draw_edit(layout, context) -> None:
-    """Draw the entry of the tool, named after what it does with the active object."""
+    """Draw the entry of the tool, named after what it does with the active object.
+
+    Not in Edit Mode, which the tool does not draw in.
+    """
+    if context.mode not in modes.TOOLS:
+        return
     is_curve = curve_record.has_record(context.active_object)
     text = "Edit Curve on Surface" if is_curve else "Draw Curve on Surface"
     layout.operator(NICMM_OT_edit_curve.bl_idname, text=text, icon=icons.EDIT)

@@ -4,9 +4,10 @@
 import bpy
 
 from .. import settings
-from ..operators import live_update
+from ..operators import curve_settings, live_update, maps
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
+from ..outputs import edited_curve
 from ..scene import curve_record
 from . import curve_list, icons, map_rows, menus
 
@@ -27,16 +28,29 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         properties = context.scene.nicmm_curves
         layout = self.layout
+        curve = edited_curve.active(context)
+        if curve is not None:
+            layout.label(text=curve.name, icon=icons.EDIT)
+            curve_settings.draw(layout, curve)
+            menus.draw_edit(layout, context)
+            if curve == context.active_object:
+                self._draw_conversion(layout, properties)
+            return
         settings.draw_course(layout, properties)
         settings.draw_output(layout, properties)
         operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
         for name in settings.PROPERTY_NAMES:
             setattr(operator, name, getattr(properties, name))
         menus.draw_edit(layout, context)
-        if curve_record.has_record(context.active_object):
-            convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=icons.CONVERT)
-            for name in settings.OutputProperties.__annotations__:
-                setattr(convert, name, getattr(properties, name))
+        if context.mode == "EDIT_MESH":
+            layout.label(text="The tool draws in Object Mode", icon="INFO")
+
+    def _draw_conversion(self, layout, properties) -> None:
+        layout.separator()
+        settings.draw_output(layout, properties)
+        convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=icons.CONVERT)
+        for name in settings.OutputProperties.__annotations__:
+            setattr(convert, name, getattr(properties, name))
 
 
 class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
@@ -50,7 +64,7 @@ class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
         return curve_record.mesh_of_context(context) is not None
 
     def draw(self, context):
-        properties = context.scene.nicmm_curves
+        properties = maps.settings_of(context)
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False

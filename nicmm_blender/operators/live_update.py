@@ -123,11 +123,13 @@ def _unnoticed():
 
 def _ask(designed, mesh_object, surfaces: dict) -> None:
     """Add a request for a curve if it is outdated; `surfaces` holds those read before."""
-    asked = curve_record.asked_of(designed)
     uid = designed.session_uid
     now = ""
-    key = mesh_object, asked.use_modifiers
     try:
+        asked = curve_record.asked_of(designed)
+        if not curve_record.has_curve(designed):  # a drawing with too few points
+            return
+        key = mesh_object, asked.use_modifiers
         if key not in surfaces:
             surfaces[key] = read(mesh_object, asked.use_modifiers, traced=False)
         surface = surfaces[key]

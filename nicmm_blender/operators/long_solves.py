@@ -45,6 +45,9 @@ class LongSolves:
     An answer is a design of the core or an error.
     """
 
+    has_handler = False
+    """Whether Blender already sends events to the operator."""
+
     def execute(self, context):
         return reporting(self, lambda: self._all_at_once(context))
 
@@ -76,20 +79,25 @@ class LongSolves:
 
     def _all_at_once(self, context):
         requests = self.requests(context)
-        with _pointer_progress(context) as progress:
+        with pointer_progress(context) as progress:
             answers = answer_all(requests, progress)
         return self.finish(context, requests, answers)
 
     def _begin(self, context):
-        self._requests = requests = self.requests(context)
+        return self.answer(context, self.requests(context))
+
+    def answer(self, context, requests: list):
+        """Answer requests at once or in time slices, then finish."""
+        self._requests = requests
         self._work = turns.Work(lambda progress: answer_all(requests, progress))
         if self._work.turn(preferences.patience()):
-            return self._end(context)
+            return self.finish(context, requests, self._work.result())
         self._partial, self._shown = PartialCurve(), None
         self._turn_ended = time.perf_counter()
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TURN, window=context.window)
-        window_manager.modal_handler_add(self)
+        if not self.has_handler:
+            window_manager.modal_handler_add(self)
         _running.append(self)
         self._show(context)
         return {"RUNNING_MODAL"}
@@ -180,7 +188,7 @@ def _cancelled(operator, message: str):
 
 
 @contextmanager
-def _pointer_progress(context):
+def pointer_progress(context):
     """Show progress at the mouse pointer; yield the progress function for the core."""
     window_manager = context.window_manager
     window_manager.progress_begin(0.0, 1.0)

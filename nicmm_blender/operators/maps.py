@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
+from ..outputs import edited_curve
 from ..scene import mesh_data
 from ..scene.messages import InputError
 from ..scene.selection import selected_vertices
@@ -92,7 +93,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         group = mesh_object.vertex_groups.new(name=NAMES[self.role])
         for vertex in np.flatnonzero(weights).tolist():
             group.add([vertex], float(weights[vertex]), "REPLACE")
-        setattr(context.scene.nicmm_curves, FIELDS[self.role], group.name)
+        setattr(settings_of(context), FIELDS[self.role], group.name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT" if self.show else mode)
         self.report({"INFO"}, f'Vertex group "{group.name}", {np.count_nonzero(weights)} vertices')
@@ -117,7 +118,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
 
     def _execute(self, context):
         mesh_object = mesh_data.mesh_object(context)
-        name = getattr(context.scene.nicmm_curves, FIELDS[self.role])
+        name = getattr(settings_of(context), FIELDS[self.role])
         if is_painting(context, mesh_object, name):
             _enter(context, mesh_object, "OBJECT")
             return {"FINISHED"}
@@ -130,6 +131,12 @@ class NICMM_OT_paint_map(bpy.types.Operator):
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT")
         return {"FINISHED"}
+
+
+def settings_of(context):
+    """The properties that name the maps: those of the active curve, or of the next one."""
+    curve = edited_curve.active(context)
+    return context.scene.nicmm_curves if curve is None else curve.nicmm_settings
 
 
 def is_painting(context, mesh_object, name: str) -> bool:

@@ -7,6 +7,14 @@ OBJECT_EDIT_OR_WEIGHTS = (
     {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"},
     "Switch to Object Mode, Edit Mode or Weight Paint",
 )
+TOOL = (
+    {"OBJECT", "SCULPT", "PAINT_WEIGHT"},
+    "Switch to Object Mode, Sculpt Mode or Weight Paint",
+)
+TOOL_OR_EDIT = (
+    {"OBJECT", "EDIT_MESH", "SCULPT", "PAINT_WEIGHT"},
+    "Switch to Object Mode, Edit Mode, Sculpt Mode or Weight Paint",
+)
 """Modes that an operator works in, and the message in other modes."""
 
 NO_MESH = "Make a mesh object active"

@@ -103,4 +103,4 @@ def _tolerance(surface, mesh, drawing: Drawing) -> float:
 
 
 def _core_mesh(surface):
-    return designers.designer_for(surface.solved, surface.faces).mesh
+    return designers.mesh_for(surface.solved, surface.faces)

@@ -46,6 +46,12 @@ def scale_of(made, surface) -> float:
     return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
 
 
+def scale_in_scene(made, mesh_object) -> float:
+    """The same without a surface; `mesh_object` is the parent."""
+    placement = np.array(mesh_object.matrix_world @ made.matrix_parent_inverse)[:3, :3]
+    return float(np.cbrt(abs(np.linalg.det(placement)))) or 1.0
+
+
 def in_its_space(made, points: np.ndarray) -> np.ndarray:
     """Points in the mesh's local space, (n, 3), in the space of a child."""
     if made.parent is None or made.matrix_parent_inverse == Matrix():

@@ -13,6 +13,9 @@ from . import sticky_nodes
 from .clean_curves import on_surface
 from .curve_object import adopt, in_its_space, scale_of
 
+RADIUS = "nicmm_radius"
+"""Property of a drawing without a curve."""
+
 
 def are_drawn_with_all_points() -> bool:
     """Whether Blender draws hair curves point by point, in the viewport and in EEVEE.
@@ -40,9 +43,14 @@ def write(made, surface, curves, drawing) -> None:
     """Replace the curves of a hair curves object; radii of its points stay."""
     data = made.data
     radii = _radii(data)
+    if not len(data.points):
+        radii = np.zeros(1), np.array([drawing.radius / scale_of(made, surface)])
     curves = on_surface(surface, curves, drawing)
     if len(data.curves):
         data.remove_curves()
+    if not curves:
+        data[RADIUS] = float(radii[1].max())
+        return
     data.add_curves([len(curve.faces) for curve in curves])
     faces = np.concatenate([curve.faces for curve in curves])
     barycentric = np.concatenate([curve.barycentric for curve in curves])
@@ -65,8 +73,19 @@ def write(made, surface, curves, drawing) -> None:
 
 
 def radius_of(data) -> float:
-    """The greatest radius of the points."""
-    return float(_radii(data)[1].max())
+    """The greatest radius of the points, or that of the curve before it lost them."""
+    return float(_radii(data)[1].max()) if len(data.points) else float(data.get(RADIUS, 0.0))
+
+
+def set_radius(data, radius: float) -> None:
+    """Scale the radii of the points to a greatest one."""
+    if not len(data.points):
+        data[RADIUS] = radius
+        return
+    shares, values = _radii(data)
+    greatest = float(values.max())
+    values = values * (radius / greatest) if greatest > 0.0 else np.full(len(shares), radius)
+    _set(data, "radius", "FLOAT", "POINT", values)
 
 
 def _radii(data) -> tuple[np.ndarray, np.ndarray]:

@@ -84,6 +84,16 @@ def redraw(drawn, surface, curves) -> None:
         curve_object.write_splines(drawn, splines(surface, curves, drawing))
 
 
+def show_unfinished(drawn, surface, curve) -> None:
+    """Show a curve that is being changed in an object, with all its points."""
+    kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
+    drawing = Drawing(EXACT, 0.0, kind["offset"])
+    if drawn.type == "CURVES":
+        sticky_curves.write(drawn, surface, [curve], drawing)
+    else:
+        curve_object.write_splines(drawn, splines(surface, [curve], drawing))
+
+
 def drawn_as(settings) -> dict:
     """The settings of a drawing that a record holds."""
     return {"spline": settings.spline, "offset": settings.offset}

@@ -15,12 +15,15 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import OPTIONS, Kind
-from . import designers, mesh_data
+from . import designers, mesh_data, record_check, shown_surfaces
 from .cage_trace import CagePlaces, places_of, points_at, with_own_cage
 from .messages import InputError
 from .surface import group_weights, read
 
 KEY = "nicmm_curve"
+KINDS = ("CURVE", "CURVES")
+"""Types of the objects that may have a record."""
+
 VERSION = 2
 """Version of the record's format. Records of release 0.1.0 have none and count as 0; those of
 version 1 know nothing of modifiers."""
@@ -103,7 +106,8 @@ def remember(
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
     `drawn` is None for an object of a version that drew all points. `controls` are the control
-    points as SurfacePoints of the core; by default those of the curves.
+    points as SurfacePoints of the core; by default those of the curves. A drawing with too few
+    points for a curve has no curves.
     """
     if controls is None:
         found = [curve.control_index[curve.control_index >= 0] for curve in curves]
@@ -125,10 +129,10 @@ def remember(
         "vertices": len(surface.local),
         "counts": [len(curve.faces) for curve in curves],
         "closed": [int(curve.closed) for curve in curves],
-        "corners": np.concatenate([surface.faces[c.faces] for c in curves]).ravel().tolist(),
-        "barycentric": np.concatenate([c.barycentric for c in curves]).ravel().tolist(),
+        "corners": _flat([surface.faces[curve.faces] for curve in curves]),
+        "barycentric": _flat([curve.barycentric for curve in curves]),
         "control_counts": [len(curve.control_index) for curve in curves],
-        "control_index": np.concatenate([c.control_index for c in curves]).tolist(),
+        "control_index": _flat([curve.control_index for curve in curves]),
         "control_corners": surface.faces[control_faces].ravel().tolist(),
         "control_barycentric": control_barycentric.ravel().tolist(),
         **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
@@ -137,6 +141,12 @@ def remember(
     }
     # Stored in the same data-block as the points, so that undo restores both together.
     curve_object.data[DESIGNED_ON] = digest(mesh_object, surface, asked)
+    shown_surfaces.note_change()
+
+
+def _flat(arrays: list) -> list:
+    """The values of arrays, one after another."""
+    return [value for array in arrays for value in array.ravel().tolist()]
 
 
 def digest(mesh_object, surface, asked: Asked) -> str:
@@ -163,25 +173,51 @@ def is_current(curve_object, now: str) -> bool:
 
 
 def _readable(curve_object):
-    """The record of a curve, if its version is supported."""
+    """The record of a curve, if its version is supported and its points fit together."""
+    record = _with_settings(curve_object)
+    _refuse(curve_object, record_check.problem_of(record))
+    return record
+
+
+def _with_settings(curve_object):
+    """The record of a curve, if its version is supported and its settings can be used."""
     record = curve_object[KEY]
-    if record.get("version", 0) > VERSION:
+    version = record.get("version", 0)
+    if not isinstance(version, int):
+        _refuse(curve_object, f"its version is {version!r}")
+    if version > VERSION:
         raise InputError(
             f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
             "Update the extension to use it"
         )
+    _refuse(curve_object, record_check.problem_of_settings(record, Asked))
     return record
+
+
+def _refuse(curve_object, problem: str) -> None:
+    if problem:
+        raise InputError(
+            f'The record of "{curve_object.name}" is damaged: {problem}. Undo, or delete the curve '
+            "and draw it again"
+        )
 
 
 def has_record(candidate) -> bool:
     """Whether an object is a designed curve."""
-    return candidate is not None and KEY in candidate
+    if candidate is None or candidate.type not in KINDS or KEY not in candidate:
+        return False
+    return record_check.is_group(candidate[KEY])
+
+
+def has_curve(curve_object) -> bool:
+    """Whether a designed curve has enough points for a curve."""
+    return len(_readable(curve_object)["counts"]) > 0
 
 
 def mesh_of(curve_object):
     """The mesh object that a curve was designed on, or None if it no longer exists."""
     found = curve_object[KEY].get("mesh")
-    return found if found is not None and found.type == "MESH" else None
+    return found if isinstance(found, bpy.types.Object) and found.type == "MESH" else None
 
 
 def present_mesh(context, curve_object):
@@ -229,7 +265,7 @@ def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
 
     Points whose triangle no longer exists are left out; a closed curve ends with its first point.
     """
-    record = curve_object[KEY]
+    record = _readable(curve_object)
     found = []
     for kind in ("control_", ""):
         names = (f"{kind}corners", f"{kind}barycentric")
@@ -239,15 +275,17 @@ def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
         there = faces >= 0
         found.append(surface.points(faces[there], barycentric[there]))
     points, line = found
-    if len(record["closed"]) == 1 and record["closed"][0]:
+    if len(record["closed"]) == 1 and record["closed"][0] and len(line):
         line = np.concatenate([line, line[:1]])
     return points, line
 
 
 def lies_on(curve_object, surface) -> bool:
-    """Whether all triangles of a curve still exist."""
-    record = curve_object[KEY]
-    return bool((_recalled(record, "corners", "barycentric", surface)[0] >= 0).all())
+    """Whether all triangles of a curve still exist; False if it has no curve yet."""
+    record = _readable(curve_object)
+    return len(record["counts"]) > 0 and bool(
+        (_recalled(record, "corners", "barycentric", surface)[0] >= 0).all()
+    )
 
 
 def designed_on(mesh_object) -> list:
@@ -258,9 +296,10 @@ def designed_on(mesh_object) -> list:
 
 def asked_of(curve_object) -> Asked:
     """The settings of a curve."""
-    stored = curve_object[KEY].get("asked")
+    record = _with_settings(curve_object)
+    stored = record.get("asked")
     if stored is None:  # from a version that did not record them
-        return Asked(closed=bool(curve_object[KEY]["closed"][0]), use_modifiers=False)
+        return Asked(closed=bool(record["closed"][0]), use_modifiers=False)
     before = {"use_modifiers": False}  # what versions did that did not record a setting
     return Asked(
         **{
@@ -272,8 +311,17 @@ def asked_of(curve_object) -> Asked:
 
 def drawn_as(curve_object) -> dict | None:
     """How a curve is drawn; None if a version made it that drew all points."""
-    found = curve_object[KEY].get("drawn")
+    found = _with_settings(curve_object).get("drawn")
     return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
+
+
+def without_curve(curve_object) -> str:
+    """What to do about a drawing that has too few points for a curve."""
+    count = len(_readable(curve_object)["control_corners"]) // 3
+    return (
+        f'"{curve_object.name}" has {count} control point{"" if count == 1 else "s"} and no curve '
+        "yet. Add points with the tool Surface Curve, or delete it"
+    )
 
 
 def surface_of(curve_object, mesh_object):
@@ -286,6 +334,8 @@ def recall(curve_object, surface) -> list:
     from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
+    if not len(record["counts"]):
+        raise InputError(without_curve(curve_object))
     faces, barycentric = _recalled(record, "corners", "barycentric", surface)
     if (faces < 0).any():
         raise InputError(
@@ -334,6 +384,8 @@ def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
 
+    if not len(surface.faces):
+        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
     points, positions = recall_controls(curve_object, surface)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
     lost = faces < 0
@@ -345,7 +397,7 @@ def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
             faces[lost], barycentric[lost] = there[lost], weights[lost]
     lost = faces < 0
     if lost.any():
-        mesh = designers.designer_for(surface.solved, surface.faces).mesh
+        mesh = designers.mesh_for(surface.solved, surface.faces)
         nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
     return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
@@ -390,8 +442,15 @@ def _recalled(record, corners_name: str, weights_name: str, surface):
 
 def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The triangle with the given vertices, or -1, and which of them each of its corners is."""
-    known = {key: face for face, key in enumerate(map(tuple, np.sort(faces, axis=1).tolist()))}
+    # Only a few of the triangles have no other vertices than these.
+    wanted = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
+    wanted[corners[corners < len(wanted)]] = True
+    candidates = np.flatnonzero(wanted[faces].all(axis=1))
+    sides = map(tuple, np.sort(faces[candidates], axis=1).tolist())
+    known = dict(zip(sides, candidates.tolist(), strict=True))
     keys = map(tuple, np.sort(corners, axis=1).tolist())
     found = np.array([known.get(key, -1) for key in keys], dtype=np.int64)
+    if not len(faces):
+        return found, np.tile(np.arange(3), (len(found), 1))
     order = (faces[found][:, :, None] == corners[:, None, :]).argmax(axis=2)
     return found, order

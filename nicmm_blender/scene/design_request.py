@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from . import curve_record, designers
+from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
+from . import curve_record, designers, shown_surfaces
 from .curve_record import Asked
 from .messages import InputError, in_words
 from .surface import Surface, group_weights, read
@@ -45,6 +46,8 @@ class DesignRequest:
     def check_unchanged(self) -> None:
         """Raise an error if the mesh has changed since it was read."""
         found = self.mesh_object()
+        if found and shown_surfaces.known(found, self.surface.with_modifiers) is self.surface:
+            return
         now = found and read(found, self.surface.with_modifiers, traced=False)
         if not now or not (
             np.array_equal(now.solved, self.surface.solved)
@@ -76,10 +79,19 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
     )
 
 
+def for_drawing(mesh_object, surface, points, asked: Asked) -> DesignRequest:
+    """A request for a curve that is drawn point by point: two points are joined by an open one."""
+    request = for_points(mesh_object, surface, points, "given", asked)
+    closed = asked.closed and len(points) >= FEWEST_CLOSED
+    return replace(request, options={**request.options, "closed": closed})
+
+
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
     """A request to design a curve again on the present surface, along the same course."""
     points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
-    request = for_points(mesh_object, surface, points, "given", asked)
+    if len(points) < FEWEST_OPEN:
+        raise InputError(curve_record.without_curve(curve_object))
+    request = for_drawing(mesh_object, surface, points, asked)
     start = None
     if asked.method == "NICMM" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.recall(curve_object, surface)

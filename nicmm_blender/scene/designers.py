@@ -5,6 +5,7 @@ The redo panel runs the operator again on the same mesh for every change of a se
 """
 
 import hashlib
+import weakref
 from contextlib import contextmanager
 
 import numpy as np
@@ -12,6 +13,11 @@ import numpy as np
 from .. import preferences
 
 _designers: dict = {}
+_in_use: dict = {}
+"""Those of work in time slices; only their meshes may be used."""
+
+_fingerprints: dict = {}
+"""Of the arrays that were asked for before, by their addresses."""
 
 
 def designer_for(vertices: np.ndarray, faces: np.ndarray):
@@ -31,20 +37,58 @@ def exclusive(vertices: np.ndarray, faces: np.ndarray):
     """
     fingerprint = _fingerprint(vertices, faces)
     designer = _taken(fingerprint, vertices, faces)
+    _in_use[fingerprint] = designer
     try:
         yield designer
     finally:
+        _in_use.pop(fingerprint, None)
         _keep(fingerprint, designer)
+
+
+def mesh_for(vertices: np.ndarray, faces: np.ndarray):
+    """The core's mesh of these arrays, also while a designer works on it."""
+    fingerprint = _fingerprint(vertices, faces)
+    if fingerprint in _in_use:
+        return _in_use[fingerprint].mesh
+    return designer_for(vertices, faces).mesh
+
+
+def is_prepared(vertices: np.ndarray, faces: np.ndarray) -> bool:
+    """Whether a ray can be cast at a mesh at once."""
+    fingerprint = _fingerprint(vertices, faces)
+    designer = _in_use.get(fingerprint) or _designers.get(fingerprint)
+    return designer is not None and "face_trees" in vars(designer.mesh)
+
+
+def prepare(vertices: np.ndarray, faces: np.ndarray, progress) -> bool:
+    """Compute what a ray needs; False if the progress function has cancelled it."""
+    from ...nicmm_core.progress import CancelledError, watched
+
+    try:
+        with watched(progress), exclusive(vertices, faces) as designer:
+            _ = designer.mesh.face_trees
+    except CancelledError:
+        return False
+    return True
 
 
 def forget() -> None:
     """Free the memory."""
     _designers.clear()
+    _fingerprints.clear()
 
 
 def _fingerprint(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+    """A hash of the arrays of a surface, which nobody changes."""
+    address = id(vertices), id(faces)
+    known = _fingerprints.get(address)
+    if known is not None and known[0]() is vertices and known[1]() is faces:
+        return known[2]
     digest = hashlib.blake2b(vertices.tobytes())
     digest.update(faces.tobytes())
+    for gone in [key for key, kept in _fingerprints.items() if kept[0]() is None]:
+        del _fingerprints[gone]
+    _fingerprints[address] = weakref.ref(vertices), weakref.ref(faces), digest.digest()
     return digest.digest()
 
 

@@ -126,7 +126,7 @@ def _nearest(surface: Surface, vertices: np.ndarray):
     found = surface.cage.vertices[vertices]
     before = surface.cage.positions[vertices] @ surface.linear.T
     wanted = np.where(found[:, None] >= 0, surface.solved[found], before)
-    mesh = designers.designer_for(surface.solved, surface.faces).mesh
+    mesh = designers.mesh_for(surface.solved, surface.faces)
     return nearest_points(mesh, wanted)[0]
 
 

@@ -22,6 +22,9 @@ from .vertex_weights import weights_on
 FLAT = 1e-6
 """Least scale along an axis relative to the largest one, limited by single precision."""
 
+MODES_THAT_HIDE = {"EDIT", "SCULPT", "WEIGHT_PAINT"}
+"""Modes of the object in which hidden faces are not shown."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -38,7 +41,7 @@ class Surface:
     polygons : (F,) int array
         The face of the mesh that each triangle is a part of.
     hidden : (F,) bool array
-        Which triangles the user has hidden in Edit Mode.
+        Which triangles the user has hidden; in Object Mode all are shown.
     linear : (3, 3) float array
         The map from the local space to the other.
     placement : (4, 4) float array
@@ -96,7 +99,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
         faces = mesh_arrays.corner_vertices(mesh).astype(np.int64)[loops]
         polygons = mesh_arrays.triangle_faces(mesh).astype(np.int64)
         hidden = np.zeros(len(faces), dtype=bool)
-        if mesh_object.mode == "EDIT":
+        if mesh_object.mode in MODES_THAT_HIDE:
             hidden = mesh_arrays.read(mesh.polygons, "hide", 1, bool)[polygons]
         cage = trace(mesh_object, mesh, loops, cage_mesh) if use_modifiers and traced else None
     linear = np.array(matrix.to_3x3(), dtype=np.float64)

@@ -1,25 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool in the toolbar of the 3D viewport, in Object Mode and in Edit Mode."""
+"""The tool in the toolbar of the 3D viewport, in the modes that it draws in."""
 
 import bpy
 
+from ..operators import curve_settings
+from ..outputs import edited_curve
 from ..scene import mesh_data
-from .edit_operator import NICMM_OT_edit_curve
+from . import modes
+from .draw_operator import NICMM_OT_draw_on_surface
+from .point_operators import NICMM_OT_end_curve
 
 ICON = "ops.curve.pen"
+LABEL = "Surface Curve"
 
 KEYMAP = (
+    (NICMM_OT_draw_on_surface.bl_idname, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
     (
-        NICMM_OT_edit_curve.bl_idname,
-        {"type": "LEFTMOUSE", "value": "PRESS"},
-        {"properties": [("at_mouse", True)]},
+        NICMM_OT_draw_on_surface.bl_idname,
+        {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
+        {"properties": [("remove", True)]},
     ),
+    (NICMM_OT_end_curve.bl_idname, {"type": "LEFTMOUSE", "value": "DOUBLE_CLICK"}, None),
+    (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
+    (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
+)
+"""No letters: Blender uses them. Items without Alt leave Emulate 3 Button Mouse alone."""
+
+HINTS = (
+    (("MOUSE_LMB",), "Add or Insert Point"),
+    (("MOUSE_LMB_DRAG",), "Move Point"),
+    (("EVENT_CTRL", "MOUSE_LMB"), "Remove Point"),
+    (("EVENT_RETURN",), "End Curve"),
 )
 
 
 class _SurfaceCurve:
     bl_space_type = "VIEW_3D"
-    bl_label = "Surface Curve"
+    bl_label = LABEL
     bl_description = (
         "Draw a curve on the surface of the active mesh point by point.\n"
         "Click on a designed curve to edit it"
@@ -30,7 +47,11 @@ class _SurfaceCurve:
 
     @staticmethod
     def draw_settings(context, layout, _tool):
-        """Draw the settings of a new curve in the header."""
+        """Draw the settings of the active curve in the header, or those of a new one."""
+        curve = edited_curve.active(context)
+        if curve is not None:
+            curve_settings.draw_in_header(layout, curve)
+            return
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness"):
             layout.prop(properties, name)
@@ -42,19 +63,41 @@ class _SurfaceCurve:
 
 class NICMM_WT_object(_SurfaceCurve, bpy.types.WorkSpaceTool):
     bl_context_mode = "OBJECT"
-    bl_idname = "nicmm.surface_curve"
+    bl_idname = modes.TOOLS["OBJECT"]
 
 
-class NICMM_WT_edit_mesh(_SurfaceCurve, bpy.types.WorkSpaceTool):
-    bl_context_mode = "EDIT_MESH"
-    bl_idname = "nicmm.surface_curve_edit_mesh"
+class NICMM_WT_sculpt(_SurfaceCurve, bpy.types.WorkSpaceTool):
+    bl_context_mode = "SCULPT"
+    bl_idname = modes.TOOLS["SCULPT"]
+
+
+class NICMM_WT_weights(_SurfaceCurve, bpy.types.WorkSpaceTool):
+    bl_context_mode = "PAINT_WEIGHT"
+    bl_idname = modes.TOOLS["PAINT_WEIGHT"]
+
+
+TOOLS = (NICMM_WT_object, NICMM_WT_sculpt, NICMM_WT_weights)
+
+
+def draw_hints(header, context) -> None:
+    """Draw the tool's mouse buttons and keys at the start of the status bar."""
+    if not modes.is_tool_active(context):
+        return
+    row = header.layout.row(align=False)
+    for icons, text in HINTS:
+        part = row.row(align=True)
+        for icon in icons[:-1]:
+            part.label(text="", icon=icon)
+        part.label(text=text, icon=icons[-1])
 
 
 def register() -> None:
-    bpy.utils.register_tool(NICMM_WT_object, separator=True)
-    bpy.utils.register_tool(NICMM_WT_edit_mesh, separator=True)
+    for tool in TOOLS:
+        bpy.utils.register_tool(tool, separator=True)
+    bpy.types.STATUSBAR_HT_header.prepend(draw_hints)
 
 
 def unregister() -> None:
-    bpy.utils.unregister_tool(NICMM_WT_edit_mesh)
-    bpy.utils.unregister_tool(NICMM_WT_object)
+    bpy.types.STATUSBAR_HT_header.remove(draw_hints)
+    for tool in reversed(TOOLS):
+        bpy.utils.unregister_tool(tool)

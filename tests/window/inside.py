@@ -6,6 +6,7 @@ thread. The result or the error of each is written beside it as JSON. Mouse and 
 outside, as by a user.
 """
 
+import hashlib
 import json
 import sys
 import time
@@ -31,20 +32,28 @@ class Helper:
 
     @classmethod
     def region(cls):
-        return next(region for region in cls.area().regions if region.type == "WINDOW")
+        """The region of the viewport; in a quad view that of the perspective."""
+        view = cls.area().spaces.active.region_3d
+        return next(
+            region
+            for region in cls.area().regions
+            if region.type == "WINDOW" and region.data.as_pointer() == view.as_pointer()
+        )
 
     @classmethod
     def in_view(cls):
         return bpy.context.temp_override(area=cls.area(), region=cls.region())
 
     @staticmethod
-    def suzanne():
-        """The monkey in the middle of an empty scene, 15,744 triangles, seen from the front."""
+    def suzanne(levels=2):
+        """The monkey in the middle of an empty scene; at two levels it has 15,744 triangles."""
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
         for found in list(bpy.data.objects):
             bpy.data.objects.remove(found)
         bpy.ops.mesh.primitive_monkey_add()
         monkey = bpy.context.active_object
-        monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        monkey.modifiers.new("Subdivision", "SUBSURF").levels = levels
         bpy.ops.object.modifier_apply(modifier="Subdivision")
         bpy.ops.object.shade_smooth()
         monkey.data.calc_loop_triangles()
@@ -63,12 +72,12 @@ class Helper:
         view.update()
 
     @classmethod
-    def pixels(cls, places):
+    def pixels(cls, places, name="Suzanne"):
         """Pixels of the screen, from its top left, of positions in the monkey's local space."""
         from bpy_extras.view3d_utils import location_3d_to_region_2d
 
         region = cls.region()
-        monkey = bpy.data.objects["Suzanne"]
+        monkey = bpy.data.objects[name]
         found = []
         for place in np.atleast_2d(places).tolist():
             flat = location_3d_to_region_2d(
@@ -114,6 +123,89 @@ class Helper:
             posed.keyframe_insert("rotation_euler", frame=frame)
         bpy.context.scene.frame_set(8)
         Helper.switch("Suzanne", "OBJECT")
+
+    @classmethod
+    def body(cls, kind):
+        """Suzanne under modifiers, active in Object Mode."""
+        if kind == "posed":
+            cls.figure()
+            return
+        for found in list(bpy.data.objects):
+            bpy.data.objects.remove(found)
+        bpy.ops.mesh.primitive_monkey_add()
+        monkey = bpy.context.active_object
+        bpy.ops.object.shade_smooth()
+        if kind == "mirrored":
+            import bmesh
+
+            edited = bmesh.new()
+            edited.from_mesh(monkey.data)
+            gone = [vertex for vertex in edited.verts if vertex.co.x < -1e-5]
+            bmesh.ops.delete(edited, geom=gone, context="VERTS")
+            edited.to_mesh(monkey.data)
+            edited.free()
+            monkey.modifiers.new("Mirror", "MIRROR")
+        monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+
+    @staticmethod
+    def activate():
+        """Make the first designed curve active."""
+        found = next(each for each in bpy.data.objects if "nicmm_curve" in each)
+        Helper.switch(found.name, "OBJECT")
+
+    @staticmethod
+    def activate_mesh():
+        Helper.switch("Suzanne", "OBJECT")
+
+    @staticmethod
+    def cube():
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(1.9, 0.0, 0.9))
+
+    @staticmethod
+    def shape(name):
+        """A hash of the vertices of a mesh."""
+        mesh = bpy.data.objects[name].data
+        values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        mesh.vertices.foreach_get("co", values)
+        return hashlib.sha1(values.tobytes()).hexdigest()
+
+    @staticmethod
+    def ridge():
+        """A roof, with a thick curve on its far side just below the ridge."""
+        for found in list(bpy.data.objects):
+            bpy.data.objects.remove(found)
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=2.0)
+        roof = bpy.context.active_object
+        roof.name = "Ridge"
+        for vertex in roof.data.vertices:
+            vertex.co.z = 1.0 - abs(vertex.co.y)
+        places = [roof.closest_point_on_mesh((x, 0.04, 0.96))[1] for x in (-0.7, 0.0, 0.7)]
+        points = [{"name": "", "position": place} for place in places]
+        bpy.ops.nicmm.edit_curve(points=points, closed=False, radius=0.08)
+
+    @staticmethod
+    def top_of_tube():
+        """A place on the tube that the viewport shows, in the local space of the roof."""
+        return [[0.2, 0.0, 1.02]]
+
+    @classmethod
+    def camera(cls):
+        data = bpy.data.cameras.new("Camera")
+        camera = bpy.data.objects.new("Camera", data)
+        bpy.context.scene.collection.objects.link(camera)
+        camera.location, camera.rotation_euler = (0.3, -5.0, 0.8), (1.42, 0.0, 0.06)
+        bpy.context.scene.camera = camera
+        cls.area().spaces.active.region_3d.view_perspective = "CAMERA"
+
+    @classmethod
+    def local_view(cls):
+        with cls.in_view():
+            bpy.ops.view3d.localview()
+
+    @classmethod
+    def quad_view(cls):
+        with cls.in_view():
+            bpy.ops.screen.region_quadview()
 
     @staticmethod
     def switch(name, mode):
@@ -180,11 +272,62 @@ class Helper:
         return bpy.app.timers.is_registered(live.tick)
 
     @staticmethod
-    def session():
-        """The session of the running tool, or None."""
-        return Helper.running[0]._opened.session if Helper.running else None
+    def curve():
+        """The active designed curve, or None."""
+        return import_module(f"{MODULE}.outputs.edited_curve").active(bpy.context)
 
-    running: list = []
+    @classmethod
+    def count(cls):
+        """Control points of the active curve; -1 without one."""
+        return len(cls.places()) if cls.curve() else -1
+
+    @classmethod
+    def places(cls):
+        """Control points of the active curve in the mesh's local space."""
+        return np.array(cls.curve()["nicmm_curve"]["control_positions"]).reshape(-1, 3).tolist()
+
+    @classmethod
+    def line(cls):
+        """Points of the active curve object."""
+        splines = cls.curve().data.splines
+        return [list(point.co[:3]) for spline in splines for point in spline.points]
+
+    @classmethod
+    def state(cls):
+        """A hash of everything that a designed curve consists of, for all curves."""
+        found = []
+        for each in sorted(bpy.data.objects, key=lambda each: each.name):
+            if "nicmm_curve" in each:
+                record = each["nicmm_curve"].to_dict()
+                record["mesh"] = record["mesh"].name
+                splines = [
+                    [list(point.co[:]) for point in spline.points] for spline in each.data.splines
+                ]
+                found.append((each.name, sorted(record.items()), splines))
+        return hashlib.sha1(repr(found).encode()).hexdigest()
+
+    @staticmethod
+    def keymap(name):
+        """Choose a keymap of Blender's."""
+        bpy.utils.keyconfig_set(bpy.utils.preset_find(name, "keyconfig"))
+
+    @staticmethod
+    def forget():
+        """Forget what the core knows of meshes."""
+        import_module(f"{MODULE}.scene.designers").forget()
+
+    @staticmethod
+    def is_modal():
+        """Whether an operator of the extension runs."""
+        running = bpy.context.window.modal_operators
+        return any(each.bl_idname.startswith("NICMM") for each in running)
+
+    @staticmethod
+    def tool():
+        """The tool of the present mode."""
+        context = bpy.context
+        found = context.workspace.tools.from_space_view3d_mode(context.mode, create=False)
+        return "" if found is None else found.idname
 
 
 def _vector(place):
@@ -194,27 +337,18 @@ def _vector(place):
 
 
 def watch_tool():
-    """Measure every event of the tool, and store the running operator."""
-    operator = import_module(f"{MODULE}.tool.edit_operator").NICMM_OT_edit_curve
-    modal, invoke = operator.modal, operator.invoke
+    """Measure every event of a drag: its type, and milliseconds of CPU of Blender's thread."""
+    drag = import_module(f"{MODULE}.tool.point_drag").PointDrag
+    modal = drag._modal
 
-    def watched_invoke(self, context, event):
-        result = invoke(self, context, event)
-        if "RUNNING_MODAL" in result:
-            Helper.running[:] = [self]
-        return result
-
-    def watched_modal(self, context, event):
-        waiting = self._opened.session.waiting
+    def watched(self, context, event):
+        waiting = self._live is not None and self._live.waiting
         before = time.thread_time()  # Blender draws in other threads
         result = modal(self, context, event)
-        spent = 1e3 * (time.thread_time() - before)
-        Helper.frames.append([event.type, self._grabbed is not None, waiting, spent])
-        if result & {"FINISHED", "CANCELLED"}:
-            Helper.running.clear()
+        Helper.frames.append([event.type, waiting, 1e3 * (time.thread_time() - before)])
         return result
 
-    operator.invoke, operator.modal = watched_invoke, watched_modal
+    drag._modal = watched
 
 
 def answer():

@@ -62,15 +62,13 @@ def drive(blender: Blender, idle: float) -> None:
     places = blender.do(f"value = helper.shown_in_front({PLACES})")
     for number, pixel in enumerate(blender.do(f"value = helper.pixels({places})"), start=1):
         blender.click(pixel)
-        blender.wait(
-            f"helper.session() and len(helper.session().points) == {number}", f"point {number}"
-        )
-    blender.wait("helper.session().idle", "the curve")
+        blender.wait(f"helper.count() == {number}", f"point {number}")
+        time.sleep(0.6)  # no double click
     visible = "all(each.show_viewport for each in bpy.data.objects['Suzanne'].modifiers)"
     check(blender.do(f"value = {visible}"), "modifiers stay visible")
     blender.shot("live-2-drawn")
     blender.key("Return")
-    blender.wait("any(o.type == 'CURVE' for o in bpy.data.objects) and not helper.running", "keep")
+    blender.wait("helper.curve() is None", "the end")
     away = blender.do("value = helper.away()")
     check(away < 1e-6, f"the kept curve is on the shown surface ({away} diagonals)")
     blender.shot("live-3-kept")

@@ -21,13 +21,14 @@ class View:
 
     `perspective` is the (4, 4) matrix from the object's local space to clip space, `size` the
     region's width and height in pixels; `surface` is the `surface.Surface` and `mesh` the
-    core's mesh of them.
+    core's mesh of them. With `xray` nothing hides anything.
     """
 
     perspective: np.ndarray
     size: np.ndarray
     surface: object
     mesh: object
+    xray: bool = False
 
     def project(self, positions: np.ndarray) -> np.ndarray:
         """Pixels of positions, (n, 2); NaN if they are behind the eye."""
@@ -36,16 +37,25 @@ class View:
         depth = np.where(behind, np.nan, clip[:, 3])
         return (clip[:, :2] / depth[:, None] + 1.0) * 0.5 * self.size
 
-    def ray(self, pixel) -> tuple[np.ndarray, np.ndarray]:
-        """The near end of a pixel's line of sight in the view, and the vector to its far end."""
+    def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Near ends of the lines of sight of pixels, (n, 2), and vectors to their far ends."""
         inverse = np.linalg.inv(self.perspective)
-        flat = 2.0 * np.asarray(pixel, dtype=np.float64) / self.size - 1.0
-        ends = np.array([[*flat, -1.0, 1.0], [*flat, 1.0, 1.0]]) @ inverse.T
-        near, far = ends[:, :3] / ends[:, 3:]
+        flat = 2.0 * np.asarray(pixels, dtype=np.float64) / self.size - 1.0
+        ends = []
+        for depth in (-1.0, 1.0):
+            clip = np.concatenate([flat, np.tile([depth, 1.0], (len(flat), 1))], axis=1)
+            there = clip @ inverse.T
+            ends.append(there[:, :3] / there[:, 3:])
+        near, far = ends
         return near, far - near
 
-    def place_at(self, pixel) -> tuple[int, np.ndarray] | None:
-        """Face and barycentrics of the surface under a pixel; None off the mesh."""
+    def ray(self, pixel) -> tuple[np.ndarray, np.ndarray]:
+        """The near end of a pixel's line of sight in the view, and the vector to its far end."""
+        (near,), (direction,) = self.rays(np.asarray(pixel, dtype=np.float64)[None])
+        return near, direction
+
+    def place_at(self, pixel):
+        """The surface under a pixel as a point of the core, or None off the mesh."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
         origin, direction = (vector[None] @ self.surface.linear.T for vector in self.ray(pixel))
@@ -53,21 +63,23 @@ class View:
             points, along = first_hits(self.mesh, origin, direction)
             face = int(points.faces[0])
             if face < 0 or not self.surface.hidden[face]:
-                return None if face < 0 else (face, points.barycentric[0])
+                return None if face < 0 else points
             # Behind the hidden face; each step passes it by more than rounding.
             origin = origin + (along[0] + BEHIND) * direction
             direction = direction * max(1.0 - along[0] - BEHIND, 0.0)
 
     def visible(self, positions: np.ndarray) -> np.ndarray:
-        """Which positions are not hidden by the mesh, (n,)."""
+        """Which positions are in view and not hidden by the mesh, (n,)."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
         if not len(positions):
             return np.zeros(0, dtype=bool)
         pixels = self.project(positions)
         seen = np.isfinite(pixels).all(axis=1)
-        origins = np.array([self.ray(pixel)[0] for pixel in np.where(seen[:, None], pixels, 0.0)])
-        directions = positions - origins
+        if self.xray:
+            return seen
+        origins, _ = self.rays(np.where(seen[:, None], pixels, 0.0))
+        directions = np.where(seen[:, None], positions, origins) - origins
         lengths = np.linalg.norm(directions, axis=1)
         linear = self.surface.linear.T
         _, along = first_hits(self.mesh, origins @ linear, directions @ linear)
@@ -81,27 +93,54 @@ class View:
         near = near[self.visible(positions[near])]
         return int(near[away[near].argmin()]) if len(near) else None
 
-    def nearest_on_line(self, pixel, line: np.ndarray, reach: float) -> tuple[int, float] | None:
+    def nearest_on_line(
+        self, pixel, line: np.ndarray, reach: float, radius: float = 0.0
+    ) -> tuple[int, float] | None:
         """The segment of a polyline, (n, 3), nearest to a pixel, and the fraction along it.
 
-        None if no visible part is within reach.
+        None if no visible part is within reach. The line may have a radius: a tube is seen where
+        the surface of the tube is, also if the line is hidden.
         """
+        if len(line) < 2:
+            return None
         flat = self.project(line)
         start, step = flat[:-1], np.diff(flat, axis=0)
         squared = np.maximum((step * step).sum(axis=1), np.finfo(float).tiny)
         share = np.clip(((pixel - start) * step).sum(axis=1) / squared, 0.0, 1.0)
         away = np.linalg.norm(start + share[:, None] * step - pixel, axis=1)
-        near = np.flatnonzero(away <= reach)
+        near = np.flatnonzero(away <= np.maximum(reach, self._in_pixels(line[:-1], radius)))
         if len(near):
             at = share[near][:, None]
-            near = near[self.visible((1.0 - at) * line[near] + at * line[near + 1])]
+            centres = (1.0 - at) * line[near] + at * line[near + 1]
+            seen = self.visible(centres)
+            if radius > 0.0 and not seen.all():
+                seen |= self.visible(self._towards(pixel, centres, radius))
+            near = near[seen]
         if not len(near):
             return None
         best = int(near[away[near].argmin()])
         return best, float(share[best])
 
+    def _in_pixels(self, positions: np.ndarray, radius: float) -> np.ndarray:
+        """A length across the view at positions, in pixels, (n,)."""
+        depth = positions @ self.perspective[3, :3] + self.perspective[3, 3]
+        across = 0.5 * self.size[0] * np.linalg.norm(self.perspective[0, :3])
+        return radius * across / np.maximum(depth, np.finfo(float).tiny)
 
-def view_of(region, region_3d, mesh_object, surface, mesh) -> View:
+    def _towards(self, pixel, centres: np.ndarray, radius: float) -> np.ndarray:
+        """Where spheres about centres are nearest to the eye on the line of sight of a pixel."""
+        origin, direction = self.ray(pixel)
+        direction = direction / np.linalg.norm(direction)
+        along = (centres - origin) @ direction
+        across = origin + along[:, None] * direction - centres
+        away = np.linalg.norm(across, axis=1)
+        across *= np.minimum(1.0, radius / np.maximum(away, np.finfo(float).tiny))[:, None]
+        depth = np.sqrt(np.maximum(radius**2 - np.minimum(away, radius) ** 2, 0.0))
+        return centres + across - depth[:, None] * direction
+
+
+def view_of(region, region_3d, mesh_object, surface, mesh, xray: bool = False) -> View:
     """The view of a viewport's region."""
     perspective = np.array(region_3d.perspective_matrix @ mesh_object.matrix_world)
-    return View(perspective, np.array([region.width, region.height], float), surface, mesh)
+    size = np.array([region.width, region.height], float)
+    return View(perspective, size, surface, mesh, xray)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings of a designed curve as properties of its object, which take effect at once.
+
+They are read from the record of the curve. A change designs the curve again; if that is impossible,
+the curve and its settings stay, and the reason is shown below them.
+"""
+
+import functools
+from dataclasses import replace
+
+import bpy
+from bpy.props import PointerProperty
+
+from .. import settings
+from ..outputs import curve_object, edited_curve, sticky_curves, writing
+from ..scene import curve_record, shown_surfaces
+from ..scene.messages import InputError
+from .long_solves import answer_all
+
+COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
+DRAWING = ("spline", "offset")
+
+_problems: dict = {}
+"""Messages by the session_uid of the curve."""
+
+
+def problem_of(curve) -> str:
+    """Why the last change of a curve's settings was impossible; may be empty."""
+    return _problems.get(curve.session_uid, "")
+
+
+def _read(group, name: str, default):
+    """A setting of a curve, or the default if its record cannot be read."""
+    curve = group.id_data
+    if not curve_record.has_record(curve):
+        return default
+    try:
+        if name in DRAWING:
+            drawn = curve_record.drawn_as(curve)
+            return default if drawn is None else drawn[name]
+        return getattr(curve_record.asked_of(curve), name)
+    except InputError:
+        return default
+
+
+def _write(group, name: str, value) -> None:
+    """Change a setting of a curve, or note why that is impossible."""
+    from ... import nicmm_core as nicmm
+
+    curve = group.id_data
+    if not curve_record.has_record(curve):
+        return
+    try:
+        _change(curve, name, value)
+    except (InputError, nicmm.NicmmError, ImportError) as error:
+        _problems[curve.session_uid] = str(error)
+    else:
+        _problems.pop(curve.session_uid, None)
+
+
+def _change(curve, name: str, value) -> None:
+    context = bpy.context
+    if name == "radius":
+        writing.check_replaceable(curve)
+        _set_radius(context, curve, value)
+        return
+    asked = curve_record.asked_of(curve)
+    if name in DRAWING:
+        opened = edited_curve.opened(context, curve)
+        drawn = curve_record.drawn_as(curve) or {"spline": "EXACT", "offset": 0.0}
+        curves = curve_record.recall(curve, opened.surface) if _has_curve(curve) else []
+        record = curve[curve_record.KEY]
+        record["drawn"] = {**drawn, name: value}
+        writing.redraw(curve, opened.surface, curves)
+        shown_surfaces.note_change()
+        return
+    wanted = replace(asked, **{name: value})
+    opened = edited_curve.opened(context, curve, wanted, keeps_course=True)
+    requests = edited_curve.request(opened, opened.points)
+    curves = edited_curve.curves_of(answer_all(requests, lambda _fraction, _points: True))
+    edited_curve.write(context, opened, opened.points, curves, None)
+
+
+def _has_curve(curve) -> bool:
+    return curve_record.has_curve(curve)
+
+
+def _get_radius(group) -> float:
+    curve = group.id_data
+    mesh_object = curve_record.mesh_of(curve) if curve_record.has_record(curve) else None
+    if mesh_object is None:
+        return 0.0
+    return _own_radius(curve) * curve_object.scale_in_scene(curve, mesh_object)
+
+
+def _own_radius(curve) -> float:
+    if curve.type == "CURVES":
+        return sticky_curves.radius_of(curve.data)
+    return curve.data.bevel_depth
+
+
+def _set_radius(context, curve, value: float) -> None:
+    mesh_object = curve_record.present_mesh(context, curve)
+    radius = value / curve_object.scale_in_scene(curve, mesh_object)
+    if curve.type == "CURVES":
+        sticky_curves.set_radius(curve.data, radius)
+    else:
+        curve.data.bevel_depth = radius
+    curve.data.update_tag()
+    shown_surfaces.note_change()
+
+
+def _property(name: str, given):
+    """The property of a setting, read from the record and written to it."""
+    words = {**given.keywords}
+    default = words.get("default", "")
+    get, put = functools.partial(_read, name=name, default=default), _setter(name)
+    if "items" in words:
+        names = [item[0] for item in words["items"]]
+        return given.function(
+            **words,
+            get=lambda group: names.index(get(group)),
+            set=lambda group, number: put(group, names[number]),
+        )
+    return given.function(**words, get=lambda group: get(group), set=put)
+
+
+def _setter(name: str):
+    return lambda group, value: _write(group, name, value)
+
+
+def _radius_property():
+    words = dict(settings.OutputProperties.__annotations__["radius"].keywords)
+    words["description"] = "Radius of the curve; zero gives a line"
+    return bpy.props.FloatProperty(
+        **words, get=_get_radius, set=lambda group, value: _write(group, "radius", value)
+    )
+
+
+_GIVEN = settings.EditingProperties.__annotations__ | settings.OutputProperties.__annotations__
+
+
+class NICMM_PG_curve_settings(bpy.types.PropertyGroup):
+    """Settings of a designed curve; a change designs it again"""
+
+    __annotations__ = {  # noqa: RUF012 - as Blender reads it
+        **{name: _property(name, _GIVEN[name]) for name in (*COURSE, *DRAWING)},
+        "radius": _radius_property(),
+    }
+
+
+def draw_in_header(layout, curve) -> None:
+    """Draw the settings that are changed most while drawing."""
+    values = curve.nicmm_settings
+    mesh_object = curve_record.mesh_of(curve)
+    layout.prop(values, "closed")
+    layout.prop(values, "smoothness")
+    if mesh_object is not None:
+        for name in edited_curve.MAPS:
+            layout.prop_search(values, name, mesh_object, "vertex_groups")
+    _draw_problem(layout, curve)
+
+
+def draw(layout, curve) -> None:
+    """Draw the settings of a curve, without its maps."""
+    values = curve.nicmm_settings
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for name in ("closed", "smoothness", "use_modifiers"):
+        layout.prop(values, name)
+    for name in ("spline", "radius", "offset"):
+        layout.prop(values, name)
+    _draw_problem(layout, curve)
+
+
+def _draw_problem(layout, curve) -> None:
+    if problem := problem_of(curve):
+        layout.label(text=problem, icon="ERROR")
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_PG_curve_settings)
+    bpy.types.Object.nicmm_settings = PointerProperty(type=NICMM_PG_curve_settings)
+
+
+def unregister() -> None:
+    _problems.clear()
+    del bpy.types.Object.nicmm_settings
+    bpy.utils.unregister_class(NICMM_PG_curve_settings)

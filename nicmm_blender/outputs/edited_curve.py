@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes the control points and settings of a designed curve: opens, designs and writes it.
+
+It holds no Blender objects, since undo replaces them.
+"""
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...nicmm_core.options import FEWEST_OPEN
+from ..scene import curve_record, design_request, mesh_data, shown_surfaces
+from ..scene.curve_record import Asked
+from ..scene.messages import InputError
+from ..scene.surface import Surface, shown_beyond_the_cage
+from . import curve_object, writing
+
+MAPS = ("obstacle_group", "alignment_group")
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A curve on the present surface, or a new one.
+
+    Attributes
+    ----------
+    curve_uid, mesh_uid : int
+        The session_uid of the objects; 0 for a new curve.
+    surface : Surface
+    asked : Asked
+    points : SurfacePoints of the core
+        The control points.
+    curve : SurfaceCurve of the core, or None
+        None if it has to be designed again.
+    remark : str
+        For the user; may be empty.
+    """
+
+    curve_uid: int
+    mesh_uid: int
+    surface: Surface
+    asked: Asked
+    points: object
+    curve: object
+    remark: str
+
+    @property
+    def mesh_object(self):
+        """The mesh object."""
+        return by_uid(self.mesh_uid)
+
+    @property
+    def curve_object(self):
+        """The curve object; None for a new curve."""
+        return by_uid(self.curve_uid) if self.curve_uid else None
+
+    def positions(self) -> np.ndarray:
+        """Positions of the control points in the object's local space, (k, 3)."""
+        return self.surface.points(self.points.faces, self.points.barycentric)
+
+    def polyline(self) -> np.ndarray:
+        """The curve's points in the object's local space, (n, 3); the first again if closed."""
+        return polyline_of(self.surface, self.curve)
+
+
+def by_uid(uid: int):
+    """The object with a session_uid, or None."""
+    return next((found for found in bpy.data.objects if found.session_uid == uid), None)
+
+
+def polyline_of(surface, curve) -> np.ndarray:
+    """A curve's points in the object's local space, (n, 3); the first again if it is closed."""
+    if curve is None:
+        return np.zeros((0, 3))
+    line = surface.points(curve.faces, curve.barycentric)
+    return np.concatenate([line, line[:1]]) if curve.closed else line
+
+
+def chosen(context, name: str):
+    """The designed curve with a name, or the active one; None for a new curve."""
+    if not name:
+        return active(context)
+    found = bpy.data.objects.get(name)
+    if not curve_record.has_record(found):
+        raise InputError(
+            f'There is no designed curve "{name}". Give the name of a designed curve, or no name '
+            "for a new curve"
+        )
+    return found
+
+
+def active(context):
+    """The designed curve that is being drawn: the active object.
+
+    In Sculpt Mode and Weight Paint the mesh is active, so there it is the only selected curve on
+    it.
+    """
+    found = context.active_object
+    if curve_record.has_record(found):
+        return found
+    if found is None or found.type != "MESH" or found.mode not in {"SCULPT", "WEIGHT_PAINT"}:
+        return None
+    curves = [
+        each
+        for each in context.selected_objects
+        if curve_record.has_record(each) and curve_record.mesh_of(each) == found
+    ]
+    return curves[0] if len(curves) == 1 else None
+
+
+def opened(context, edited, asked: Asked | None = None, keeps_course: bool = False) -> Opened:
+    """Read a curve and its surface, or the active mesh for a new curve.
+
+    `asked` are other settings than those of the curve, or of the panel for a new one. With other
+    settings the best course may be a different one; with another smoothness the present one can be
+    kept.
+    """
+    from ... import nicmm_core as nicmm
+
+    if edited is None:
+        mesh_object = mesh_data.mesh_object(context)
+        if mesh_object is None:
+            raise InputError("Make a mesh or a designed curve active")
+        before = replace(curve_record.asked_by(context.scene.nicmm_curves), method="NICMM")
+    else:
+        mesh_object = curve_record.present_mesh(context, edited)
+        writing.check_replaceable(edited)
+        before = curve_record.asked_of(edited)
+    asked = before if asked is None else asked
+    surface = shown_surfaces.shown(mesh_object, asked.use_modifiers)
+    if not len(surface.faces):
+        raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
+    remarks = []
+    beyond = shown_beyond_the_cage(mesh_object)
+    if beyond and not asked.use_modifiers:
+        remarks.append(f"on the mesh without its {beyond}")
+    for name in MAPS:
+        group = getattr(asked, name)
+        if edited is not None and group and group not in mesh_object.vertex_groups:
+            asked = replace(asked, **{name: ""})
+            remarks.append(f'without the vertex group "{group}", which no longer exists')
+    points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+    curve = None
+    if edited is not None:
+        points, moved = curve_record.controls_now(edited, mesh_object, surface)
+        if moved:
+            remarks.append(f"the mesh has changed: {moved} points moved to the nearest positions")
+        else:
+            kept = {"smoothness": before.smoothness} if keeps_course else {}
+            if replace(asked, method=before.method, **kept) == before:
+                curve = _curve_of(edited, surface)
+    remark = "".join(f"; {each}" for each in remarks)
+    uid = 0 if edited is None else edited.session_uid
+    return Opened(uid, mesh_object.session_uid, surface, asked, points, curve, remark)
+
+
+def request(edited: Opened, points) -> list:
+    """The request for the curve through other points, in a list; empty if they are too few."""
+    if len(points) < FEWEST_OPEN:
+        return []
+    asked = replace(edited.asked, method="NICMM")
+    found = design_request.for_drawing(edited.mesh_object, edited.surface, points, asked)
+    return [replace(found, start=edited.curve)]
+
+
+def curves_of(answers: list) -> list:
+    """The curves of the answers to `request`; an error is raised."""
+    for answer in answers:
+        if isinstance(answer, Exception):
+            raise answer
+        if not answer.curves:
+            raise InputError(str(answer.status))
+    return [curve for answer in answers for curve in answer.curves]
+
+
+def write(context, edited: Opened, points, curves: list, settings):
+    """Write curves through points into the object, or a new one; return the object.
+
+    `settings` holds the output settings of a new one.
+    """
+    mesh_object, made = edited.mesh_object, edited.curve_object
+    if made is None:
+        made = writing.as_object(mesh_object, edited.surface, curves, settings)
+        drawn = writing.drawn_as(settings)
+    else:
+        writing.redraw(made, edited.surface, curves)
+        drawn = curve_record.drawn_as(made)
+    asked = replace(edited.asked, method="NICMM")
+    curve_record.remember(made, mesh_object, edited.surface, curves, asked, drawn, points)
+    if not edited.curve_uid:
+        curve_object.place(context, mesh_object, made)
+    return made
+
+
+def located(edited: Opened, positions: np.ndarray, name: str):
+    """Positions on the surface in the object's local space, (k, 3), as points of the core."""
+    from ...nicmm_core.geometry.surface_points import locate_points
+    from ..scene import designers
+
+    surface = edited.surface
+    mesh = designers.mesh_for(surface.solved, surface.faces)
+    return locate_points(mesh, positions @ surface.linear.T, name)
+
+
+def with_point(points, number: int, place, replaced: bool = False):
+    """Points with one more before another, or in its place; `place` is a single point."""
+    from ... import nicmm_core as nicmm
+
+    rest = points
+    if replaced:
+        rest = points[np.delete(np.arange(len(points)), number)]
+    return nicmm.SurfacePoints(
+        np.insert(rest.faces, number, place.faces[0]),
+        np.insert(rest.barycentric, number, place.barycentric[0], axis=0),
+    )
+
+
+def without_point(points, number: int):
+    """Points without one of them."""
+    return points[np.delete(np.arange(len(points)), number)]
+
+
+def _curve_of(edited, surface):
+    """The recorded curve of an object; None if it has to be designed again."""
+    if not curve_record.lies_on(edited, surface):
+        return None
+    curves = curve_record.recall(edited, surface)
+    whole = len(curves) == 1 and (curves[0].control_index >= 0).all()
+    return curves[0] if whole else None

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks the record of a curve before it is used: a file or a script may hold anything."""
+
+from dataclasses import fields
+
+import numpy as np
+
+LARGEST = 2**31 - 1
+"""Of an index in Blender."""
+
+SPLINES = ("EVEN", "EXACT", "BEZIER")
+"""Ways to draw a curve."""
+
+
+def is_group(value) -> bool:
+    """Whether a custom property has properties of its own."""
+    return hasattr(value, "keys") and hasattr(value, "get")
+
+
+def problem_of(record) -> str:
+    """What is wrong with the points of a record; empty if they can be used."""
+    return _problem(_check_points, record)
+
+
+def problem_of_settings(record, asked_type) -> str:
+    """What is wrong with the settings of a record; `asked_type` is their class."""
+    return _problem(_check_settings, record, asked_type)
+
+
+def _problem(check, *arguments) -> str:
+    try:
+        check(*arguments)
+    except _DamagedError as error:
+        return str(error)
+    return ""
+
+
+class _DamagedError(Exception):
+    """What is wrong with a record."""
+
+
+def _check_points(record) -> None:
+    counts = _whole(record, "counts", least=1)
+    closed = _whole(record, "closed", len(counts), least=0)
+    total = sum(counts)
+    _whole(record, "corners", 3 * total, least=0)
+    _numbers(record, "barycentric", 3 * total)
+    control_counts = _whole(record, "control_counts", len(counts), least=0)
+    index = _whole(record, "control_index", sum(control_counts), least=-1)
+    for number, (first, last) in enumerate(_ranges(control_counts)):
+        if (index[first:last] >= counts[number]).any():
+            raise _DamagedError("a control point is beyond the end of the curve")
+    vertices = record.get("vertices")
+    if not isinstance(vertices, int) or vertices < 0:
+        raise _DamagedError(f"its number of vertices is {vertices!r}")
+    if "control_corners" not in record:  # from a version that did not record them
+        if len(counts) != 1:
+            raise _DamagedError(f"it has no control points and {len(counts)} curves")
+        return
+    controls = _whole(record, "control_corners", least=0)
+    if len(controls) % 3:
+        raise _DamagedError("the length of control_corners is not a multiple of three")
+    _numbers(record, "control_barycentric", len(controls))
+    _numbers(record, "control_positions", len(controls))
+    if not len(counts) and (len(closed) or len(control_counts)):
+        raise _DamagedError("it has no curve and settings of one")
+    if len(record.get("cage", ())):
+        count = len(controls) // 3
+        _whole(record, "cage", 3, least=0)
+        _whole(record, "control_cage_faces", count, least=-1)
+        _numbers(record, "control_cage_places", 2 * count)
+        _whole(record, "control_cage_copies", count, least=0)
+
+
+def _check_settings(record, asked_type) -> None:
+    asked, drawn = record.get("asked"), record.get("drawn")
+    if asked is None:
+        if not len(_whole(record, "closed")):
+            raise _DamagedError("it has neither settings nor a curve")
+    elif not is_group(asked):
+        raise _DamagedError("asked is no group of properties")
+    else:
+        for field in fields(asked_type):
+            value = asked.get(field.name, field.default)
+            if not (isinstance(value, str) if field.type is str else _is_finite(value)):
+                raise _DamagedError(f"its setting {field.name} is {value!r}")
+    if drawn is not None and not (
+        is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))
+    ):
+        raise _DamagedError("drawn does not say how the curve is drawn")
+
+
+def _is_finite(value) -> bool:
+    return isinstance(value, int | float) and bool(np.isfinite(value))
+
+
+def _ranges(counts: np.ndarray):
+    ends = np.cumsum(counts)
+    return zip((ends - counts).tolist(), ends.tolist(), strict=True)
+
+
+def _numbers(record, name: str, length: int | None = None) -> np.ndarray:
+    """A list of finite numbers."""
+    try:
+        values = np.array(record[name], dtype=np.float64)
+    except (KeyError, TypeError, ValueError) as error:
+        raise _DamagedError(f"{name} is missing or holds no numbers") from error
+    if values.ndim != 1 or not np.isfinite(values).all():
+        raise _DamagedError(f"{name} does not hold finite numbers")
+    if length is not None and len(values) != length:
+        raise _DamagedError(f"{name} has {len(values)} values and needs {length}")
+    return values
+
+
+def _whole(record, name: str, length: int | None = None, least: int = 0) -> np.ndarray:
+    """A list of whole numbers."""
+    values = _numbers(record, name, length)
+    if ((values != np.floor(values)) | (values < least) | (values > LARGEST)).any():
+        raise _DamagedError(f"{name} holds numbers that are no index or count")
+    return values.astype(np.int64)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A cache of the surfaces of mesh objects, for what happens at every move of the mouse.
+
+Blender reports every change of an object; a surface is dropped when its object has changed.
+"""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .surface import Surface, read
+
+MOST = 4
+"""Surfaces that are kept."""
+
+FEW_FACES = 60_000
+"""Faces that are read at once, in some hundredths of a second; more only with a message."""
+
+
+class _Cache:
+    """Surfaces by session_uid, mode and modifiers; `changes` counts all reported changes."""
+
+    def __init__(self) -> None:
+        self.surfaces: dict = {}
+        self.changes = 0
+
+
+_cache = _Cache()
+
+
+def changes() -> int:
+    """A number that grows when a mesh or a designed curve may have changed."""
+    return _cache.changes
+
+
+def note_change() -> None:
+    """Note that a designed curve has changed."""
+    _cache.changes += 1
+
+
+def known(mesh_object, use_modifiers: bool) -> Surface | None:
+    """The surface of an object if it has been read since the last change."""
+    return _cache.surfaces.get(_key(mesh_object, use_modifiers))
+
+
+def shown(mesh_object, use_modifiers: bool) -> Surface:
+    """The surface of an object, read only if it has changed."""
+    found = known(mesh_object, use_modifiers)
+    if found is None:
+        found = read(mesh_object, use_modifiers)
+        bpy.context.view_layer.update()  # reports what reading has made and removed
+        while len(_cache.surfaces) >= MOST:
+            del _cache.surfaces[next(iter(_cache.surfaces))]
+        _cache.surfaces[_key(mesh_object, use_modifiers)] = found
+    return found
+
+
+def has_few_faces(mesh_object) -> bool:
+    """Whether reading the surface takes no longer than a frame or two."""
+    evaluated = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return len(evaluated.data.polygons) <= FEW_FACES and not any(
+        modifier.show_viewport and modifier.type in {"SUBSURF", "MULTIRES"} and modifier.levels > 2
+        for modifier in mesh_object.modifiers
+        if hasattr(modifier, "levels")
+    )
+
+
+def _key(mesh_object, use_modifiers: bool) -> tuple:
+    return mesh_object.session_uid, mesh_object.mode, use_modifiers
+
+
+@persistent
+def note_updates(_scene, depsgraph) -> None:
+    """Drop the surfaces of the objects that have changed."""
+    for update in depsgraph.updates:
+        changed = update.id.original
+        if not isinstance(changed, bpy.types.Object):
+            continue
+        if changed.type in {"CURVE", "CURVES"}:
+            _cache.changes += 1
+        if changed.type != "MESH":
+            continue
+        # Strokes in Sculpt Mode are reported as changes of the shading only.
+        sculpted = update.is_updated_shading and changed.mode == "SCULPT"
+        if update.is_updated_geometry or update.is_updated_transform or sculpted:
+            _drop(changed.session_uid)
+
+
+def _drop(uid: int) -> None:
+    _cache.changes += 1
+    for key in [key for key in _cache.surfaces if key[0] == uid]:
+        del _cache.surfaces[key]
+
+
+@persistent
+def forget(*_arguments) -> None:
+    """Drop all surfaces, after undo, a change of the frame or opening a file."""
+    _cache.surfaces.clear()
+    _cache.changes += 1
+
+
+HANDLERS = (
+    ("depsgraph_update_post", note_updates),
+    ("frame_change_post", forget),
+    ("undo_post", forget),
+    ("redo_post", forget),
+    ("load_pre", forget),
+    ("load_post", forget),
+)
+
+
+def register() -> None:
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister() -> None:
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).remove(function)
+    forget()

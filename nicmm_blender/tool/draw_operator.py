@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a click of the tool does: it starts the operator for what is under the mouse."""
+
+import bpy
+
+from ..operators import turns
+from ..operators.long_solves import LONGEST_TURN, PASSED_ON, reporting
+from ..operators.viewports import redraw
+from ..scene import designers
+from . import modes, picking
+from .picking import Kind
+
+PASS = {"PASS_THROUGH"}
+
+
+class NICMM_OT_draw_on_surface(bpy.types.Operator):
+    """Add a point to the designed curve, move or insert one, or activate the curve under the mouse
+
+    On a mesh that has not been drawn on, it first prepares the mesh, in time slices.
+    """
+
+    bl_idname = "nicmm.draw_on_surface"
+    bl_label = "Draw Curve on Surface"
+    bl_description = (
+        "Add a point to the designed curve, move or insert one, or activate the curve under the "
+        "mouse"
+    )
+    bl_options = {"INTERNAL"}
+
+    remove: bpy.props.BoolProperty(
+        name="Remove",
+        description="Remove the point under the mouse instead",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context, event):
+        if context.mode not in modes.TOOLS or not picking.is_view(context):
+            return PASS
+        return reporting(self, lambda: self._invoke(context, event))
+
+    def _invoke(self, context, event):
+        mesh_object, curve = picking.mesh_and_curve(context)
+        if mesh_object is None:
+            return PASS
+        self._pixel, self._is_down = picking.pixel_of(event), True
+        if picking.is_ready(context, mesh_object, curve):
+            return self._act(context)
+        self._work, self._surface = None, None
+        self._turns = 0
+        self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self.cancel(context)
+            return {"CANCELLED"}
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._is_down = False
+        if event.type == "TIMER":
+            result = reporting(self, lambda: self._prepare(context))
+            if result & {"FINISHED", "CANCELLED"}:
+                self._tidy(context)
+            return result
+        return PASS if event.type in PASSED_ON else {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Also called by Blender when it opens another file or quits."""
+        if self._work is not None:
+            self._work.cancel()
+        self._tidy(context)
+
+    def _prepare(self, context):
+        """Work for one turn; at the end do what the click was for."""
+        mesh_object, curve = picking.mesh_and_curve(context)
+        if mesh_object is None:
+            return {"CANCELLED"}
+        self._turns += 1
+        if self._turns == 1:
+            return PASS  # the message is drawn first
+        if self._surface is None:
+            self._surface = surface = picking.surface_for(context, mesh_object, curve)
+            self._work = turns.Work(
+                lambda progress: designers.prepare(surface.solved, surface.faces, progress)
+            )
+        elif self._work.turn(LONGEST_TURN):
+            self._work.result()
+            self._tidy(context)
+            return self._act(context)
+        self._show(context)
+        return PASS
+
+    def _show(self, context) -> None:
+        what = "Reading the mesh" if self._surface is None else "Preparing the mesh"
+        context.workspace.status_text_set(f"{self.bl_label}: {what}   |   Esc: Cancel")
+        redraw()
+
+    def _tidy(self, context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+            context.workspace.status_text_set(None)
+
+    def _act(self, context):
+        hit = picking.under_mouse(context, self._pixel)
+        if hit is None:
+            return PASS
+        call = _call_of(hit, self.remove)
+        if call is None:
+            return PASS
+        operator, arguments = call
+        if "from_mouse" in arguments:
+            arguments["from_mouse"] = self._is_down
+        try:
+            operator("INVOKE_DEFAULT", True, **arguments)
+        except RuntimeError as error:  # what the operator has reported
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+def _call_of(hit, remove: bool) -> tuple | None:
+    """The operator for what is under the mouse, and its arguments; None for no operator."""
+    calls = bpy.ops.nicmm
+    if remove:
+        if hit.kind is not Kind.POINT:
+            return None
+        return calls.remove_point, {"curve": hit.name, "index": hit.index}
+    if hit.kind is Kind.CURVE:
+        return calls.activate_curve, {"curve": hit.name}
+    named = {"curve": hit.name, "position": hit.position, "from_mouse": True}
+    if hit.kind is Kind.SURFACE:
+        return calls.add_point, named
+    operator = calls.move_point if hit.kind is Kind.POINT else calls.insert_point
+    return operator, {**named, "index": hit.index}
+
+
+def register() -> None:
+    bpy.utils.register_class(NICMM_OT_draw_on_surface)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(NICMM_OT_draw_on_surface)

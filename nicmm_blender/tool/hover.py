@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Follows the mouse while the tool is chosen, by a gizmo that is never selected.
+
+Blender asks a gizmo about every move of the mouse in a viewport; no operator has to run.
+"""
+
+import bpy
+import numpy as np
+
+from ..scene.messages import InputError
+from . import modes, overlay, picking
+
+
+class NICMM_GT_hover(bpy.types.Gizmo):
+    bl_idname = "NICMM_GT_hover"
+
+    def draw(self, _context):
+        """The overlay draws."""
+
+    def test_select(self, context, location):
+        overlay.show_hover(_under(context, location))
+        return -1
+
+
+def _under(context, location):
+    """What is under the mouse, if that is known without a long computation."""
+    from ...nicmm_core import NicmmError
+
+    if not picking.is_view(context):
+        return None
+    try:
+        mesh_object, curve = picking.mesh_and_curve(context)
+        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
+            return None
+        return picking.under_mouse(context, np.array(location, dtype=np.float64))
+    except (InputError, NicmmError):
+        return None  # a click reports it
+
+
+class NICMM_GGT_hover(bpy.types.GizmoGroup):
+    bl_idname = "NICMM_GGT_hover"
+    bl_label = "Surface Curve"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"
+    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}  # noqa: RUF012 - as Blender reads it
+
+    @classmethod
+    def poll(cls, context):
+        active = modes.is_tool_active(context)
+        if not active and overlay.hovered() is not None:
+            overlay.show_hover(None)
+        return active
+
+    def setup(self, _context):
+        self.gizmos.new(NICMM_GT_hover.bl_idname)
+
+
+CLASSES = (NICMM_GT_hover, NICMM_GGT_hover)
+
+
+def register() -> None:
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

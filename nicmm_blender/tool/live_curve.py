@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A curve while one of its points is dragged: a bounded amount of work for each move.
+
+Each move starts from the last curve. If that is impossible, for example after a jump, the curve has
+to be designed from scratch, which takes longer: `waiting` is set.
+"""
+
+from dataclasses import replace
+
+from ..scene import designers
+from ..scene.design_request import DesignRequest
+from ..scene.messages import in_words
+
+ITERATIONS = 3
+"""Iterations for a move at most, which take one or two frames."""
+
+POINTS = 3000
+"""Points of the curve times iterations for a move: an iteration takes time for every point."""
+
+MOST_STEPS = 60
+"""Steps after a move before the curve is designed from scratch; most need fewer than five."""
+
+
+class LiveCurve:
+    """A curve whose points move.
+
+    Attributes
+    ----------
+    request : DesignRequest
+        With the present points, and the last curve as its start.
+    waiting : bool
+        Whether the curve has to be designed from scratch.
+    steps_left : int
+        How often `step` may go on.
+    problem : str
+        Why there is no curve through the points; empty if there is one.
+    """
+
+    def __init__(self, request: DesignRequest) -> None:
+        self.request = request
+        self.waiting, self.steps_left = request.start is None, 0
+        self.problem = ""
+
+    @property
+    def curve(self):
+        """The last curve, a SurfaceCurve of the core, or None."""
+        found = self.request.start
+        return found.curves[0] if hasattr(found, "curves") else found
+
+    def move(self, points) -> None:
+        """Move the points."""
+        self.request = replace(self.request, points=points)
+        self.waiting, self.steps_left = self.request.start is None, MOST_STEPS
+        if not self.waiting:
+            self.step()
+
+    def take(self, design) -> None:
+        """Store a design from scratch, or the error."""
+        self.waiting, self.steps_left = False, 0
+        if isinstance(design, Exception):
+            self.problem = str(design)
+        elif design.curves:
+            self.request, self.problem = replace(self.request, start=design), ""
+
+    def step(self) -> None:
+        """Go on for a few iterations."""
+        from ... import nicmm_core as nicmm
+
+        if not self.steps_left:
+            return
+        self.steps_left -= 1
+        request, surface = self.request, self.request.surface
+        designer = designers.designer_for(surface.solved, surface.faces)
+        iterations = min(max(POINTS // len(self.curve.faces), 1), ITERATIONS)
+        bounds = {"order": "given", "max_iterations": iterations, "start": request.start}
+        try:
+            design = designer.design(request.points, **bounds, **request.options)
+        except nicmm.CurveError:
+            self.waiting, self.steps_left = True, 0
+        except nicmm.NicmmError as error:
+            self.problem, self.steps_left = in_words(error, request.asked.obstacle_group), 0
+        else:
+            self.request, self.problem = replace(request, start=design), ""
+            if design.status is not nicmm.Status.ITERATION_LIMIT:
+                self.steps_left = 0
+            elif not self.steps_left:
+                self.waiting = True

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The modes that the tool draws in, and which curve is active in them.
+
+In mesh Edit Mode Blender's undo does not restore other objects, so that a click there could not be
+undone; points are selected vertices there.
+"""
+
+import bpy
+
+from ..outputs import curve_object
+from ..scene import curve_record
+
+TOOLS = {
+    "OBJECT": "nicmm.surface_curve",
+    "SCULPT": "nicmm.surface_curve_sculpt",
+    "PAINT_WEIGHT": "nicmm.surface_curve_weights",
+}
+"""The tool's name in each mode of the context."""
+
+DRAWS_IN = (
+    "The tool Surface Curve draws in Object Mode, Sculpt Mode and Weight Paint. In Edit Mode, "
+    "select vertices and run Design Curve on Surface"
+)
+
+
+def is_tool_active(context) -> bool:
+    """Whether the tool is chosen in the present mode."""
+    if context.mode not in TOOLS or context.workspace is None:
+        return False
+    tool = context.workspace.tools.from_space_view3d_mode(context.mode, create=False)
+    return tool is not None and tool.idname == TOOLS[context.mode]
+
+
+def make_active(context, curve) -> None:
+    """Make a designed curve the one that is drawn; None ends drawing.
+
+    In Object Mode it becomes the active object. In other modes the mesh stays active, and the
+    selection shows which of its curves is drawn.
+    """
+    mesh_object = context.active_object if curve is None else curve_record.mesh_of(curve)
+    if curve_record.has_record(mesh_object):
+        mesh_object = curve_record.mesh_of(mesh_object)
+    if context.mode == "OBJECT":
+        shown = curve or mesh_object
+        if shown is not None and shown.name in context.view_layer.objects:
+            curve_object.select_only(context, shown)
+        return
+    for other in curve_record.designed_on(mesh_object):
+        if other.name in context.view_layer.objects:
+            other.select_set(other == curve)
+
+
+def named(name: str):
+    """The designed curve with a name, or None."""
+    found = bpy.data.objects.get(name)
+    return found if curve_record.has_record(found) else None

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draws the active curve and its control points over the 3D viewports while the tool is chosen.
+
+Parts hidden by the mesh are dimmed. The mark under the mouse shows what a click would do.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from mathutils import Matrix
+
+from ..operators.viewports import redraw
+from ..outputs import edited_curve
+from ..scene.messages import InputError
+from . import modes, picking
+from .picking import Kind
+from .view import OFFSET
+
+HIDDEN = 0.22
+"""Opacity of parts hidden by the mesh."""
+
+LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
+"""In pixels at a resolution scale of 1."""
+
+CORNERS = 20
+"""Number of corners of the disc that shows a point."""
+
+OUTLINE = (0.05, 0.05, 0.05)
+"""Dark, under every line and point: readable over any colour of the theme."""
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Points, (k, 3), and line, (n, 3), in the local space of a mesh object."""
+
+    mesh_uid: int
+    surface: object
+    points: np.ndarray
+    line: np.ndarray
+    problem: str = ""
+    radius: float = 0.0
+
+
+class _State:
+    """What is drawn; holds no Blender objects, since undo replaces them."""
+
+    def __init__(self) -> None:
+        self.handlers: list = []
+        self.dragged: _Drawn | None = None
+        self.hover = None  # a picking.Hit
+        self.batch, self.batch_of = None, None
+        self.visible: tuple = (None, None)
+
+
+_state = _State()
+
+
+def show_dragged(opened, points=None, curve=None, problem: str = "") -> None:
+    """Draw a curve while it is being changed instead of the active one; None ends that."""
+    _state.dragged, _state.hover = None, None
+    if opened is not None:
+        surface = opened.surface
+        _state.dragged = _Drawn(
+            opened.mesh_uid,
+            surface,
+            surface.points(points.faces, points.barycentric),
+            edited_curve.polyline_of(surface, curve),
+            problem,
+            _radius_of(opened),
+        )
+
+
+def show_hover(hit) -> None:
+    """Mark what is under the mouse, a `picking.Hit` or None."""
+    if hit != _state.hover:
+        _state.hover = hit
+        redraw()
+
+
+def hovered():
+    """What is marked under the mouse."""
+    return _state.hover
+
+
+def _drawn_now(context) -> _Drawn | None:
+    """What to draw; None if the tool is not chosen or the mesh would have to be read first."""
+    if _state.dragged is not None:
+        return _state.dragged
+    if not modes.is_tool_active(context) or not context.space_data.overlay.show_overlays:
+        return None
+    if context.screen.is_animation_playing:
+        return None
+    try:
+        mesh_object, curve = picking.mesh_and_curve(context)
+        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
+            return None
+        opened = picking.opened_now(context)
+    except InputError:
+        return None  # a click reports it
+    points, line = opened.positions(), opened.polyline()
+    return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
+
+
+def _radius_of(opened) -> float:
+    curve = opened.curve_object
+    return 0.0 if curve is None else picking.radius_of(curve, opened.surface)
+
+
+def _draw_lines() -> None:
+    context = bpy.context
+    drawn = _drawn_now(context)
+    mesh_object = None if drawn is None else edited_curve.by_uid(drawn.mesh_uid)
+    if mesh_object is None:
+        return
+    colours = _Colours(context)
+    nearer = _towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
+    if len(drawn.line):
+        colour = colours.problem if drawn.problem else colours.line
+        _draw_line(context, nearer, _line_batch(drawn.line), colour)
+    hit = _state.hover
+    if hit is not None and hit.kind is Kind.CURVE and _state.dragged is None:
+        for line in picking.other_lines(context):
+            if line.name == hit.name and len(line.positions) > 1:
+                nearer = _towards_the_eye(
+                    context.region_data, mesh_object, drawn.surface, line.radius
+                )
+                _draw_line(context, nearer, _batch(line.positions), colours.hover)
+
+
+def _draw_line(context, matrix, batch, colour) -> None:
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    region, scale = context.region, context.preferences.system.ui_scale
+    hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
+    gpu.state.blend_set("ALPHA")
+    gpu.state.depth_mask_set(False)
+    with gpu.matrix.push_pop():
+        gpu.matrix.load_matrix(matrix)
+        shader.bind()
+        shader.uniform_float("viewportSize", (region.width, region.height))
+        for width, shade in ((LINE_WIDTH + 2.0 * OUTLINE_WIDTH, OUTLINE), (LINE_WIDTH, colour)):
+            shader.uniform_float("lineWidth", width * scale)
+            for test, opacity in (("GREATER", hidden), ("LESS_EQUAL", 1.0)):
+                gpu.state.depth_test_set(test)
+                shader.uniform_float("color", (*shade[:3], opacity))
+                batch.draw(shader)
+    gpu.state.depth_test_set("NONE")
+    gpu.state.blend_set("NONE")
+
+
+def _line_batch(line: np.ndarray):
+    """The batch of the active line, made again only if it has changed."""
+    if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
+        _state.batch, _state.batch_of = _batch(line), line
+    return _state.batch
+
+
+def _batch(line: np.ndarray):
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    return batch_for_shader(shader, "LINE_STRIP", {"pos": line.astype(np.float32)})
+
+
+def _draw_points() -> None:
+    context = bpy.context
+    drawn = _drawn_now(context)
+    mesh_object = None if drawn is None else edited_curve.by_uid(drawn.mesh_uid)
+    if mesh_object is None:
+        return
+    view = picking.view_on(context, mesh_object, drawn.surface)
+    colours = _Colours(context)
+    positions, marked = drawn.points, -1
+    fills = [colours.point] * len(positions)
+    hit = _state.hover
+    if hit is not None and _state.dragged is None:
+        if hit.kind is Kind.POINT and hit.index < len(positions):
+            fills[hit.index] = colours.hover
+        elif hit.kind in {Kind.LINE, Kind.SURFACE}:
+            marked = len(positions)
+            positions = np.concatenate([positions, [hit.position]])
+            fills.append(colours.hover)
+    if not len(positions):
+        return
+    centres, visible = view.project(positions), _visible(view, positions)
+    scale = context.preferences.system.ui_scale
+    corners, colour_of = [], []
+    shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
+    for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
+        opacity = 1.0 if visible[number] else HIDDEN
+        size = 0.6 if number == marked else 1.0  # not a point yet
+        for radius, colour in (
+            (POINT_RADIUS + OUTLINE_WIDTH, OUTLINE),
+            (POINT_RADIUS, fills[number]),
+        ):
+            corners.append(centres[number] + size * scale * radius * _DISC)
+            colour_of.append(np.tile((*colour[:3], opacity), (len(_DISC), 1)))
+    if not corners:
+        return
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    flat = np.concatenate(corners)
+    batch = batch_for_shader(
+        shader,
+        "TRIS",
+        {
+            "pos": np.concatenate([flat, np.zeros((len(flat), 1))], axis=1).astype(np.float32),
+            "color": np.concatenate(colour_of).astype(np.float32),
+        },
+    )
+    gpu.state.blend_set("ALPHA")
+    batch.draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def _visible(view, positions: np.ndarray) -> np.ndarray:
+    """Which points are visible, cast again only if the view or the points have changed."""
+    key = view.perspective.tobytes(), view.xray, id(view.mesh), positions.tobytes()
+    if _state.visible[0] != key:
+        _state.visible = key, view.visible(positions)
+    return _state.visible[1]
+
+
+class _Colours:
+    """Colours of the theme: those of gizmos, which differ from those of selections."""
+
+    def __init__(self, context) -> None:
+        theme = context.preferences.themes[0].user_interface
+        self.line, self.point = tuple(theme.gizmo_secondary), tuple(theme.gizmo_hi)
+        self.hover, self.problem = tuple(theme.gizmo_primary), tuple(theme.axis_x)
+
+
+def _disc() -> np.ndarray:
+    """Triangles of a disc of radius 1, as consecutive corners, (n, 2)."""
+    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.stack([np.zeros((CORNERS, 2)), rim[:-1], rim[1:]], axis=1).reshape(-1, 2)
+
+
+_DISC = _disc()
+
+
+def _towards_the_eye(region_3d, mesh_object, surface, radius: float):
+    """The model-view matrix, moved slightly towards the eye: lines lie in front of mesh and tube.
+
+    In perspective it scales about the eye, so that no point moves on the screen.
+    """
+    world = mesh_object.matrix_world
+    step = (OFFSET * surface.diagonal + radius) * max(world.to_scale(), key=abs)
+    if region_3d.is_perspective:
+        distance = (region_3d.view_matrix @ world.translation).length
+        nearer = Matrix.Scale(1.0 - min(abs(step) / max(distance, abs(step)), 0.5), 4)
+        nearer[3][3] = 1.0
+    else:
+        nearer = Matrix.Translation((0.0, 0.0, abs(step)))
+    return nearer @ region_3d.view_matrix @ world
+
+
+def register() -> None:
+    add = bpy.types.SpaceView3D.draw_handler_add
+    _state.handlers = [
+        add(_draw_lines, (), "WINDOW", "POST_VIEW"),
+        add(_draw_points, (), "WINDOW", "POST_PIXEL"),
+    ]
+
+
+def unregister() -> None:
+    for handler in _state.handlers:
+        bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+    _state.__init__()

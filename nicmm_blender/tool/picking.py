@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is under the mouse: a point or the line of the active curve, another curve, the surface."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import bpy
+import numpy as np
+
+from mathutils import Vector
+
+from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
+from ..scene import curve_record, designers, shown_surfaces
+from ..scene.messages import InputError
+from .view import View, view_of
+
+POINT_REACH, CURVE_REACH = 12.0, 8.0
+"""Greatest distance of the mouse from a point and from the curve, in pixels at a scale of 1."""
+
+SOLID = {"SOLID", "TEXTURED", "WIRE"}
+"""Ways to display an object; one that shows its bounds only hides nothing."""
+
+
+class Kind(Enum):
+    """What a click meets."""
+
+    POINT = auto()
+    LINE = auto()
+    CURVE = auto()
+    SURFACE = auto()
+
+
+@dataclass(frozen=True)
+class Hit:
+    """What is under the mouse.
+
+    `index` is that of the point, or of the one before which a point on the line is inserted;
+    `name` is that of the curve object, empty for a new curve; `position` is in the local space of
+    the mesh object.
+    """
+
+    kind: Kind
+    name: str
+    index: int
+    position: tuple
+
+
+@dataclass(frozen=True)
+class Line:
+    """A designed curve on the surface that is not the active one."""
+
+    name: str
+    positions: np.ndarray
+    radius: float
+
+
+class _Places:
+    """What the viewport shows, read again after changes only."""
+
+    def __init__(self) -> None:
+        self.key: tuple = ()
+        self.opened: Opened | None = None
+        self.lines: list[Line] = []
+
+
+_places = _Places()
+
+
+def mesh_and_curve(context) -> tuple:
+    """The mesh object that a click draws on, and the active curve; each may be None."""
+    curve = edited_curve.active(context)
+    if curve is None:
+        mesh_object = context.active_object
+        if mesh_object is None or mesh_object.type != "MESH":
+            return None, None
+    else:
+        mesh_object = curve_record.mesh_of(curve)
+    if mesh_object is None or not _is_shown(context, mesh_object):
+        return None, curve
+    return mesh_object, curve
+
+
+def is_ready(context, mesh_object, curve) -> bool:
+    """Whether what is under the mouse is known without a long computation."""
+    surface = shown_surfaces.known(mesh_object, _uses_modifiers(context, curve))
+    if surface is None:
+        return shown_surfaces.has_few_faces(mesh_object)
+    few = len(surface.faces) <= 2 * shown_surfaces.FEW_FACES
+    return few or designers.is_prepared(surface.solved, surface.faces)
+
+
+def surface_for(context, mesh_object, curve):
+    """The surface that a click draws on."""
+    return shown_surfaces.shown(mesh_object, _uses_modifiers(context, curve))
+
+
+def opened_now(context) -> Opened:
+    """The active curve, or the mesh for a new one; read again only after changes."""
+    return _read(context).opened
+
+
+def other_lines(context) -> list:
+    """The other designed curves on the mesh, as `Line`."""
+    return _read(context).lines
+
+
+def pixel_of(event) -> np.ndarray:
+    """The mouse in the region of the event."""
+    return np.array([event.mouse_region_x, event.mouse_region_y], dtype=np.float64)
+
+
+def view_on(context, mesh_object, surface) -> View:
+    """The view of the region of the context."""
+    mesh = designers.mesh_for(surface.solved, surface.faces)
+    region = context.region
+    return view_of(region, region.data, mesh_object, surface, mesh, is_xray(context.space_data))
+
+
+def is_xray(space) -> bool:
+    """Whether the viewport shows what is behind the surface."""
+    shading = space.shading
+    if shading.type == "WIREFRAME":
+        return shading.show_xray_wireframe
+    return shading.type == "SOLID" and shading.show_xray
+
+
+def under_mouse(context, pixel) -> Hit | None:
+    """What a click at a pixel meets; None off the mesh."""
+    mesh_object, curve = mesh_and_curve(context)
+    if mesh_object is None:
+        return None
+    found = _read(context)
+    opened, name = found.opened, "" if curve is None else curve.name
+    view = view_on(context, mesh_object, opened.surface)
+    hit = _hit(context, view, pixel, found, name, curve)
+    if hit is None or _is_behind_another(context, mesh_object, view, pixel, hit.position):
+        return None
+    return hit
+
+
+def _hit(context, view: View, pixel, found: _Places, name: str, curve) -> Hit | None:
+    opened, scale = found.opened, context.preferences.system.ui_scale
+    positions = opened.positions()
+    number = view.nearest_point(pixel, positions, POINT_REACH * scale)
+    if number is not None:
+        return Hit(Kind.POINT, name, number, tuple(positions[number]))
+    reach = CURVE_REACH * scale
+    radius = 0.0 if curve is None else radius_of(curve, opened.surface)
+    on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
+    if on_line is not None:
+        return _on_line(opened, view.mesh, name, *on_line)
+    for line in found.lines:
+        on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
+        if on_line is not None:
+            return Hit(Kind.CURVE, line.name, 0, tuple(line.positions[on_line[0]]))
+    place = view.place_at(pixel)
+    if place is None:
+        return None
+    position = opened.surface.points(place.faces, place.barycentric)[0]
+    return Hit(Kind.SURFACE, name, len(positions), tuple(position))
+
+
+def _on_line(opened: Opened, mesh, name: str, segment: int, share: float) -> Hit:
+    from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
+
+    place = point_on_segment(mesh, opened.curve, segment, share)
+    number = leg_of_segment(opened.curve, segment) + 1
+    position = opened.surface.points(place.faces, place.barycentric)[0]
+    return Hit(Kind.LINE, name, number, tuple(position))
+
+
+def _read(context) -> _Places:
+    mesh_object, curve = mesh_and_curve(context)
+    uid = 0 if curve is None else curve.session_uid
+    panel = context.scene.nicmm_curves.use_modifiers
+    key = shown_surfaces.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode
+    if key != _places.key:
+        _places.opened = edited_curve.opened(context, curve)
+        _places.lines = _other_lines(context, mesh_object, curve, _places.opened.surface)
+        _places.key = shown_surfaces.changes(), *key[1:]
+    return _places
+
+
+def _other_lines(context, mesh_object, active, surface) -> list:
+    lines = []
+    for curve in curve_record.curves_on(context, mesh_object):
+        if curve == active or not _is_shown(context, curve):
+            continue
+        try:
+            on = surface
+            asked = curve_record.asked_of(curve)
+            if asked.use_modifiers != surface.with_modifiers:
+                on = shown_surfaces.shown(mesh_object, asked.use_modifiers)
+            _, line = curve_record.places(curve, on)
+        except InputError:
+            continue  # shown where the curve is used
+        lines.append(Line(curve.name, line, radius_of(curve, surface)))
+    return lines
+
+
+def _uses_modifiers(context, curve) -> bool:
+    if curve is None:
+        return context.scene.nicmm_curves.use_modifiers
+    return curve_record.asked_of(curve).use_modifiers
+
+
+def radius_of(curve, surface) -> float:
+    """How far a curve object reaches from its line, in the local space of the mesh."""
+    from ..outputs import curve_object, sticky_curves
+
+    if curve.type == "CURVES":
+        radius = sticky_curves.radius_of(curve.data)
+    else:
+        radius = curve.data.bevel_depth
+    drawn = curve_record.drawn_as(curve)
+    offset = 0.0 if drawn is None else abs(drawn["offset"])
+    return (radius * curve_object.scale_of(curve, surface) + offset) / surface.scale
+
+
+def _is_shown(context, candidate) -> bool:
+    """Whether an object is visible in this viewport, also in its local view."""
+    space = context.space_data
+    if candidate.name not in context.view_layer.objects or not candidate.visible_get():
+        return False
+    in_view = space is not None and space.type == "VIEW_3D"
+    return not in_view or candidate.visible_in_viewport_get(space)
+
+
+def _is_behind_another(context, mesh_object, view: View, pixel, position) -> bool:
+    """Whether another mesh is in front of a position on the line of sight of a pixel."""
+    if view.xray:
+        return False
+    near, direction = view.ray(pixel)
+    to_world = mesh_object.matrix_world
+    origin = to_world @ Vector(near)
+    step = to_world.to_3x3() @ Vector(direction)
+    limit = float(np.dot(position - near, direction) / np.dot(direction, direction))
+    graph = context.evaluated_depsgraph_get()
+    for other in context.visible_objects:
+        if other == mesh_object or other.type != "MESH" or other.display_type not in SOLID:
+            continue
+        if not _is_shown(context, other):
+            continue
+        back = other.matrix_world.inverted_safe()
+        start, along = back @ origin, back.to_3x3() @ step
+        if not _meets_box(other, start, along):
+            continue
+        met, where, _normal, _face = other.ray_cast(start, along.normalized(), depsgraph=graph)
+        if met and (where - start).dot(along) < limit * along.length_squared:
+            return True
+    return False
+
+
+def _meets_box(candidate, start, along) -> bool:
+    """Whether a ray meets the bounding box of an object, in its local space."""
+    corners = np.array([corner[:] for corner in candidate.bound_box])
+    direction = np.array(along)
+    direction = np.where(np.abs(direction) < 1e-12, 1e-12, direction)
+    first = (corners.min(axis=0) - start) / direction
+    last = (corners.max(axis=0) - start) / direction
+    entry = np.minimum(first, last).max()
+    leave = np.maximum(first, last).min()
+    return bool(leave >= max(entry, 0.0))
+
+
+def forget() -> None:
+    """Drop what was read."""
+    _places.key, _places.opened, _places.lines = (), None, []
+
+
+def register() -> None:
+    forget()
+
+
+def unregister() -> None:
+    forget()
+
+
+def is_view(context) -> bool:
+    """Whether the context is a 3D viewport with a view."""
+    space, region = context.space_data, context.region
+    return (
+        space is not None
+        and space.type == "VIEW_3D"
+        and region is not None
+        and region.type == "WINDOW"
+        and isinstance(region.data, bpy.types.RegionView3D)
+    )

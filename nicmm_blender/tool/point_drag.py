@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A control point under the pressed mouse button, with the curve live.
+
+The operator is modal only until the button is released. Esc or a right click leaves everything as
+it was.
+"""
+
+import time
+
+import bpy
+import numpy as np
+
+from ..operators import turns
+from ..operators.long_solves import TURN, answer_all, reporting
+from ..operators.viewports import NAVIGATION, redraw
+from ..outputs import edited_curve, writing
+from . import overlay, picking
+from .live_curve import LiveCurve
+
+INTERVAL = 1.0 / 60.0
+"""Seconds between two steps of a curve that is converging."""
+
+PAUSE = 0.15
+"""Seconds without mouse movement before a dragged curve is designed from scratch."""
+
+HINT = "Release: Confirm   |   Esc, Right Mouse: Cancel"
+
+
+class PointDrag:
+    """A mixin for operators with `opened(context)` and `changed(opened)`.
+
+    `dragged` is the present place of the point, as a point of the core, or None in a script.
+    """
+
+    FROM_MOUSE = bpy.props.BoolProperty(
+        name="From Mouse",
+        description="Drag the point until the mouse button is released",
+        default=False,
+        options={"SKIP_SAVE", "HIDDEN"},
+    )
+
+    dragged = None
+    _live = None
+
+    def invoke(self, context, event):
+        if not self.from_mouse:
+            return super().invoke(context, event)
+        return reporting(self, lambda: self._press(context, event))
+
+    def _press(self, context, event):
+        self._opened = self.opened(context)
+        self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
+        pixel = picking.pixel_of(event)
+        self._pressed, self._grip = pixel, np.zeros(2)
+        given = np.array([self.position[:]], dtype=float)
+        self.dragged = place = edited_curve.located(self._opened, given, "position")
+        positions = self._opened.surface.points(place.faces, place.barycentric)
+        on_screen = self._view.project(positions)[0]
+        if np.isfinite(on_screen).all():
+            self._grip = on_screen - pixel
+        self._is_new = len(self.changed(self._opened)) > len(self._opened.points)
+        requests = edited_curve.request(self._opened, self.changed(self._opened))
+        self._live = LiveCurve(requests[0]) if requests else None
+        self._preview = _Preview(self._opened)
+        self._scratch, self._last_move = None, 0.0
+        if self._live is not None and self._is_new:
+            self._live.move(self.changed(self._opened))
+        self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        self.has_handler = True
+        context.workspace.status_text_set(f"{self.bl_label}   |   {HINT}")
+        self._is_dragging = True
+        self._show_drag()
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if not getattr(self, "_is_dragging", False):
+            return super().modal(context, event)
+        try:
+            return self._modal(context, event)
+        except Exception:
+            self._let_go(context)
+            raise
+
+    def cancel(self, context):
+        """Called by Blender if it ends the operator, for example when it quits."""
+        if getattr(self, "_is_dragging", False):
+            self._let_go(context)
+        else:
+            super().cancel(context)
+
+    def _modal(self, context, event):
+        if event.type == "MOUSEMOVE":
+            self._move(context, event)
+        elif event.type == "TIMER":
+            self._work_on()
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            return self._release(context)
+        elif event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
+            self._let_go(context)
+            return {"CANCELLED"}
+        elif event.type in NAVIGATION:
+            return {"PASS_THROUGH"}
+        return {"RUNNING_MODAL"}
+
+    def _move(self, context, event) -> None:
+        pixel = picking.pixel_of(event)
+        if (pixel == self._pressed).all():
+            return
+        self._pressed = np.full(2, np.nan)  # from now on every move counts
+        self._last_move = time.monotonic()
+        self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
+        place = self._view.place_at(pixel + self._grip)
+        if place is None:
+            return
+        self._stop_scratch()
+        self.dragged = place
+        if self._live is not None:
+            self._live.move(self.changed(self._opened))
+        self._show_drag()
+
+    def _work_on(self) -> None:
+        """Go on with the curve, from scratch only while the mouse stays still."""
+        live = self._live
+        if live is None:
+            return
+        if live.waiting:
+            if time.monotonic() - self._last_move < PAUSE:
+                return
+            if self._scratch is None:
+                requests = edited_curve.request(self._opened, live.request.points)
+                self._scratch = turns.Work(lambda progress: answer_all(requests, progress))
+            if not self._scratch.turn(TURN):
+                return
+            (answer,) = self._scratch.result()
+            self._scratch = None
+            live.take(answer)
+        elif live.steps_left:
+            live.step()
+        else:
+            return
+        self._show_drag()
+
+    def _show_drag(self) -> None:
+        points = self.changed(self._opened)
+        live = self._live
+        curve = None if live is None else live.curve
+        problem = "" if live is None else live.problem
+        overlay.show_dragged(self._opened, points, curve, problem)
+        if curve is not None and live.request.start is not self._opened.curve:
+            self._preview.show(curve)
+        redraw()
+
+    def _release(self, context):
+        live, opened = self._live, self._opened
+        moved = np.isnan(self._pressed).any()
+        if not moved and not self._is_new:
+            self._let_go(context)
+            return {"CANCELLED"}
+        self._points = self.changed(opened)
+        self.position = opened.surface.points(self.dragged.faces, self.dragged.barycentric)[0]
+        requests = edited_curve.request(opened, self._points)
+        design = None
+        if live is not None and not live.waiting and not live.problem:
+            # What is seen is kept: the curve goes on from there.
+            requests = [live.request]
+            if not live.steps_left and hasattr(live.request.start, "curves"):
+                design = live.request.start
+        self._let_go(context)
+        return reporting(self, lambda: self._keep(context, requests, design))
+
+    def _keep(self, context, requests: list, design):
+        if design is not None:
+            return self.finish(context, requests, [design])
+        # The points stay visible while a long computation goes on.
+        overlay.show_dragged(self._opened, self._points, self._opened.curve)
+        result = set()
+        try:
+            result = self.answer(context, requests)
+        finally:
+            if "RUNNING_MODAL" not in result:
+                overlay.show_dragged(None)
+        return result
+
+    def _tidy(self, context):
+        overlay.show_dragged(None)
+        super()._tidy(context)
+
+    def _stop_scratch(self) -> None:
+        if self._scratch is not None:
+            self._scratch.cancel()
+            self._scratch = None
+
+    def _let_go(self, context) -> None:
+        """Restore the window and the object."""
+        self._is_dragging = False
+        self._stop_scratch()
+        self._preview.restore()
+        overlay.show_dragged(None)
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+        redraw()
+
+
+class _Preview:
+    """Shows the dragged curve in its object, in a copy of the data that is removed afterwards."""
+
+    def __init__(self, opened) -> None:
+        self._opened = opened
+        self._kept = self._copy = ""
+
+    def show(self, curve) -> None:
+        """Draw a curve."""
+        shown = self._opened.curve_object
+        if shown is None:
+            return
+        if not self._copy:
+            copy = shown.data.copy()
+            self._kept, self._copy = shown.data.name, copy.name
+            shown.data = copy
+        writing.show_unfinished(shown, self._opened.surface, curve)
+
+    def restore(self) -> None:
+        """Give the object its own data again."""
+        shown = self._opened.curve_object
+        if not self._copy or shown is None:
+            return
+        all_data = bpy.data.curves if shown.type == "CURVE" else bpy.data.hair_curves
+        kept, copy = all_data.get(self._kept), all_data.get(self._copy)
+        if kept is not None:
+            shown.data = kept
+        if copy is not None and copy != shown.data:
+            all_data.remove(copy)
+        self._copy = ""
