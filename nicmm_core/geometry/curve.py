@@ -226,15 +226,14 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
         unknown[-1] = False
     for point in np.flatnonzero(unknown).tolist():
         both = np.concatenate([support[point], support[following[point]]])
-        candidates = mesh.faces_at(both[both >= 0][:1])
-        holds = _holds(mesh.faces[candidates], np.tile(both, (len(candidates), 1)))
-        if not holds.any():
+        common = mesh.faces_with(both[both >= 0])
+        if not len(common):
             raise CurveError(
                 f"curve is not on this mesh: no face holds its points {point} and "
                 f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
                 "there share no vertices, merge vertices by distance and design it again"
             )
-        found[point] = candidates[holds.argmax()]
+        found[point] = common[0]
     return found
 
 

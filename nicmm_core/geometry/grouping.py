@@ -114,3 +114,11 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     checkpoint()
     number, label = csgraph.connected_components(graph, directed=False)
     return int(number), label.astype(np.int64)
+
+
+def path_between(previous: IntArray, start: int, end: int) -> list[int]:
+    """Nodes of a shortest path, from the predecessors that a search from its start has found."""
+    path = [end]
+    while path[-1] != start:
+        path.append(int(previous[path[-1]]))
+    return path[::-1]

@@ -95,11 +95,6 @@ def root_delta(value: Array, width: float) -> Array:
     return math.e ** (-0.25 * (value / width) ** 2) / math.sqrt(width * math.sqrt(2.0 * math.pi))
 
 
-def gaussian_delta(value: Array, width: float) -> Array:
-    """G_σ(φ): a Gaussian of unit integral for the Dirac delta of Eq. 5."""
-    return root_delta(value, width) ** 2
-
-
 def slope_residual(squared_slope: Array) -> Array:
     """Residual of Eq. 3, |∇φ|² - 1; the energy is the integral of ½ residual²."""
     return squared_slope - 1.0

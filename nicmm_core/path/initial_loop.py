@@ -55,12 +55,16 @@ class InitialLoop:
     zigzag: float
     closed: bool = True
 
+    @property
+    def edges(self) -> IntArray:
+        """Pairs of consecutive vertices, shape (l, 2), or (l - 1, 2) of an open path."""
+        pairs = np.stack([self.vertices, np.roll(self.vertices, -1)], axis=1)
+        return pairs if self.closed else pairs[:-1]
+
     def neighbours(self, place: int) -> list[int]:
         """The previous and the next vertex at an index of the path."""
-        places = [place - 1, place + 1]
-        if self.closed:
-            return [int(self.vertices[i % len(self.vertices)]) for i in places]
-        return [int(self.vertices[i]) for i in places if 0 <= i < len(self.vertices)]
+        edges = self.edges
+        return edges[(edges == self.vertices[place])[:, ::-1]].tolist()
 
 
 def build_initial_loop(

@@ -13,6 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.grouping import components, path_between
 from ..geometry.mesh import Mesh, unique_edges
 from ..progress import checkpoint
 from .leg_graph import Node, Patch, nonmanifold_vertices
@@ -160,10 +161,7 @@ class LegSearch:
         patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
         free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
-        entries = (np.ones(len(free_arcs)), (free_arcs[:, 0], free_arcs[:, 1]))
-        _, label = csgraph.connected_components(
-            sparse.coo_array(entries, shape=(patch.size, patch.size)), directed=False
-        )
+        _, label = components(patch.size, *free_arcs.T)
         whole = patch.graph(patch.lengths)
 
         def reached(vertex: int) -> set[int]:
@@ -195,10 +193,7 @@ class LegSearch:
         )
         if previous[there] < 0:
             return None
-        places = [int(there)]
-        while places[-1] != here:
-            places.append(int(previous[places[-1]]))
-        places = self._without_crossing(patch, places[::-1])
+        places = self._without_crossing(patch, path_between(previous, int(here), int(there)))
         steps = np.stack([places[:-1], places[1:]], axis=1)
         length = float(patch.step_lengths(steps).sum())
         return Leg([patch.node(place) for place in places], length)

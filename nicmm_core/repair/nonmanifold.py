@@ -20,8 +20,8 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import components, distinct_rows, grouped
-from ..geometry.mesh import Mesh
+from ..geometry.grouping import distinct_rows, grouped
+from ..geometry.mesh import Mesh, joined_corners
 from ..progress import checkpoint
 from .degenerate_faces import flat_faces, with_areas
 from .edge_subdivision import SubdividedFaces, subdivided
@@ -75,15 +75,16 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
         return _with_areas(mesh, welded, corners, vertices, kept, None, place)
     joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.branching]
     parts = sides.subdivided([SEGMENTS * len(pieces) for pieces in joins], len(mesh.vertices))
-    start, end = mesh.vertices[parts.edge_points[:, :2].astype(np.int64)].transpose(1, 0, 2)
-    share = parts.edge_points[:, 2:]
-    centroids = mesh.vertices[mesh.faces[kept]].mean(axis=1)[np.unique(parts.parent[_split(parts)])]
-    vertices = np.concatenate([mesh.vertices, (1.0 - share) * start + share * end, centroids])
+    vertices = np.empty((int(parts.faces.max()) + 1, 3))
+    vertices[: len(mesh.vertices)] = mesh.vertices
+    face = kept[parts.parent]
+    new = parts.faces >= len(mesh.vertices)
+    at_corners = np.einsum("fcd,fdk->fck", parts.corners, mesh.vertices[mesh.faces[face]])
+    vertices[parts.faces[new]] = at_corners[new]
     place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
     pieces = _Sides(parts.faces, place)
     pairs = np.concatenate([pieces.plain_pairs, _piece_pairs(sides.branching, joins, parts)])
     corners, vertex = pieces.cut(pairs, len(vertices))
-    face = kept[parts.parent]
     vertices, place = vertices[vertex], place[vertex]
     return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
 
@@ -113,11 +114,6 @@ def _has_lone_twins(mesh: Mesh) -> bool:
 def _without_twins(faces: IntArray) -> IntArray:
     """Indices of the faces without duplicates of earlier faces, ascending."""
     return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
-
-
-def _split(parts: SubdividedFaces) -> IntArray:
-    """The children of divided faces, ascending."""
-    return np.flatnonzero((parts.corners[:, 2] < 1.0).all(axis=1))
 
 
 Joins = list[IntArray]
@@ -249,24 +245,18 @@ class _Sides:
         (v,) int array
             The original vertex of each vertex.
         """
-        corner = self._faces.ravel()
         one, other = pairs.T
         checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
         columns = np.concatenate([self._low[other], self._high[other]])
-        n_labels, label = components(len(corner), rows, columns)
-        source = np.zeros(n_labels, dtype=np.int64)
-        source[label] = corner
+        group, source = joined_corners(self._faces, rows, columns)
         # One of the copies keeps the number of the vertex.
         order, begin, _ = grouped(source)
-        first = order[begin]
-        number = np.full(n_labels, -1)
-        number[first] = source[first]
-        new = np.flatnonzero(number < 0)
+        new = np.delete(np.arange(len(source)), order[begin])
         checkpoint()
+        number = source.copy()
         number[new] = n_vertices + np.arange(len(new))
-        vertex = np.concatenate([np.arange(n_vertices), source[new]])
-        return number[label].reshape(-1, 3), vertex
+        return number[group], np.concatenate([np.arange(n_vertices), source[new]])
 
 
 def _opposite(outward: FloatArray) -> IntArray:

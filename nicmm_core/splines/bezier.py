@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.distances import distance_to_segments
 from ..geometry.tolerances import TINY
-from .polyline import CORNER, CutPolyline, angles, cut_polyline, distances_to_segments
+from .polyline import CORNER, CutPolyline, angles, cut_polyline
 
 SAMPLES = 16
 """Points of the polyline that each cubic is fitted to, besides its vertices."""
@@ -462,7 +463,7 @@ def _deviations(
     """
     distance = np.linalg.norm(target - _at(cubic, span, parameter), axis=1)
     middle = _at(cubic, span[:-1], 0.5 * (parameter[:-1] + parameter[1:]))
-    off = distances_to_segments(middle, target[:-1], target[1:])
+    off = distance_to_segments(middle, target[:-1], target[1:])
     off[first_row[1:] - 1] = 0.0  # from one span to the next
     distance[:-1] = np.maximum(distance[:-1], off)
     return np.maximum.reduceat(distance, first_row)
