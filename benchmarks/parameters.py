@@ -55,7 +55,7 @@ class Outcome:
     bending : float
         L ∮ κ_g² ds.
     slope : float
-        Median of |∇φ| in the narrow band about the level set; nan where there is none.
+        Median of |∇φ| in the narrow band about the level set; nan without one.
     """
 
     curve: SurfaceCurve

@@ -24,7 +24,7 @@ from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
-from ..repair.degenerate_faces import flat_faces, with_areas
+from ..repair.degenerate_faces import degenerate_faces, with_areas
 
 TIE_BREAK = 1e-6
 """Greatest change of an edge's length, relative to it, for each of its ends."""
@@ -154,7 +154,7 @@ def _with_areas(mesh: Mesh) -> Mesh:
     """A mesh without degenerate faces: on a grid, three seeds may be collinear."""
     vertices, faces = mesh.vertices, mesh.faces
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
-    flat = flat_faces(vertices, faces, short)
+    flat = degenerate_faces(vertices, faces, short)
     if not flat.any():
         return mesh
     origin = vertices[faces[0, 0]]

@@ -79,7 +79,7 @@ def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
 
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
-    """The point some share of the way from one point of a curve to the next, in a face of both."""
+    """The point at a share of a segment of a curve, in a face that contains the segment."""
     curve, segment_faces = checked_curve(mesh, curve)
     ends = np.array([segment, (segment + 1) % len(curve.faces)])
     there = segment_faces[[segment, segment]]

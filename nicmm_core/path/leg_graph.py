@@ -26,7 +26,7 @@ class Patch:
         Vertices of the split mesh, sorted.
     edges : (E, 2) int array
         Sorted.
-    on_rim, branching : (E,) bool array
+    on_rim, nonmanifold_edges : (E,) bool array
         Edges with one face, and with more than two.
     positions : (n + E, 3) float array
         Of the nodes.
@@ -39,7 +39,7 @@ class Patch:
     vertices: IntArray
     edges: IntArray
     on_rim: BoolArray
-    branching: BoolArray
+    nonmanifold_edges: BoolArray
     positions: FloatArray
     weight: FloatArray
     arcs: IntArray

@@ -32,7 +32,7 @@ Two strands of a loop then pass a thin limb on opposite sides, which leaves room
 between them.
 """
 
-BRANCH_FACTOR = 20.0
+NONMANIFOLD_FACTOR = 20.0
 """Factor of lengths at non-manifold vertices and edges.
 
 These belong to several sheets and can be passed only once, so a leg uses them only where it must.
@@ -124,7 +124,7 @@ class LegSearch:
         self._component = component
         self._phi_fea = phi_fea
         self._clearance = clearance
-        self._pinched = nonmanifold_vertices(mesh)
+        self._nonmanifold = nonmanifold_vertices(mesh)
         corners = mesh.vertices[mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
@@ -175,7 +175,7 @@ class LegSearch:
         self, patch: Patch, source: int, target: int, obstacles: BlockedElements, limit: float
     ) -> Leg | None:
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
-        factor = self._branch_factor(patch)
+        factor = self._nonmanifold_factor(patch)
         if factor is not None:
             lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
@@ -246,7 +246,7 @@ class LegSearch:
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
-            branching=count > 2,
+            nonmanifold_edges=count > 2,
             positions=node_position,
             weight=weight,
             arcs=arcs,
@@ -258,7 +258,7 @@ class LegSearch:
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
         # A boundary vertex where fans of faces meet may be the only connection between them.
-        free[np.setdiff1d(patch.edges[patch.on_rim], self._pinched_here(patch))] = False
+        free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.places(obstacles.vertices)] = False
         if len(obstacles.edges):
@@ -270,20 +270,20 @@ class LegSearch:
         free[ends] = True
         return free
 
-    def _branch_factor(self, patch: Patch) -> FloatArray | None:
+    def _nonmanifold_factor(self, patch: Patch) -> FloatArray | None:
         """Factor of lengths at each node, or None on a manifold."""
-        pinched = self._pinched_here(patch)
-        if not (len(pinched) or patch.branching.any()):
+        nonmanifold = self._nonmanifold_here(patch)
+        if not (len(nonmanifold) or patch.nonmanifold_edges.any()):
             return None
         factor = np.ones(patch.size)
-        factor[pinched] = BRANCH_FACTOR
-        factor[patch.edges[patch.branching]] = BRANCH_FACTOR
-        factor[len(patch.vertices) + np.flatnonzero(patch.branching)] = BRANCH_FACTOR
+        factor[nonmanifold] = NONMANIFOLD_FACTOR
+        factor[patch.edges[patch.nonmanifold_edges]] = NONMANIFOLD_FACTOR
+        factor[len(patch.vertices) + np.flatnonzero(patch.nonmanifold_edges)] = NONMANIFOLD_FACTOR
         return factor
 
-    def _pinched_here(self, patch: Patch) -> IntArray:
+    def _nonmanifold_here(self, patch: Patch) -> IntArray:
         n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
-        return np.flatnonzero(self._pinched[patch.vertices[:n_input]])
+        return np.flatnonzero(self._nonmanifold[patch.vertices[:n_input]])
 
     def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
         assert self._phi_fea is not None

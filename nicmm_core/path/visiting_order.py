@@ -172,9 +172,9 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
         if gain[i, j] > best:
             best = float(gain[i, j])
             onward = np.roll(tour, -int(i))
-            section, rest = onward[:count], onward[count:]
+            section, others = onward[:count], onward[count:]
             if turned[i, j] < straight[i, j]:
                 section = section[::-1]
             place = int(offset[i, j]) - count + 1
-            moved = np.concatenate([rest[:place], section, rest[place:]])
+            moved = np.concatenate([others[:place], section, others[place:]])
     return best, moved

@@ -23,7 +23,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.grouping import distinct_rows, grouped
 from ..geometry.mesh import Mesh, joined_corners
 from ..progress import checkpoint
-from .degenerate_faces import flat_faces, with_areas
+from .degenerate_faces import degenerate_faces, with_areas
 from .edge_subdivision import SubdividedFaces, subdivided
 from .mapped_mesh import MappedMesh
 
@@ -67,23 +67,27 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     if mesh.has_nonmanifold_edges or is_welded or _has_lone_twins(mesh):
         kept = kept[_without_twins(welded[mesh.faces[kept]])]
     sides = _Sides(mesh.faces[kept], welded)
-    if not sides.branching:
+    if not sides.nonmanifold_edges:
         if connected:
             return None
         corners, vertex = sides.cut(sides.plain_pairs, len(mesh.vertices))
         vertices, place = mesh.vertices[vertex], welded[vertex]
         return _with_areas(mesh, welded, corners, vertices, kept, None, place)
-    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.branching]
+    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.nonmanifold_edges]
     parts = sides.subdivided([SEGMENTS * len(pieces) for pieces in joins], len(mesh.vertices))
     vertices = np.empty((int(parts.faces.max()) + 1, 3))
     vertices[: len(mesh.vertices)] = mesh.vertices
     face = kept[parts.parent]
     new = parts.faces >= len(mesh.vertices)
-    at_corners = np.einsum("fcd,fdk->fck", parts.corners, mesh.vertices[mesh.faces[face]])
-    vertices[parts.faces[new]] = at_corners[new]
+    corners = mesh.vertices[mesh.faces[face]]
+    vertices[parts.faces[new]] = np.einsum("fcd,fdk->fck", parts.corners, corners)[new]
+    centroid = new[:, 2]  # no other new vertex is the last corner of a face
+    vertices[parts.faces[centroid, 2]] = corners[centroid].mean(axis=1)
     place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
     pieces = _Sides(parts.faces, place)
-    pairs = np.concatenate([pieces.plain_pairs, _piece_pairs(sides.branching, joins, parts)])
+    pairs = np.concatenate(
+        [pieces.plain_pairs, _piece_pairs(sides.nonmanifold_edges, joins, parts)]
+    )
     corners, vertex = pieces.cut(pairs, len(vertices))
     vertices, place = vertices[vertex], place[vertex]
     return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
@@ -120,10 +124,12 @@ Joins = list[IntArray]
 """For each piece of an edge, the pairs of its sides that are joined there, (p, 2)."""
 
 
-def _piece_pairs(branching: list[IntArray], joins: list[Joins], parts: SubdividedFaces) -> IntArray:
+def _piece_pairs(
+    nonmanifold_edges: list[IntArray], joins: list[Joins], parts: SubdividedFaces
+) -> IntArray:
     """Pairs of joined sides of the subdivided faces at edges of more than two faces, (p, 2)."""
     pairs = []
-    for at_edge, pieces in zip(branching, joins, strict=True):
+    for at_edge, pieces in zip(nonmanifold_edges, joins, strict=True):
         checkpoint()
         child = parts.first_child[at_edge]
         for number, chosen in enumerate(pieces):
@@ -173,7 +179,7 @@ class _Sides:
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
-    def branching(self) -> list[IntArray]:
+    def nonmanifold_edges(self) -> list[IntArray]:
         """Sides of each edge with more than two faces."""
         several = self._count > 2
         return [
@@ -209,7 +215,7 @@ class _Sides:
     def subdivided(self, segments: list[int], n_vertices: int) -> SubdividedFaces:
         """The faces with edges of more than two faces divided into segments."""
         edge_of_side = np.full(self._faces.size, -1)
-        for number, at_edge in enumerate(self.branching):
+        for number, at_edge in enumerate(self.nonmanifold_edges):
             edge_of_side[at_edge] = number
         counts = np.array(segments, dtype=np.int64)
         return subdivided(self._faces, self._low, self._high, edge_of_side, counts, n_vertices)
@@ -287,7 +293,7 @@ def _with_areas(
         corners = None if corners is None else corners[whole]
     checkpoint()
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
-    flat = flat_faces(vertices, faces, short)
+    flat = degenerate_faces(vertices, faces, short)
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
     origin = np.zeros(3)

@@ -11,7 +11,7 @@ COLLECTIONS = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 
 
 def mesh_files(folder: str) -> list[Path]:
-    """Mesh files of a collection, sorted; stops with a word where there is none."""
+    """Mesh files of a collection, sorted; stops with a message if it has no such file."""
     root = COLLECTIONS / folder
     files = sorted(path for path in root.rglob("*") if path.suffix.lower() in MESH_FORMATS)
     if not files:
