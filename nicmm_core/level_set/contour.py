@@ -64,10 +64,11 @@ def extract_curves(
     """
     passed = _passed_vertices(working, field, control_vertices, bundle)
     through = np.concatenate([control_vertices, passed])
-    nodes, segments, segment_face = _segments(working, field, through, bundle)
-    chains = _chains(segments, len(nodes))
+    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
+    # A node is an edge on which φ changes sign, smaller vertex first, or a zero vertex twice.
+    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
-    for chain, along, closed in chains:
+    for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
         if closed:
             chain, along = _from_first_control(chain, along, nodes, control_vertices)
         elif _runs_backwards(nodes[chain], control_vertices):
@@ -140,33 +141,6 @@ def segment_ends(
     fraction = _crossing_fraction(field, first, second)[..., None]
     points = (1.0 - fraction) * vertices[first] + fraction * vertices[second]
     return crossed, points[:, 0], points[:, 1]
-
-
-def _segments(
-    working: WorkingMesh, field: FloatArray, through: IntArray, bundle: SignBundle | None
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Contour nodes, the segments between them and the face of each segment.
-
-    Parameters
-    ----------
-    working : WorkingMesh
-    field : (n,) float array
-    through : (q,) int array
-        Vertices that count as zero.
-    bundle : SignBundle or None
-
-    Returns
-    -------
-    nodes : (p, 2) int array
-        The working edge on which φ changes sign, smaller index first, or a zero vertex twice.
-    segments : (s, 2) int array
-        Node indices.
-    segment_face : (s,) int array
-        Working face of each segment.
-    """
-    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
-    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    return nodes, index.reshape(-1, 2), segment_face
 
 
 def _crossings(

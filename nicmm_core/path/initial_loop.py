@@ -18,7 +18,7 @@ from scipy.sparse import csgraph
 from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, edge_keys, side_keys
 from ..geometry.surface_points import SurfacePoints, control_point_names
 from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
@@ -273,12 +273,11 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
     following = np.roll(path, -1)
     if not loop.closed:
         following[-1] = path[-2]  # the last point lies on the last segment
-    sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = len(working.vertices)
-    keys = np.sort(sides, axis=1) @ [size, 1]
+    keys = side_keys(working.faces, size)
     order = np.argsort(keys, kind="stable")
-    wanted = np.sort(np.stack([path, following], axis=1), axis=1) @ [size, 1]
-    face = working.parent_face[order[np.searchsorted(keys[order], wanted)] // 3]
+    first = np.searchsorted(keys[order], edge_keys(path, following, size))
+    face = working.parent_face[order[first] // 3]
     corners = mesh.faces[face]
     barycentric = np.asarray(working.interpolation[path[:, None], corners].todense())
     place = np.full(size, -1)

@@ -94,23 +94,11 @@ class Patch:
 
 
 def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
-    """Vertices whose faces form more than one fan, shape (V,)."""
-    _, vertex_of_fan = fans(mesh)
-    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1
-
-
-def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Fans of faces about the vertices.
+    """Vertices whose faces form more than one fan, shape (V,).
 
     Faces at a vertex belong to the same fan if edges at that vertex connect them.
-
-    Returns
-    -------
-    (F, 3) int array
-        The fan of each corner.
-    (number of fans,) int array
-        The vertex of each fan.
     """
     ends = side_corners(mesh.faces)
     one, other = adjacent_sides(mesh.faces)
-    return joined_corners(mesh.faces, ends[one].ravel(), ends[other].ravel())
+    _, vertex_of_fan = joined_corners(mesh.faces, ends[one].ravel(), ends[other].ravel())
+    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1

@@ -14,7 +14,7 @@ from scipy.sparse import csgraph
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components, path_between
-from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.mesh import Mesh, side_keys, unique_edges
 from ..progress import checkpoint
 from .leg_graph import Node, Patch, nonmanifold_vertices
 from .virtual_splits import SplitMesh
@@ -220,10 +220,8 @@ class LegSearch:
         corner = self._split.positions(vertices)
         node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
         checkpoint()
-        sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        keys = edges[:, 0] * n_vertices + edges[:, 1]
-        side_node = n_vertices + np.searchsorted(keys, sides[:, 0] * n_vertices + sides[:, 1])
-        side_node = side_node.reshape(-1, 3)
+        keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
+        side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
         checkpoint()
         inner = count > 1
         midpoint = n_vertices + np.flatnonzero(inner)

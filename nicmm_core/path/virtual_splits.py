@@ -16,7 +16,7 @@ from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, triangle_areas, unique_edges
+from ..geometry.mesh import Mesh, edge_lengths, triangle_areas, unique_edges
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 
@@ -59,8 +59,7 @@ class WorkingMesh:
     @cached_property
     def edge_lengths(self) -> FloatArray:
         """Length of each edge, shape (E,)."""
-        start, end = self.edges.T
-        return np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1)
+        return edge_lengths(self.vertices, self.edges)
 
     @cached_property
     def face_areas(self) -> FloatArray:
