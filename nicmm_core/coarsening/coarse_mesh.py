@@ -187,13 +187,10 @@ def _nearest_seeds(
     bounds = np.quantile(along, np.linspace(0.0, 1.0, n_slabs + 1))
     if n_slabs == 1:
         margin = np.inf
-    is_seed = np.zeros(len(vertices), dtype=bool)
-    is_seed[seed] = True
-    number = np.cumsum(is_seed) - 1  # seeds are ascending
     nearest = np.full(len(vertices), -1)
     for low, high in itertools.pairwise(bounds):
         near = np.flatnonzero((along >= low - margin) & (along <= high + margin))
-        seeds = np.flatnonzero(is_seed[near])
+        seeds = np.flatnonzero(np.isin(near, seed, assume_unique=True))
         if not len(seeds):
             continue
         part = graph if len(near) == len(along) else graph[near][:, near]
@@ -203,5 +200,5 @@ def _nearest_seeds(
             limit=margin,
         )  # fmt: skip
         own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
-        nearest[near[own]] = number[near[found[own]]]
+        nearest[near[own]] = np.searchsorted(seed, near[found[own]])
     return nearest

@@ -30,7 +30,8 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = mesh.unoriented_vertices
     checkpoint()
-    folded = np.setdiff1d(_corners_of_folded_faces(mesh, normals), mixed)
+    # Corners of faces at an angle of at least 90° to the normal of a corner.
+    folded = np.setdiff1d(mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)], mixed)
     owner, face_normals, areas = _faces_around(mesh, folded)
     area_vector = np.zeros((len(folded), 3))
     np.add.at(area_vector, owner, areas[:, None] * face_normals)
@@ -42,16 +43,6 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
     normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
     return normals
-
-
-def _corners_of_folded_faces(mesh: Mesh, normals: FloatArray) -> IntArray:
-    """Vertices of faces at an angle of at least 90° to the normal of a corner, ascending.
-
-    A normal of zero counts too.
-    """
-    folded = np.zeros(len(mesh.vertices), dtype=bool)
-    folded[mesh.faces[(_facing(mesh, normals) <= 0.0).any(axis=1)]] = True
-    return np.flatnonzero(folded)
 
 
 def folded_faces(mesh: Mesh, normals: FloatArray) -> BoolArray | None:

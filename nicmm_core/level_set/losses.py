@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ..geometry.array_types import Array
+from ..geometry.array_types import Array, FloatArray
 from .problem import Problem
 
 Operator = Callable[[Array], Array]
@@ -157,6 +157,12 @@ def loss_terms(surface: EnergySurface, phi: Array) -> dict[str, Array]:
         "smooth": smoothness_loss(surface, phi),
         "fea": feature_loss(surface, phi),
     }
+
+
+def energy_of(problem: Problem, field: FloatArray) -> dict[str, float]:
+    """The terms of the energy of a level set, unweighted, as numbers."""
+    terms = loss_terms(energy_surface(problem), field)
+    return {name: float(value) for name, value in terms.items()}
 
 
 def balanced(weights: LossWeights, problem: Problem) -> LossWeights:

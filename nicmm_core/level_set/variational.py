@@ -20,7 +20,7 @@ from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.distances import build_distance_surface
 from ..progress import checkpoint
 from ..status import Status
-from .losses import LossWeights, energy_surface, loss_terms
+from .losses import LossWeights, energy_of
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
 from .problem import Problem
 from .redistancing import redistanced
@@ -126,9 +126,7 @@ def solve(
             break
         field = redistanced(surface, moved, controls, reach, problem.bundle)
     field = redistanced(surface, best_field, controls, bundle=problem.bundle)
-    terms = loss_terms(energy_surface(problem), field)
-    terms = {name: float(value) for name, value in terms.items()}
-    return Solution(field, terms, losses, status, keeps_topology=True)
+    return Solution(field, energy_of(problem, field), losses, status, keeps_topology=True)
 
 
 def _is_still(least: list[float], config: VariationalConfig) -> bool:

@@ -155,6 +155,7 @@ class _Tours:
 
     def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
         self._mesh, self._points, self.closed = mesh, points, closed
+        self.given = np.arange(len(points))
 
     def of(self, order: str) -> Iterator[IntArray]:
         """The orders to try for a request, the best one first."""
@@ -163,11 +164,6 @@ class _Tours:
         else:
             yield self.shortest
             yield self.along_boundaries
-
-    @property
-    def given(self) -> IntArray:
-        """The caller's order, (k,)."""
-        return np.arange(len(self._points))
 
     @cached_property
     def shortest(self) -> IntArray:

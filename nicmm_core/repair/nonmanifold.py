@@ -62,10 +62,9 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
         welded = welded_vertices(mesh)
         if (welded == np.arange(len(welded))).all():
             return None
-    is_welded = number >= 2
     kept = usable
-    if mesh.has_nonmanifold_edges or is_welded or _has_lone_twins(mesh):
-        kept = kept[_without_twins(welded[mesh.faces[kept]])]
+    if mesh.has_nonmanifold_edges or number >= 2 or _has_lone_twins(mesh):
+        kept = usable[_without_twins(welded[mesh.faces[usable]])]
     sides = _Sides(mesh.faces[kept], welded)
     if not sides.nonmanifold_edges:
         if connected:
