@@ -124,10 +124,12 @@ def build_coarse_mesh(
     MeshError
         If the cells meet in no face.
     """
-    faces = mesh.faces[mesh.face_component == component]
-    areas = np.zeros(len(mesh.vertices))
+    inside = mesh.face_component == component
+    faces = mesh.faces[inside]
     checkpoint()
-    np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
+    thirds = np.repeat(mesh.face_areas[inside] / 3.0, 3)
+    areas: FloatArray = np.bincount(faces.ravel(), thirds, len(mesh.vertices))
+    checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # The place of a vertex decides what chance would, and not its number.
     places = frame_coordinates(mesh)

@@ -110,9 +110,10 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
         The component of each node, numbered by their first nodes.
     """
     checkpoint()
-    graph = sparse.csr_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(size, size))
+    graph = sparse.csr_array((np.ones(len(one)), (one, other)), shape=(size, size))
     checkpoint()
     number, label = csgraph.connected_components(graph, directed=False)
+    checkpoint()
     return int(number), label.astype(np.int64)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import LARGEST, Mesh
@@ -116,6 +117,7 @@ def frame_coordinates(mesh: Mesh) -> IntArray:
 def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The centre, (3,), the signed axes, (3, 3), and the vertices in that frame, (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
+    checkpoint()
     axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
         places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
@@ -165,6 +167,7 @@ def principal_frame(
 ) -> PrincipalFrame:
     """The frame of a surface, computed from the centroids and areas of its faces."""
     centroids = vertices[faces].mean(axis=1)
+    checkpoint()
     share = face_areas / face_areas.sum()
     centre = share @ centroids
     offset = centroids - centre
