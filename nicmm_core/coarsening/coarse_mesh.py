@@ -128,10 +128,10 @@ def build_coarse_mesh(
     faces = mesh.faces[inside]
     checkpoint()
     thirds = np.repeat(mesh.face_areas[inside] / 3.0, 3)
-    areas: FloatArray = np.bincount(faces.ravel(), thirds, len(mesh.vertices))
+    areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
-    # The place of a vertex decides what chance would, and not its number.
+    # Hashes of positions replace random numbers, so that the numbering makes no difference.
     places = frame_coordinates(mesh)
     checkpoint()
     chance = uniform_hash(places)
