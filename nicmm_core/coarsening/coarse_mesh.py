@@ -168,11 +168,13 @@ def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
 
     They are changed by a little, so that no two paths on a grid are equally long.
     """
-    length = edge_lengths(mesh.vertices, mesh.edges)
+    edges = mesh.edges
     checkpoint()
-    length *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
+    length = edge_lengths(mesh.vertices, edges)
+    checkpoint()
+    length *= 1.0 + TIE_BREAK * chance[edges].sum(axis=1)
     size = len(mesh.vertices)
-    return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
+    return sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))
 
 
 def _nearest_seeds(

@@ -110,7 +110,9 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
         The component of each node, numbered by their first nodes.
     """
     checkpoint()
-    graph = sparse.csr_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    arcs = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    arcs.has_canonical_format = True  # repeated arcs need not be summed
+    graph = arcs.tocsr()
     checkpoint()
     number, label = csgraph.connected_components(graph, directed=False)
     checkpoint()

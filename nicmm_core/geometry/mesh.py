@@ -75,6 +75,7 @@ class Mesh:
     def face_normals(self) -> FloatArray:
         """Unit normal of each face, shape (F, 3); zero if it has no area."""
         normal = _area_vectors(self.vertices, self.faces)
+        checkpoint()
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return normal / np.where(length > 0.0, length, 1.0)
 

@@ -38,6 +38,7 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> Boo
     sides -= vertices[faces]
     checkpoint()
     lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
+    checkpoint()
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     without = twice_area <= tolerances.WITHOUT_AREA * lengths[:, 0] * lengths[:, 2]
     return without | (lengths[:, 0] <= short)

@@ -157,6 +157,7 @@ class _Sides:
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
+        checkpoint()
         one = welded[vertices[first]]
         other = welded[vertices[second]]
         checkpoint()
