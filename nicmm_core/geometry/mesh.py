@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..errors import MeshError
+from ..errors import ArgumentError, MeshError, NicmmError
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped, stable_order
@@ -353,13 +353,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"faces has shape {checked.shape}; pass triangles of shape (F, 3), with quads and "
             "larger faces triangulated"
         )
-    outside = ((checked < 0) | (checked >= n_vertices)).any(axis=1)
-    if outside.any():
-        first = int(outside.argmax())
-        raise MeshError(
-            f"faces[{first}] = {checked[first].tolist()} refers to vertices that do not exist; "
-            f"indices must lie in 0 … {n_vertices - 1}"
-        )
+    check_indices("faces", checked, n_vertices, MeshError)
     repeated = (checked == np.roll(checked, 1, axis=1)).any(axis=1)
     if repeated.any():
         first = int(repeated.argmax())
@@ -368,6 +362,19 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"({repeated.sum()} such faces); remove degenerate faces"
         )
     return checked
+
+
+def check_indices(
+    name: str, rows: IntArray, n_vertices: int, error: type[NicmmError] = ArgumentError
+) -> None:
+    """Raise an error if rows of indices, (n, m), are not those of vertices."""
+    outside = ((rows < 0) | (rows >= n_vertices)).any(axis=1)
+    if outside.any():
+        first = int(outside.argmax())
+        raise error(
+            f"{name}[{first}] = {rows[first].tolist()} refers to vertices that do not exist; "
+            f"indices must lie in 0 … {n_vertices - 1}"
+        )
 
 
 def same_mesh(one: Mesh, other: Mesh) -> bool:

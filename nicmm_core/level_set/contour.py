@@ -69,10 +69,7 @@ def extract_curves(
     nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
     for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
-        if closed:
-            chain, along = _from_first_control(chain, along, nodes, control_vertices)
-        elif _runs_backwards(nodes[chain], control_vertices):
-            chain, along = chain[::-1], along[::-1]
+        chain, along = _directed(chain, along, closed, nodes, control_vertices)
         parent = working.parent_face[segment_face[along]]
         # The last point of an open chain has no segment after it and lies on the one before.
         parent = parent if closed else np.append(parent, parent[-1])
@@ -209,25 +206,23 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
     return chains
 
 
-def _from_first_control(
-    chain: IntArray, along: IntArray, nodes: IntArray, control_vertices: IntArray
+def _directed(
+    chain: IntArray, along: IntArray, closed: bool, nodes: IntArray, control_vertices: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Start a closed chain at its first control point, directed towards the second."""
+    """A chain, and its segments, from its first control point towards the second.
+
+    An open chain keeps its ends, and passes its first control point before its last one.
+    """
     where = _positions_in(nodes[chain], control_vertices)
     where = where[where >= 0]
-    if not len(where):
-        return chain, along
-    chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
-    if len(where) > 2 and (where[1] - where[0]) % len(chain) > (where[2] - where[0]) % len(chain):
-        chain, along = np.roll(chain[::-1], 1), along[::-1]
+    if closed and len(where):
+        chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
+        onward = (where - where[0]) % len(chain)
+        if len(onward) > 2 and onward[1] > onward[2]:
+            chain, along = np.roll(chain[::-1], 1), along[::-1]
+    elif len(where) > 1 and where[0] > where[-1]:
+        chain, along = chain[::-1], along[::-1]
     return chain, along
-
-
-def _runs_backwards(nodes: IntArray, control_vertices: IntArray) -> bool:
-    """Whether an open chain passes its last control point first."""
-    where = _positions_in(nodes, control_vertices)
-    where = where[where >= 0]
-    return len(where) > 1 and bool(where[0] > where[-1])
 
 
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:

@@ -15,8 +15,8 @@ from scipy import sparse
 from ..arguments import checked_number, checked_vertex_values
 from ..errors import ArgumentError
 from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, adjacent_sides, edge_keys, side_keys, unique_edges
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh, adjacent_sides, check_indices, edge_keys, side_keys, unique_edges
 from ..geometry.normals import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
@@ -297,11 +297,5 @@ def _checked_pairs(edges: ArrayLike, n_vertices: int) -> IntArray:
         ) from error
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise ArgumentError(f"edges has shape {pairs.shape}; pass vertex indices of shape (n, 2)")
-    outside: BoolArray = ((pairs < 0) | (pairs >= n_vertices)).any(axis=1)
-    if outside.any():
-        first = int(outside.argmax())
-        raise ArgumentError(
-            f"edges[{first}] = {pairs[first].tolist()} refers to vertices that do not exist; "
-            f"indices must lie in 0 … {n_vertices - 1}"
-        )
+    check_indices("edges", pairs, n_vertices)
     return pairs
