@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -119,7 +121,7 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     return int(number), label.astype(np.int64)
 
 
-def path_between(previous: IntArray, start: int, end: int) -> list[int]:
+def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -> list[int]:
     """Nodes of a shortest path, from the predecessors that a search from its start has found."""
     path = [end]
     while path[-1] != start:

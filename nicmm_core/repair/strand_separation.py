@@ -14,6 +14,7 @@ import numpy as np
 
 from ..geometry.array_types import IntArray
 from ..geometry.crossings import crossing_segments
+from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, joined, weights_at
 
@@ -208,7 +209,4 @@ def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
             if corner != vertex and beyond >= 0 and int(beyond) not in previous:
                 previous[int(beyond)] = face
                 queue.append(int(beyond))
-    chain = [end]
-    while chain[-1] != start:
-        chain.append(previous[chain[-1]])
-    return chain[::-1]
+    return path_between(previous, start, end)
