@@ -155,10 +155,7 @@ class Mesh:
 
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces at any of the given vertices, ascending."""
-        begin, end = self.vertex_faces.indptr[vertices], self.vertex_faces.indptr[vertices + 1]
-        count = end - begin
-        place = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
-        return np.unique(self.vertex_faces.indices[place]).astype(np.int64)
+        return np.unique(self.vertex_faces[vertices].indices).astype(np.int64)
 
     def faces_with(self, vertices: IntArray) -> IntArray:
         """Faces that have all of the given vertices, ascending."""

@@ -114,9 +114,7 @@ class SplitMesh:
     def faces_around(self, vertex: int) -> set[int]:
         """Living faces at a vertex."""
         if vertex not in self._faces_around:
-            incidence = self._mesh.vertex_faces
-            start, end = incidence.indptr[vertex : vertex + 2]
-            self._faces_around[vertex] = {int(face) for face in incidence.indices[start:end]}
+            self._faces_around[vertex] = set(self._mesh.faces_at(np.array([vertex])).tolist())
         return self._faces_around[vertex]
 
     def position(self, vertex: int) -> FloatArray:

@@ -78,15 +78,11 @@ def subdivided(
         weights = (1.0 - share)[:, None] * np.eye(3)[here % 3]
         return vertex, weights + share[:, None] * np.eye(3)[there % 3]
 
-    (start, start_weights), (stop, stop_weights) = end(step), end(step + 1)
     middle = n_vertices + n_points + row // 3
     middle_weights = np.full((len(row), 3), 1.0 / 3.0)
     # Side j runs from corner j + 1 to corner j + 2 in the orientation of the face.
     along = (low[side] % 3 == (side % 3 + 1) % 3)[row]
-    swap = ~along
-    one, other = np.where(swap, stop, start), np.where(swap, start, stop)
-    one_weights = np.where(swap[:, None], stop_weights, start_weights)
-    other_weights = np.where(swap[:, None], start_weights, stop_weights)
+    (one, one_weights), (other, other_weights) = end(step + ~along), end(step + along)
     checkpoint()
     first_child = np.full(faces.size, -1)
     first_child[side] = len(whole) + first
