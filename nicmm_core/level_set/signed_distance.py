@@ -11,7 +11,7 @@ from ..geometry.sides import two_sides
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
 from .finite_elements import FiniteElements
-from .sparse_solver import factorise
+from .sparse_solver import factorised
 
 LEAST_DISTANCE = 1e-3
 """Least distance of a vertex off the loop, in mean edge lengths; the heat method may give 0."""
@@ -63,15 +63,14 @@ def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> F
     mass = sparse.diags_array(elements.vertex_areas)
     heat = np.zeros(len(elements.vertex_areas))
     heat[sources] = 1.0
-    heat = factorise(mass + time * elements.stiffness).solve(heat)
+    heat = factorised(mass + time * elements.stiffness)(heat)
     gradient = (elements.gradient @ heat).reshape(3, -1)
     length = np.linalg.norm(gradient, axis=0)
     # Where the heat underflows to zero, there is no direction.
     direction = -gradient / np.where(length > 0.0, length, 1.0)
     flux = elements.gradient.T @ (elements.face_areas * direction).ravel()
     area = elements.vertex_areas.sum()
-    poisson = factorise(elements.stiffness + (POISSON_SHIFT / area) * mass)
-    distance = poisson.solve(flux)
+    distance = factorised(elements.stiffness + (POISSON_SHIFT / area) * mass)(flux)
     return distance - distance[sources].mean()
 
 

@@ -25,7 +25,7 @@ from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_s
 from .problem import Problem
 from .redistancing import redistanced
 from .solution import Solution
-from .sparse_solver import factorise
+from .sparse_solver import factorised
 from .topology import breaking_vertices
 from .vertex_links import VertexLinks
 
@@ -197,5 +197,5 @@ def _damped_step(
     """Solve the damped system for the unknowns that may move, shape (u,)."""
     system = hessian + damping * band.damping
     step = np.zeros(len(gradient))
-    step[free] = factorise(system[free][:, free]).solve(-gradient[free])
+    step[free] = factorised(system[free][:, free])(-gradient[free])
     return step
