@@ -180,10 +180,10 @@ class _Fitter:
         self.sharp = self.corner.copy()
         if not line.closed:
             self.sharp[ends] = True
-        self.fixed = _union(line.bounds, np.flatnonzero(self.corner))
+        self.fixed = np.union1d(line.bounds, np.flatnonzero(self.corner))
         if line.closed and len(self.fixed) == 2:  # one cubic would start where it ends
             halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
-            self.fixed = _union(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
+            self.fixed = np.union1d(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
 
     def _corners(self) -> BoolArray:
         """Where the polyline turns sharply: (n,), one vertex at each place."""
@@ -347,7 +347,7 @@ def _split(fitter: _Fitter) -> IntArray:
         if not bad.any():
             return knots
         known_end[start], known[start] = np.where(bad, -1, end), both
-        knots = _union(knots, fitter.splits(start[bad], end[bad], deviation[bad]))
+        knots = np.union1d(knots, fitter.splits(start[bad], end[bad], deviation[bad]))
 
 
 def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -383,11 +383,6 @@ def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
         points[-1] = points[0]
     bounds = np.unique(kept[line.bounds])
     return CutPolyline(points, line.arc[moves], line.closed, line.vertex[moves], bounds), kept
-
-
-def _union(first: IntArray, second: IntArray) -> IntArray:
-    joined: IntArray = np.unique(np.concatenate([first, second]))
-    return joined
 
 
 def _unit(vectors: FloatArray, others: FloatArray) -> FloatArray:
