@@ -35,6 +35,7 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> Boo
     """
     checkpoint()
     sides = vertices[np.roll(faces, -1, axis=1)]
+    checkpoint()
     sides -= vertices[faces]
     checkpoint()
     lengths = np.sort(np.linalg.norm(sides, axis=2), axis=1)
@@ -75,6 +76,7 @@ def with_areas(
     for _ in range(ATTEMPTS):
         moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
         moves[faces[still]] = True
+        checkpoint()
         move = generator.uniform(-1.0, 1.0, start.shape) * reach[:, None]
         vertices = np.where(moves[:, None], start + move, vertices)
         still = degenerate_faces(vertices, faces, short)
@@ -94,5 +96,6 @@ def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> Floa
     n_places, place = components(len(vertices), *edges[lengths <= short].T)
     shortest = np.full(n_places, np.inf)
     for end in edges[lengths > short].T:
+        checkpoint()
         np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]
