@@ -121,6 +121,7 @@ def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
     axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
         places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
+    checkpoint()
     return frame.centre, axes, places
 
 

@@ -78,6 +78,7 @@ def with_areas(
         moves[faces[still]] = True
         checkpoint()
         move = generator.uniform(-1.0, 1.0, start.shape) * reach[:, None]
+        checkpoint()
         vertices = np.where(moves[:, None], start + move, vertices)
         still = degenerate_faces(vertices, faces, short)
         if not still.any():
