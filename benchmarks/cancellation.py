@@ -1,4 +1,4 @@
-"""How soon a design stops that the caller wants no more: the time between two questions."""
+"""How soon a design stops after it is cancelled: the time between two checks."""
 
 from __future__ import annotations
 

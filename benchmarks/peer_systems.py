@@ -126,7 +126,7 @@ class SystemsProcess:
         self._start()
 
     def ask(self, name: str, task: Task, patience: float) -> Answer | str:
-        """A system's answer, or in words why there is none.
+        """A system's answer, or the reason why it gives no curve.
 
         Parameters
         ----------

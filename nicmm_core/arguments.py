@@ -62,22 +62,33 @@ def _checked_number(option: Option, value: Any) -> float:
     """A finite number within the limits of an option."""
     low, high = option.limits
     what = "a length" if option.kind is Kind.LENGTH else "a number"
+    number = checked_number(option.name, value, f"{what}{_limits(option)}")
+    if not low <= number <= high:
+        raise ArgumentError(f"{option.name} is {value!r}; pass {what}{_limits(option)}")
+    return number
+
+
+def checked_number(name: str, value: Any, what: str = "a finite number") -> float:
+    """A finite number; otherwise an ArgumentError says to pass ``what``."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(f"{option.name} is {value!r}; pass {what}") from error
-    if not (low <= number <= high and np.isfinite(number)):
-        limits = f"of at least {low:g}" if np.isinf(high) else f"in {low:g} … {high:g}"
-        raise ArgumentError(f"{option.name} is {value!r}; pass {what} {limits}")
+        raise ArgumentError(f"{name} is {value!r}; pass {what}") from error
+    if not np.isfinite(number):
+        raise ArgumentError(f"{name} is {value!r}; pass {what}")
     return number
+
+
+def _limits(option: Option) -> str:
+    low, high = option.limits
+    return f" of at least {low:g}" if np.isinf(high) else f" in {low:g} … {high:g}"
 
 
 def _checked_count(option: Option, value: Any) -> int:
     """A whole number within the limits of an option."""
     low, high = option.limits
     if not (_is_whole(value) and low <= value <= high):
-        limits = f"of at least {low:g}" if np.isinf(high) else f"in {low:g} … {high:g}"
-        raise ArgumentError(f"{option.name} is {value!r}; pass a whole number {limits}")
+        raise ArgumentError(f"{option.name} is {value!r}; pass a whole number{_limits(option)}")
     return int(value)
 
 

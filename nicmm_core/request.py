@@ -24,7 +24,7 @@ class Request:
     closed : bool
     order : {"given", "shortest"}
     via_points : dict
-        From the index of a control point to points on the way to the next one.
+        From the index of a control point to points on the path to the next one.
     method : {"nicmm", "nicmm-paper", "variational"}
     smoothness : float
     obstacles : (V,) float array or None

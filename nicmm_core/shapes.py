@@ -37,10 +37,7 @@ def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int 
     index = np.arange(around * across).reshape(around, across)
     right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
     corner = np.roll(right, -1, axis=1)
-    faces = np.concatenate(
-        [np.stack([index, right, corner], axis=-1), np.stack([index, corner, up], axis=-1)]
-    )
-    return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+    return Mesh(vertices.reshape(-1, 3), _halved_quads(index, right, corner, up))
 
 
 def cube(pieces: int = 8) -> Mesh:
@@ -49,8 +46,7 @@ def cube(pieces: int = 8) -> Mesh:
     u, v = (axis.ravel() for axis in np.meshgrid(grid, grid, indexing="ij"))
     index = np.arange(u.size).reshape(pieces + 1, pieces + 1)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    side = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
-    side = side.reshape(-1, 3)
+    side = _halved_quads(a, b, c, d)
     points: list[FloatArray] = []
     faces: list[IntArray] = []
     for axis in range(3):
@@ -91,8 +87,7 @@ def moebius_strip(around: int = 48, across: int = 8) -> Mesh:
     index = np.arange(u.size).reshape(u.shape)
     onward = np.concatenate([index[1:], index[:1, ::-1]])
     a, b, c, d = index[:, :-1], onward[:, :-1], onward[:, 1:], index[:, 1:]
-    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
-    return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+    return Mesh(vertices.reshape(-1, 3), _halved_quads(a, b, c, d))
 
 
 def double_torus(faces: int = 700, subdivisions: int = 1) -> Mesh:
@@ -185,6 +180,12 @@ def _used_part(vertices: FloatArray, faces: IntArray) -> Mesh:
     """Faces with only the vertices that they use."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], renumbered.reshape(-1, 3).astype(np.int64))
+
+
+def _halved_quads(a: IntArray, b: IntArray, c: IntArray, d: IntArray) -> IntArray:
+    """Triangles abc of all quads, then triangles acd, (n, 3)."""
+    halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((a, b, c), (a, c, d))]
+    return np.concatenate(halves)
 
 
 def _hull_faces(vertices: FloatArray) -> IntArray:

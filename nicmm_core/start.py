@@ -28,7 +28,7 @@ from .request import Request
 
 WITHOUT_START = "; design it without start"
 
-LONGEST_WAY = 1.5
+LONGEST_TRACE = 1.5
 """Longest trace from the old to the new place of a control point, relative to their distance."""
 
 STEPS = 4
@@ -152,7 +152,7 @@ def _routes(
     inside = SurfacePoints(here.faces, strictly_inside(here.barycentric))
     normals = curve.nodes.normals[at_controls]
     distance = np.linalg.norm(points.positions(mesh) - here.positions(mesh), axis=1)
-    traces = trace_between(mesh, inside, points, normals, LONGEST_WAY * distance, surface.folded)
+    traces = trace_between(mesh, inside, points, normals, LONGEST_TRACE * distance, surface.folded)
     if not traces.reached.all():
         return None
     routes = []

@@ -24,7 +24,7 @@ from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
-from ..repair.degenerate_faces import flat_faces, with_areas
+from ..repair.degenerate_faces import degenerate_faces, with_areas
 
 TIE_BREAK = 1e-6
 """Greatest change of an edge's length, relative to it, for each of its ends."""
@@ -124,12 +124,14 @@ def build_coarse_mesh(
     MeshError
         If the cells meet in no face.
     """
-    faces = mesh.faces[mesh.face_component == component]
-    areas = np.zeros(len(mesh.vertices))
+    inside = mesh.face_component == component
+    faces = mesh.faces[inside]
     checkpoint()
-    np.add.at(areas, faces, mesh.face_areas[mesh.face_component == component, None] / 3.0)
+    thirds = np.repeat(mesh.face_areas[inside] / 3.0, 3)
+    areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
+    checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
-    # The place of a vertex decides what chance would, and not its number.
+    # Hashes of positions replace random numbers, so that the numbering makes no difference.
     places = frame_coordinates(mesh)
     checkpoint()
     chance = uniform_hash(places)
@@ -154,7 +156,7 @@ def _with_areas(mesh: Mesh) -> Mesh:
     """A mesh without degenerate faces: on a grid, three seeds may be collinear."""
     vertices, faces = mesh.vertices, mesh.faces
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
-    flat = flat_faces(vertices, faces, short)
+    flat = degenerate_faces(vertices, faces, short)
     if not flat.any():
         return mesh
     origin = vertices[faces[0, 0]]
@@ -166,11 +168,13 @@ def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
 
     They are changed by a little, so that no two paths on a grid are equally long.
     """
-    length = edge_lengths(mesh.vertices, mesh.edges)
+    edges = mesh.edges
     checkpoint()
-    length *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
+    length = edge_lengths(mesh.vertices, edges)
+    checkpoint()
+    length *= 1.0 + TIE_BREAK * chance[edges].sum(axis=1)
     size = len(mesh.vertices)
-    return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
+    return sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))
 
 
 def _nearest_seeds(
@@ -187,13 +191,10 @@ def _nearest_seeds(
     bounds = np.quantile(along, np.linspace(0.0, 1.0, n_slabs + 1))
     if n_slabs == 1:
         margin = np.inf
-    is_seed = np.zeros(len(vertices), dtype=bool)
-    is_seed[seed] = True
-    number = np.cumsum(is_seed) - 1  # seeds are ascending
     nearest = np.full(len(vertices), -1)
     for low, high in itertools.pairwise(bounds):
         near = np.flatnonzero((along >= low - margin) & (along <= high + margin))
-        seeds = np.flatnonzero(is_seed[near])
+        seeds = np.flatnonzero(np.isin(near, seed, assume_unique=True))
         if not len(seeds):
             continue
         part = graph if len(near) == len(along) else graph[near][:, near]
@@ -203,5 +204,5 @@ def _nearest_seeds(
             limit=margin,
         )  # fmt: skip
         own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
-        nearest[near[own]] = number[near[found[own]]]
+        nearest[near[own]] = np.searchsorted(seed, near[found[own]])
     return nearest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -79,7 +80,6 @@ class CoarseStarts:
     def __init__(self, surface: CurveSurface) -> None:
         self._mesh, self._fine = surface.mesh, surface
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
-        self._sizes: dict[int, int] = {}
         self._large: dict[int, bool] = {}
 
     def courses(self, request: Request, draw: int = 0) -> Iterator[CoarseStart]:
@@ -88,21 +88,18 @@ class CoarseStarts:
         A small mesh has no coarse mesh, and where points are close together no course may be found.
         Draws above 0 give other courses.
         """
-        for level in self._levels(request):
-            try:
-                on_coarse = _on_coarse(self._mesh, level.coarse, request)
-                for course in level.courses.courses(on_coarse, draw):
-                    checkpoint()
-                    nodes = noded(
-                        level.surface, course.places, course.control_nodes, request.closed
-                    )
-                    controls = request.points[course.visited]
-                    curve = nodes_on_fine_mesh(self._fine, level.coarse, nodes, controls)
-                    if curve is not None:
-                        yield CoarseStart(curve, course.visited)
-            except NicmmError:
-                return
+        level = next(self._levels(request), None)
+        if level is None:
             return
+        with contextlib.suppress(NicmmError):
+            on_coarse = _on_coarse(self._mesh, level.coarse, request)
+            for course in level.courses.courses(on_coarse, draw):
+                checkpoint()
+                nodes = noded(level.surface, course.places, course.control_nodes, request.closed)
+                controls = request.points[course.visited]
+                curve = nodes_on_fine_mesh(self._fine, level.coarse, nodes, controls)
+                if curve is not None:
+                    yield CoarseStart(curve, course.visited)
 
     def by_network(self, request: Request) -> CoarseStart | None:
         """The curve of the coarsest mesh on which the network finds one, or None.
@@ -111,12 +108,10 @@ class CoarseStarts:
         are close together; the caller then falls back to full resolution.
         """
         for level in self._levels(request):
-            try:
+            with contextlib.suppress(NicmmError):
                 start = self._by_network_on(level, request)
-            except NicmmError:
-                continue
-            if start is not None:
-                return start
+                if start is not None:
+                    return start
         return None
 
     def is_large(self, request: Request) -> bool:
@@ -136,19 +131,13 @@ class CoarseStarts:
         most = self._n_vertices(component) // REDUCTION
         count = min(CELLS, most)
         while count <= most:
-            try:
-                level = self._surface(component, count)
-            except MeshError:
-                level = None
-            if level is not None:
-                yield level
+            with contextlib.suppress(MeshError):
+                yield self._surface(component, count)
             count *= GROWTH
 
     def _n_vertices(self, component: int) -> int:
-        if component not in self._sizes:
-            inside = self._mesh.faces[self._mesh.face_component == component]
-            self._sizes[component] = np.count_nonzero(np.bincount(inside.ravel()))
-        return self._sizes[component]
+        inside = self._mesh.faces[self._mesh.face_component == component]
+        return np.count_nonzero(np.bincount(inside.ravel()))
 
     def _by_network_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         coarse, copy = level.coarse, level.courses.copy

@@ -8,6 +8,7 @@ stays on that side.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.sparse import csgraph
 
 from ..geometry.array_types import IntArray
 from ..geometry.curve import SurfaceCurve
+from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh, unique_edges
 from ..geometry.surface_points import SurfacePoints, joined, nearest_points
 from ..geometry.tracing import strictly_inside
@@ -153,49 +155,30 @@ def _path_along_edges(
     _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
     if previous[there] < 0:
         return None
-    path = [int(previous[there])]
-    while path[-1] != here:
-        path.append(int(previous[path[-1]]))
-    path = vertices[path[-2::-1]].tolist()
-    return _points_of_path(mesh, ends, path)
+    path = path_between(previous, here, there)[1:-1]
+    return _points_of_path(mesh, ends, vertices[path].tolist())
 
 
 def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> SurfacePoints | None:
     """A path along vertices as points, with its start, each in the face of the next segment."""
-    start, end = ({*_support(mesh, ends, number)} for number in range(2))
+    weights = [
+        {vertex: weight for vertex, weight in zip(*point, strict=True) if weight > 0.0}
+        for point in zip(mesh.faces[ends.faces].tolist(), ends.barycentric.tolist(), strict=True)
+    ]
     # An end that is itself a vertex must not be repeated.
-    if start == {path[0]}:
-        path = path[1:]
-    if path and end == {path[-1]}:
-        path = path[:-1]
-    stops = [start, *({vertex} for vertex in path), end]
+    inner = [{vertex: 1.0} for vertex in path]
+    inner = inner[weights[0].keys() == {path[0]} :]
+    if inner and weights[1].keys() == {path[-1]}:
+        inner.pop()
+    stops = [weights[0], *inner, weights[1]]
     faces, barycentric = [], []
-    for number, (one, other) in enumerate(zip(stops[:-1], stops[1:], strict=True)):
-        face = _common_face(mesh, one | other)
-        if face is None:
+    for here, there in itertools.pairwise(stops):
+        common = mesh.faces_with(np.array([*here, *there]))
+        if not len(common):
             return None
-        corners = mesh.faces[face].tolist()
-        faces.append(face)
-        weight = dict.fromkeys(one, 1.0)
-        if number == 0:
-            own = mesh.faces[ends.faces[0]].tolist()
-            weight = dict(zip(own, ends.barycentric[0].tolist(), strict=True))
-        barycentric.append([weight.get(corner, 0.0) for corner in corners])
+        faces.append(common[0])
+        barycentric.append([here.get(corner, 0.0) for corner in mesh.faces[common[0]].tolist()])
     return SurfacePoints(np.array(faces, dtype=np.int64), np.array(barycentric))
-
-
-def _support(mesh: Mesh, points: SurfacePoints, number: int) -> list[int]:
-    """The vertices with nonzero weight at a point."""
-    return mesh.faces[points.faces[number]][points.barycentric[number] > 0.0].tolist()
-
-
-def _common_face(mesh: Mesh, vertices: set[int]) -> int | None:
-    """The face of lowest index that has all the vertices."""
-    around = [mesh.faces_at(np.array([vertex])) for vertex in sorted(vertices)]
-    common = around[0]
-    for faces in around[1:]:
-        common = np.intersect1d(common, faces)
-    return int(common.min()) if len(common) else None
 
 
 def _with_bridges(

@@ -79,7 +79,7 @@ def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
 
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
-    """The point some share of the way from one point of a curve to the next, in a face of both."""
+    """The point at a share of a segment of a curve, in a face that contains the segment."""
     curve, segment_faces = checked_curve(mesh, curve)
     ends = np.array([segment, (segment + 1) % len(curve.faces)])
     there = segment_faces[[segment, segment]]
@@ -226,15 +226,14 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
         unknown[-1] = False
     for point in np.flatnonzero(unknown).tolist():
         both = np.concatenate([support[point], support[following[point]]])
-        candidates = mesh.faces_at(both[both >= 0][:1])
-        holds = _holds(mesh.faces[candidates], np.tile(both, (len(candidates), 1)))
-        if not holds.any():
+        common = mesh.faces_with(both[both >= 0])
+        if not len(common):
             raise CurveError(
                 f"curve is not on this mesh: no face holds its points {point} and "
                 f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
                 "there share no vertices, merge vertices by distance and design it again"
             )
-        found[point] = candidates[holds.argmax()]
+        found[point] = common[0]
     return found
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -110,7 +112,18 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
         The component of each node, numbered by their first nodes.
     """
     checkpoint()
-    graph = sparse.csr_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(size, size))
+    arcs = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    arcs.has_canonical_format = True  # repeated arcs need not be summed
+    graph = arcs.tocsr()
     checkpoint()
     number, label = csgraph.connected_components(graph, directed=False)
+    checkpoint()
     return int(number), label.astype(np.int64)
+
+
+def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -> list[int]:
+    """Nodes of a shortest path, from the predecessors that a search from its start has found."""
+    path = [end]
+    while path[-1] != start:
+        path.append(int(previous[path[-1]]))
+    return path[::-1]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..errors import MeshError
+from ..errors import ArgumentError, MeshError, NicmmError
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
-from .grouping import components, grouped
+from .grouping import components, grouped, stable_order
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Bounds on coordinates and the mesh's diagonal, so that powers of lengths stay representable."""
@@ -108,6 +108,7 @@ class Mesh:
         checkpoint()
         rises = (self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]).ravel()
         alike = one[rises[one] == rises[other]]
+        checkpoint()
         several = order[np.repeat(count > 2, count)]
         twice = np.concatenate([alike, _sides_in_one_direction(self.faces, several)])
         corners = self.faces[twice // 3]
@@ -130,7 +131,7 @@ class Mesh:
         face, corner = np.nonzero(self.face_neighbours < 0)
         start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]
         size = len(self.vertices)
-        return _edges(_edge_keys(start, end, size), size)
+        return _edges(edge_keys(start, end, size), size)
 
     @cached_property
     def has_nonmanifold_edges(self) -> bool:
@@ -171,10 +172,13 @@ class Mesh:
 
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces at any of the given vertices, ascending."""
-        begin, end = self.vertex_faces.indptr[vertices], self.vertex_faces.indptr[vertices + 1]
-        count = end - begin
-        place = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
-        return np.unique(self.vertex_faces.indices[place]).astype(np.int64)
+        return np.unique(self.vertex_faces[vertices].indices).astype(np.int64)
+
+    def faces_with(self, vertices: IntArray) -> IntArray:
+        """Faces that have all of the given vertices, ascending."""
+        around = self.faces_at(vertices[:1])
+        holds = (self.faces[around][:, :, None] == vertices).any(axis=1).all(axis=1)
+        return around[holds]
 
     @cached_property
     def face_component(self) -> IntArray:
@@ -271,17 +275,63 @@ def corners_differ(faces: IntArray) -> BoolArray:
     return (one != other) & (other != third) & (third != one)
 
 
-def side_keys(faces: IntArray) -> IntArray:
-    """A key for the side opposite each corner, shape (3 F,), equal for the sides of one edge."""
-    size = int(faces.max()) + 1
+def side_keys(faces: IntArray, size: int | None = None) -> IntArray:
+    """A key for the side opposite each corner, shape (3 F,), equal for the sides of one edge.
+
+    ``size`` is above all vertex indices; by default it is taken from the faces.
+    """
+    size = int(faces.max(initial=0)) + 1 if size is None else size
     keys = np.empty(faces.shape, dtype=np.int64)
     for corner in range(3):
         checkpoint()
-        keys[:, corner] = _edge_keys(faces[:, corner - 2], faces[:, corner - 1], size)
+        keys[:, corner] = edge_keys(faces[:, corner - 2], faces[:, corner - 1], size)
     return keys.ravel()
 
 
-def _edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
+def adjacent_sides(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Pairs of sides at the same edge, both (p,); k - 1 pairs at an edge with k faces.
+
+    Side 3 f + j is opposite corner j of face f.
+    """
+    keys = side_keys(faces)
+    order = stable_order(keys)
+    checkpoint()
+    same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
+    return order[same], order[same + 1]
+
+
+def sides_among(faces: IntArray, edges: IntArray) -> BoolArray:
+    """Whether the side opposite each corner is one of some edges (e, 2), shape (3 F,)."""
+    size = int(max(faces.max(initial=0), edges.max(initial=0))) + 1
+    return np.isin(side_keys(faces, size), edge_keys(edges[:, 0], edges[:, 1], size))
+
+
+def side_corners(faces: IntArray) -> IntArray:
+    """Indices of the corners at the ends of each side, smaller vertex first, shape (3 F, 2)."""
+    corner = np.arange(faces.size).reshape(-1, 3)
+    ends = np.stack([corner[:, [1, 2, 0]], corner[:, [2, 0, 1]]], axis=2).reshape(-1, 2)
+    turned = faces.ravel()[ends[:, 0]] > faces.ravel()[ends[:, 1]]
+    ends[turned] = ends[turned, ::-1]
+    return ends
+
+
+def joined_corners(faces: IntArray, one: IntArray, other: IntArray) -> tuple[IntArray, IntArray]:
+    """Groups of corners of faces that pairs of them, both (p,), connect.
+
+    Returns
+    -------
+    (F, 3) int array
+        The group of each corner.
+    (number of groups,) int array
+        The vertex of each group.
+    """
+    n_groups, group = components(faces.size, one, other)
+    vertex = np.zeros(n_groups, dtype=np.int64)
+    vertex[group] = faces.ravel()
+    return group.reshape(-1, 3), vertex
+
+
+def edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
     """One key for each edge, which sorts several times faster than rows of two columns."""
     return np.minimum(start, end) * size + np.maximum(start, end)
 
@@ -344,13 +394,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"faces has shape {checked.shape}; pass triangles of shape (F, 3), with quads and "
             "larger faces triangulated"
         )
-    outside = ((checked < 0) | (checked >= n_vertices)).any(axis=1)
-    if outside.any():
-        first = int(outside.argmax())
-        raise MeshError(
-            f"faces[{first}] = {checked[first].tolist()} refers to vertices that do not exist; "
-            f"indices must lie in 0 … {n_vertices - 1}"
-        )
+    check_indices("faces", checked, n_vertices, MeshError)
     repeated = ~corners_differ(checked)
     if repeated.any():
         first = int(repeated.argmax())
@@ -359,6 +403,19 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"({repeated.sum()} such faces); remove degenerate faces"
         )
     return checked
+
+
+def check_indices(
+    name: str, rows: IntArray, n_vertices: int, error: type[NicmmError] = ArgumentError
+) -> None:
+    """Raise an error if rows of indices, (n, m), are not those of vertices."""
+    outside = ((rows < 0) | (rows >= n_vertices)).any(axis=1)
+    if outside.any():
+        first = int(outside.argmax())
+        raise error(
+            f"{name}[{first}] = {rows[first].tolist()} refers to vertices that do not exist; "
+            f"indices must lie in 0 … {n_vertices - 1}"
+        )
 
 
 def same_mesh(one: Mesh, other: Mesh) -> bool:

@@ -41,9 +41,7 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
     against = _facing(mesh, normals) <= 0.0  # a normal of zero counts too
     if not len(mixed) and not against.any():
         return normals, None
-    corners = np.zeros(len(mesh.vertices), dtype=bool)
-    corners[mesh.faces[against.any(axis=1)]] = True
-    folded = np.setdiff1d(np.flatnonzero(corners), mixed)
+    folded = np.setdiff1d(mesh.faces[against.any(axis=1)], mixed)
     owner, face_normals, areas = _faces_around(mesh, folded)
     area_vector = np.zeros((len(folded), 3))
     np.add.at(area_vector, owner, areas[:, None] * face_normals)

@@ -1,4 +1,4 @@
-"""A copy of a mesh that its surface decides: numbers by place, coordinates in its principal frame.
+"""A canonical copy of a mesh: numbered by position, with coordinates in its principal frame.
 
 Which path is found among several of about the same length depends on the order in which vertices
 and faces are visited. Here they are sorted by their places in the principal frame of the surface,
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import LARGEST, Mesh, blocks
@@ -62,7 +63,7 @@ class Renumbered:
         return positions @ self.axes.T + self.centre
 
     def points(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the original on the copy; vertices of it in faces that the copy decides."""
+        """Points of the original on the copy, each in the face of lowest index there."""
         place = np.empty(len(self.face), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
         faces = place[points.faces]
@@ -92,7 +93,7 @@ class Renumbered:
 
 
 def renumbered(mesh: Mesh) -> Renumbered:
-    """The copy of a mesh that its surface decides."""
+    """The canonical copy of a mesh."""
     centre, axes, places = _in_frame(mesh)
     order = np.lexsort(_rounded(mesh, places).T[::-1])
     number = np.empty(len(order), dtype=np.int64)
@@ -116,9 +117,11 @@ def frame_coordinates(mesh: Mesh) -> IntArray:
 def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The centre, (3,), the signed axes, (3, 3), and the vertices in that frame, (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
+    checkpoint()
     axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
         places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
+    checkpoint()
     return frame.centre, axes, places
 
 

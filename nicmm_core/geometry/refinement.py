@@ -12,6 +12,12 @@ from .array_types import FloatArray, IntArray
 from .mesh import Mesh
 from .surface_points import SurfacePoints
 
+POINTS = np.concatenate([np.eye(3), 0.5 * (1.0 - np.eye(3))])
+"""Barycentric coordinates of the corners of a face and of the midpoints opposite them."""
+
+PARTS = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]])
+"""Which of these points are the corners of each part of a face."""
+
 
 @dataclass(frozen=True)
 class Refined:
@@ -60,20 +66,14 @@ def refined(mesh: Mesh, times: int) -> Refined:
     for _ in range(times):
         edge = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
         ends, number = np.unique(edge, axis=0, return_inverse=True)
-        a, b, c = faces.T
-        # Midpoints opposite each corner.
-        at_a, at_b, at_c = (weights.shape[0] + number.reshape(-1, 3)).T
+        midpoints = weights.shape[0] + number.reshape(-1, 3)  # opposite each corner
         halves = sparse.csr_array(
             (np.full(2 * len(ends), 0.5), ends.ravel(), 2 * np.arange(len(ends) + 1)),
             shape=(len(ends), weights.shape[0]),
         )
         weights = sparse.csr_array(sparse.vstack([weights, halves @ weights]))
-        parts = [(a, at_c, at_b), (at_c, b, at_a), (at_b, at_a, c), (at_a, at_b, at_c)]
-        faces = np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3)
-        p, q, r = corners.transpose(1, 0, 2)
-        pq, qr, rp = 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)
-        inner = [(p, pq, rp), (pq, q, qr), (rp, qr, r), (qr, rp, pq)]
-        corners = np.stack([np.stack(part, axis=1) for part in inner], axis=1).reshape(-1, 3, 3)
+        faces = np.concatenate([faces, midpoints], axis=1)[:, PARTS].reshape(-1, 3)
+        corners = np.einsum("pij,fjk->fpik", POINTS[PARTS], corners).reshape(-1, 3, 3)
         parent = np.repeat(parent, 4)
     divided = mesh if times == 0 else Mesh(weights @ mesh.vertices, faces)
     return Refined(divided, parent, corners, weights)

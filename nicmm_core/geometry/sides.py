@@ -7,10 +7,9 @@ of times. If a closed path crosses it an odd number of times, the curve bounds n
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from .array_types import BoolArray, IntArray
+from .grouping import components
 
 
 def two_sides(count: int, neighbours: IntArray, crossed: BoolArray) -> tuple[IntArray, IntArray]:
@@ -37,7 +36,6 @@ def two_sides(count: int, neighbours: IntArray, crossed: BoolArray) -> tuple[Int
     # The graph has two nodes for each, one for either side.
     rows = np.concatenate([one, one + count])
     columns = np.concatenate([other + odd * count, other + (1 - odd) * count])
-    graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
+    _, label = components(2 * count, rows, columns)
     here, there = label[:count], label[count:]
     return np.minimum(here, there), np.sign(there - here)

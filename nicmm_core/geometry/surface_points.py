@@ -43,8 +43,8 @@ class SurfacePoints:
     def __repr__(self) -> str:
         return f"<SurfacePoints: {len(self)} points>"
 
-    def __getitem__(self, index: IntArray | BoolArray) -> SurfacePoints:
-        """Some of the points, by an array of indices or a mask."""
+    def __getitem__(self, index: IntArray | BoolArray | slice) -> SurfacePoints:
+        """Some of the points, by an array of indices, a mask or a slice."""
         return SurfacePoints(self.faces[index], self.barycentric[index])
 
 
@@ -365,8 +365,8 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName
 def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
     """Concatenate sets of points."""
     return SurfacePoints(
-        np.concatenate([part.faces for part in parts]),
-        np.concatenate([part.barycentric for part in parts]),
+        np.concatenate([np.zeros(0, np.int64), *(part.faces for part in parts)]),
+        np.concatenate([np.zeros((0, 3)), *(part.barycentric for part in parts)]),
     )
 
 
@@ -383,9 +383,7 @@ def in_first_faces(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:
     faces = points.faces.copy()
     for number in np.flatnonzero((points.barycentric == 0.0).any(axis=1)).tolist():
         support = mesh.faces[faces[number]][points.barycentric[number] > 0.0]
-        around = mesh.faces_at(support[:1])
-        holds = (mesh.faces[around][:, :, None] == support).any(axis=1).all(axis=1)
-        faces[number] = around[holds.argmax()]
+        faces[number] = mesh.faces_with(support)[0]
     return in_faces(mesh, points, faces)
 
 

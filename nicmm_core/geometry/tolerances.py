@@ -50,7 +50,7 @@ CLEAN_CURVE = 1e-4
 """Greatest distance of a clean version of a curve from the curve, in bounding-box diagonals."""
 
 CLEAN_TUBE = 0.1
-"""That distance in radii, where a tube is drawn around the curve."""
+"""That distance in radii, if a tube is shown around the curve."""
 
 TINY = float(np.finfo(np.float64).tiny)
 """Least divisor, where the dividend is zero too."""
@@ -64,7 +64,7 @@ def of_clean_curve(diagonal: float, radius: float = 0.0) -> float:
     diagonal : float
         Diagonal of the bounding box of the mesh.
     radius : float, default 0
-        Radius of the tube that is drawn around the curve, in mesh units; 0 for none.
+        Radius of the tube that is shown around the curve, in mesh units; 0 for none.
     """
     of_mesh = CLEAN_CURVE * diagonal
     return min(of_mesh, CLEAN_TUBE * radius) if radius > 0.0 else of_mesh

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ArgumentError, MeshError
+from ..errors import ArgumentError, MeshError, NicmmError
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
 from .obj import read_obj
@@ -39,12 +39,7 @@ def read_mesh(path: str | Path) -> Mesh:
     MeshError
         If the file is missing, its extension is not supported, or it contains no mesh.
     """
-    try:
-        path = Path(path)
-    except TypeError as error:
-        raise MeshError(f"{path!r} is not a path of a mesh file; pass a str or a Path") from error
-    if path.suffix.lower() not in MESH_FORMATS:
-        raise MeshError(f"{path} is not a supported mesh file; use {', '.join(MESH_FORMATS)}")
+    path = _supported(path, MESH_FORMATS, MeshError, "of a mesh file")
     try:
         if not path.is_file():
             raise MeshError(f"{path} does not exist or is not a file; check the path of the mesh")
@@ -100,12 +95,7 @@ def check_curve_path(path: str | Path) -> Path:
 
 
 def _checked_output(path: str | Path, formats: tuple[str, ...]) -> Path:
-    try:
-        path = Path(path)
-    except TypeError as error:
-        raise ArgumentError(f"{path!r} is not a path to write to; pass a str or a Path") from error
-    if path.suffix.lower() not in formats:
-        raise ArgumentError(f"{path} has no supported extension; write to {', '.join(formats)}")
+    path = _supported(path, formats, ArgumentError, "to write to")
     try:
         has_folder = path.absolute().parent.is_dir()
     except OSError as error:  # a name that is too long
@@ -114,6 +104,19 @@ def _checked_output(path: str | Path, formats: tuple[str, ...]) -> Path:
         ) from error
     if not has_folder:
         raise ArgumentError(f"the folder of {path} does not exist; create it first")
+    return path
+
+
+def _supported(
+    path: str | Path, formats: tuple[str, ...], error: type[NicmmError], purpose: str
+) -> Path:
+    """A path with one of some extensions, or an error of the given type."""
+    try:
+        path = Path(path)
+    except TypeError as cause:
+        raise error(f"{path!r} is not a path {purpose}; pass a str or a Path") from cause
+    if path.suffix.lower() not in formats:
+        raise error(f"{path} has no supported extension; use {', '.join(formats)}")
     return path
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +42,9 @@ class _Element:
     properties: list[_Property] = field(default_factory=list)
 
 
+Fields = list[tuple[str, int]]
+"""The type and the number of values of each field of a row."""
+
 Columns = dict[str, tuple[FloatArray, IntArray]]
 """For each property, all values, row by row, and the number of values in each row."""
 
@@ -56,10 +58,10 @@ def read_ply(data: bytes) -> Polygons:
         If the header cannot be parsed, or the body is too short for it.
     """
     byte_order, elements, start = _header(data)
-    read = _text_reader(data[start:]) if byte_order == "" else _binary_reader(data, start)
+    body = _Binary(data, start, byte_order) if byte_order else _Text(data[start:])
     found: dict[str, Columns] = {}
     for element in elements:
-        found[element.name] = read(element, byte_order)
+        found[element.name] = _read(element, body)
         if "vertex" in found and ("face" in found or "tristrips" in found):
             break
     if "vertex" not in found or not ("face" in found or "tristrips" in found):
@@ -108,143 +110,91 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
     return byte_order, elements, newline + 1
 
 
-def _binary_reader(data: bytes, start: int) -> Callable[[_Element, str], Columns]:
-    """A function that reads the next element at each call."""
-    position = start
+class _Text:
+    """The body of a text file, read from a position on."""
 
-    def read(element: _Element, byte_order: str) -> Columns:
-        nonlocal position
-        sizes = _row_sizes(data, position, element, byte_order)
-        rows = np.zeros(0, dtype=_row_type(element, byte_order, sizes))
-        room = (len(data) - position) // rows.dtype.itemsize
-        if element.count <= room:
-            rows = np.frombuffer(data, rows.dtype, count=element.count, offset=position)
-        if element.count <= room and _are_alike(rows, sizes):
-            position += rows.nbytes
-            return _columns(element, rows, sizes)
-        columns, position = _uneven(data, position, element, byte_order)
-        return columns
+    def __init__(self, body: bytes) -> None:
+        self._tokens, self.position = body.split(), 0
 
-    return read
+    def room(self, fields: Fields) -> int:
+        """Number of rows with some fields that the rest has room for."""
+        return (len(self._tokens) - self.position) // max(sum(size for _, size in fields), 1)
+
+    def rows(self, fields: Fields, count: int) -> list[FloatArray]:
+        """The next rows: for each field an array (count, size)."""
+        sizes = [size for _, size in fields]
+        begin, self.position = self.position, self.position + count * sum(sizes)
+        table = floats(self._tokens[begin : self.position]).reshape(count, sum(sizes))
+        return np.split(table, np.cumsum(sizes)[:-1], axis=1)
 
 
-def _row_sizes(data: bytes, position: int, element: _Element, byte_order: str) -> dict[str, int]:
-    """Length of each list in the first row; 0 if there is no row."""
-    sizes: dict[str, int] = {}
+class _Binary:
+    """The body of a binary file, read from a position on."""
+
+    def __init__(self, data: bytes, position: int, byte_order: str) -> None:
+        self._data, self.position, self._byte_order = data, position, byte_order
+
+    def room(self, fields: Fields) -> int:
+        """Number of rows with some fields that the rest has room for."""
+        return (len(self._data) - self.position) // max(self._row(fields).itemsize, 1)
+
+    def rows(self, fields: Fields, count: int) -> list[FloatArray]:
+        """The next rows: for each field an array (count, size)."""
+        row = self._row(fields)
+        found = np.frombuffer(self._data, row, count, self.position)
+        self.position += found.nbytes
+        return [found[name].astype(np.float64) for name in row.names or ()]
+
+    def _row(self, fields: Fields) -> np.dtype:
+        names = enumerate(fields)
+        return np.dtype([(str(n), self._byte_order + kind, (size,)) for n, (kind, size) in names])
+
+
+def _read(element: _Element, body: _Text | _Binary) -> Columns:
+    """Read an element: all rows at once if their lists have the same lengths."""
+    begin = body.position
+    first = _row_by_row(element, min(element.count, 1), body)
+    body.position = begin
+    fields: Fields = []
     for column in element.properties:
-        if column.count_type is not None:
-            count, position = _count_at(data, position, column, byte_order) or (0, len(data))
-            sizes[column.name] = count
-            position += count * np.dtype(column.type).itemsize
-        else:
-            position += np.dtype(column.type).itemsize
-    return sizes
-
-
-def _count_at(
-    data: bytes, position: int, column: _Property, byte_order: str
-) -> tuple[int, int] | None:
-    """Length of the list at a position, and offset of its values; None if it does not fit."""
-    count_type = np.dtype(byte_order + str(column.count_type))
-    begin = position + count_type.itemsize
-    if begin > len(data):
-        return None
-    count = np.frombuffer(data, count_type, count=1, offset=position)[0]
-    if not 0 <= count <= (len(data) - begin) // np.dtype(column.type).itemsize:
-        return None
-    return int(count), begin
-
-
-def _row_type(element: _Element, byte_order: str, sizes: dict[str, int]) -> np.dtype:
-    """The type of a row whose lists have the given lengths."""
-    fields: list[tuple] = []
-    for place, column in enumerate(element.properties):
-        if column.count_type is not None:
-            fields.append((f"count {place}", byte_order + column.count_type))
-            fields.append((f"value {place}", byte_order + column.type, (sizes[column.name],)))
-        else:
-            fields.append((f"value {place}", byte_order + column.type))
-    return np.dtype(fields)
-
-
-def _are_alike(rows: np.ndarray, sizes: dict[str, int]) -> bool:
-    """Whether the lists have the same lengths in all rows as in the first one."""
-    counts = [rows[name] for name in rows.dtype.names or () if name.startswith("count")]
-    return all(bool((c == s).all()) for c, s in zip(counts, sizes.values(), strict=True))
-
-
-def _columns(element: _Element, rows: np.ndarray, sizes: dict[str, int]) -> Columns:
-    return {
-        column.name: (
-            rows[f"value {place}"].astype(np.float64).reshape(-1),
-            np.full(len(rows), sizes.get(column.name, 1)),
-        )
-        for place, column in enumerate(element.properties)
-    }
-
-
-def _uneven(data: bytes, position: int, element: _Element, byte_order: str) -> tuple[Columns, int]:
-    """Read rows with lists of different lengths one by one."""
-    values: dict[str, list[np.ndarray]] = {column.name: [] for column in element.properties}
-    sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
-    for row in range(element.count):
+        counts = [] if column.count_type is None else [(column.count_type, 1)]
+        fields += [*counts, (column.type, int(first[column.name][1].sum()))]
+    if element.count <= body.room(fields):
+        blocks = iter(body.rows(fields, element.count))
+        columns, alike = {}, True
         for column in element.properties:
-            kind = np.dtype(byte_order + column.type)
-            count, begin = 1, position
-            if column.count_type is not None:
-                count, begin = _count_at(data, position, column, byte_order) or (-1, position)
-            position = begin + count * kind.itemsize
-            if count < 0 or position > len(data):
-                raise FormatError(
-                    f"{element.name} {row} of {element.count} is beyond the end of the file, "
-                    "which may be truncated"
-                )
-            values[column.name].append(np.frombuffer(data, kind, count, begin))
-            sizes[column.name].append(count)
+            sizes = np.ones(element.count) if column.count_type is None else next(blocks).ravel()
+            values = next(blocks)
+            alike &= bool((sizes == values.shape[1]).all())
+            columns[column.name] = values.ravel(), sizes.astype(np.int64)
+        if alike:
+            return columns
+        body.position = begin
+    return _row_by_row(element, element.count, body)
+
+
+def _row_by_row(element: _Element, n_rows: int, body: _Text | _Binary) -> Columns:
+    """Read rows with lists of any lengths."""
+    values: dict[str, list[FloatArray]] = {column.name: [] for column in element.properties}
+    sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
+
+    def taken(kind: str, count: float) -> FloatArray:
+        if not (0 <= count <= body.room([(kind, 1)]) and count % 1 == 0):
+            raise FormatError(
+                f"the element {element.name!r} of {element.count} rows ends early, in row "
+                f"{len(sizes[element.properties[0].name])}; the file may be truncated"
+            )
+        return body.rows([(kind, int(count))], 1)[0].ravel()
+
+    for _ in range(n_rows):
+        for column in element.properties:
+            count = 1.0 if column.count_type is None else float(taken(column.count_type, 1)[0])
+            values[column.name].append(taken(column.type, count))
+            sizes[column.name].append(int(count))
     return {
-        name: (
-            np.concatenate([np.zeros(0), *values[name]]),
-            np.array(sizes[name], dtype=np.int64),
-        )
+        name: (np.concatenate([np.zeros(0), *values[name]]), np.array(sizes[name], dtype=np.int64))
         for name in values
-    }, position
-
-
-def _text_reader(body: bytes) -> Callable[[_Element, str], Columns]:
-    """A function that reads the next element at each call."""
-    tokens = body.split()
-    position = 0
-
-    def taken(count: int, element: _Element) -> list[bytes]:
-        nonlocal position
-        if not 0 <= count <= len(tokens) - position:
-            raise FormatError(f"the element {element.name!r} ends early; the file may be truncated")
-        position += count
-        return tokens[position - count : position]
-
-    def read(element: _Element, _: str) -> Columns:
-        n_columns = len(element.properties)
-        if all(column.count_type is None for column in element.properties):
-            table = floats(taken(element.count * n_columns, element)).reshape(-1, n_columns)
-            ones = np.ones(element.count, dtype=np.int64)
-            return {
-                column.name: (table[:, place], ones)
-                for place, column in enumerate(element.properties)
-            }
-        values: dict[str, list[bytes]] = {column.name: [] for column in element.properties}
-        sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
-        for _row in range(element.count):
-            for column in element.properties:
-                count = 1
-                if column.count_type is not None:
-                    count = whole(taken(1, element)[0])
-                values[column.name] += taken(count, element)
-                sizes[column.name].append(count)
-        return {
-            name: (floats(values[name]), np.array(sizes[name], dtype=np.int64)) for name in values
-        }
-
-    return read
+    }
 
 
 def _coordinate(columns: Columns, axis: str) -> FloatArray:

@@ -6,7 +6,8 @@ import re
 
 import numpy as np
 
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray
+from ..geometry.grouping import distinct_rows
 from .numbers import floats
 from .polygons import FormatError, Polygons
 
@@ -39,19 +40,9 @@ def read_stl(data: bytes) -> Polygons:
     else:
         triangles = np.frombuffer(data, TRIANGLE, count=count, offset=HEADER_BYTES)
         vertices = triangles["corners"].astype(np.float64).reshape(-1, 3)
-    joined, corners = joined_positions(vertices)
-    return Polygons(joined, corners, np.full(len(vertices) // 3, 3))
-
-
-def joined_positions(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Distinct positions, sorted, and the index of the position of each vertex."""
     vertices = vertices + 0.0  # -0.0 and 0.0 are one position
-    order = np.lexsort(vertices.T[::-1])
-    new = np.ones(len(vertices), dtype=bool)
-    new[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
-    index = np.empty(len(vertices), dtype=np.int64)
-    index[order] = np.cumsum(new) - 1
-    return vertices[order[new]], index
+    first, corners = distinct_rows(vertices)
+    return Polygons(vertices[first], corners, np.full(len(vertices) // 3, 3))
 
 
 def _text_corners(data: bytes) -> FloatArray:

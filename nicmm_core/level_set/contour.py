@@ -64,14 +64,12 @@ def extract_curves(
     """
     passed = _passed_vertices(working, field, control_vertices, bundle)
     through = np.concatenate([control_vertices, passed])
-    nodes, segments, segment_face = _segments(working, field, through, bundle)
-    chains = _chains(segments, len(nodes))
+    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
+    # A node is an edge on which φ changes sign, smaller vertex first, or a zero vertex twice.
+    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
-    for chain, along, closed in chains:
-        if closed:
-            chain, along = _from_first_control(chain, along, nodes, control_vertices)
-        elif _runs_backwards(nodes[chain], control_vertices):
-            chain, along = chain[::-1], along[::-1]
+    for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
+        chain, along = _directed(chain, along, closed, nodes, control_vertices)
         parent = working.parent_face[segment_face[along]]
         # The last point of an open chain has no segment after it and lies on the one before.
         parent = parent if closed else np.append(parent, parent[-1])
@@ -142,33 +140,6 @@ def segment_ends(
     return crossed, points[:, 0], points[:, 1]
 
 
-def _segments(
-    working: WorkingMesh, field: FloatArray, through: IntArray, bundle: SignBundle | None
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Contour nodes, the segments between them and the face of each segment.
-
-    Parameters
-    ----------
-    working : WorkingMesh
-    field : (n,) float array
-    through : (q,) int array
-        Vertices that count as zero.
-    bundle : SignBundle or None
-
-    Returns
-    -------
-    nodes : (p, 2) int array
-        The working edge on which φ changes sign, smaller index first, or a zero vertex twice.
-    segments : (s, 2) int array
-        Node indices.
-    segment_face : (s,) int array
-        Working face of each segment.
-    """
-    segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
-    nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    return nodes, index.reshape(-1, 2), segment_face
-
-
 def _crossings(
     faces: IntArray, sign: IntArray, bundle: SignBundle | None
 ) -> tuple[IntArray, IntArray]:
@@ -235,25 +206,23 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
     return chains
 
 
-def _from_first_control(
-    chain: IntArray, along: IntArray, nodes: IntArray, control_vertices: IntArray
+def _directed(
+    chain: IntArray, along: IntArray, closed: bool, nodes: IntArray, control_vertices: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Start a closed chain at its first control point, directed towards the second."""
+    """A chain, and its segments, from its first control point towards the second.
+
+    An open chain keeps its ends, and passes its first control point before its last one.
+    """
     where = _positions_in(nodes[chain], control_vertices)
     where = where[where >= 0]
-    if not len(where):
-        return chain, along
-    chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
-    if len(where) > 2 and (where[1] - where[0]) % len(chain) > (where[2] - where[0]) % len(chain):
-        chain, along = np.roll(chain[::-1], 1), along[::-1]
+    if closed and len(where):
+        chain, along = np.roll(chain, -where[0]), np.roll(along, -where[0])
+        onward = (where - where[0]) % len(chain)
+        if len(onward) > 2 and onward[1] > onward[2]:
+            chain, along = np.roll(chain[::-1], 1), along[::-1]
+    elif len(where) > 1 and where[0] > where[-1]:
+        chain, along = chain[::-1], along[::-1]
     return chain, along
-
-
-def _runs_backwards(nodes: IntArray, control_vertices: IntArray) -> bool:
-    """Whether an open chain passes its last control point first."""
-    where = _positions_in(nodes, control_vertices)
-    where = where[where >= 0]
-    return len(where) > 1 and bool(where[0] > where[-1])
 
 
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ..geometry.array_types import Array
+from ..geometry.array_types import Array, FloatArray
 from .problem import Problem
 
 Operator = Callable[[Array], Array]
@@ -95,11 +95,6 @@ def root_delta(value: Array, width: float) -> Array:
     return math.e ** (-0.25 * (value / width) ** 2) / math.sqrt(width * math.sqrt(2.0 * math.pi))
 
 
-def gaussian_delta(value: Array, width: float) -> Array:
-    """G_σ(φ): a Gaussian of unit integral for the Dirac delta of Eq. 5."""
-    return root_delta(value, width) ** 2
-
-
 def slope_residual(squared_slope: Array) -> Array:
     """Residual of Eq. 3, |∇φ|² - 1; the energy is the integral of ½ residual²."""
     return squared_slope - 1.0
@@ -162,6 +157,12 @@ def loss_terms(surface: EnergySurface, phi: Array) -> dict[str, Array]:
         "smooth": smoothness_loss(surface, phi),
         "fea": feature_loss(surface, phi),
     }
+
+
+def energy_of(problem: Problem, field: FloatArray) -> dict[str, float]:
+    """The terms of the energy of a level set, unweighted, as numbers."""
+    terms = loss_terms(energy_surface(problem), field)
+    return {name: float(value) for name, value in terms.items()}
 
 
 def balanced(weights: LossWeights, problem: Problem) -> LossWeights:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..errors import MeshError
 from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import vertex_normals
@@ -28,7 +27,6 @@ from .finite_elements import FiniteElements, build_finite_elements
 from .sign_bundle import SignBundle, build_sign_bundle
 from .signed_distance import bounding_side, signed_distance
 from .smoothing import Smoother, build_smoother
-from .sparse_solver import DEGENERATE
 from .topology import keep_topology
 
 SMOOTHING_LENGTH = 1.5
@@ -132,9 +130,6 @@ def build_problem(
     UnreachableError
         If no simple path passes the points in this order.
     """
-    component = mesh.face_component == mesh.face_component[points.faces[0]]
-    if not (mesh.face_areas[component] > 0.0).all():
-        raise MeshError(DEGENERATE)
     phi_fea = None
     if obstacles is not None or alignment is not None:
         width = component_unit(mesh, int(points.faces[0]))

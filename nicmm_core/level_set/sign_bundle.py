@@ -22,6 +22,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..geometry.array_types import IntArray
+from ..geometry.mesh import adjacent_sides, sides_among
+from ..geometry.sides import two_sides
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
 from ..progress import checkpoint
@@ -57,40 +59,25 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
         vertex = int(loop.vertices[place])
         checkpoint()
         around = at_corners[[vertex]].indices // 3
-        side_of = _sides(faces, around, vertex, loop.neighbours(place))
+        side = _sides(faces, around, vertex, loop.neighbours(place))
         # Make the sides at one vertex of the path consistent with those at the next.
-        shared = [face for face in side_of if face in before]
-        turn = side_of[shared[0]] * before[shared[0]] if shared else 1
-        before = {face: turn * face_side for face, face_side in side_of.items()}
-        for face, face_side in before.items():
-            corner_sign[face, faces[face] == vertex] = face_side
+        turns = (s * before[f] for f, s in zip(around.tolist(), side, strict=True) if f in before)
+        side = next(turns, 1) * side
+        before = dict(zip(around.tolist(), side.tolist(), strict=True))
+        corner, here = np.nonzero(faces[around] == vertex)
+        corner_sign[around[corner], here] = side[corner]
     side = _nearest_side(working, loop, corner_sign)
     ends = np.zeros(0, dtype=np.int64) if loop.closed else loop.vertices[[0, -1]]
     return SignBundle(corner_sign * side[faces], side, ends)
 
 
-def _sides(
-    faces: IntArray, around: IntArray, vertex: int, path_neighbours: list[int]
-) -> dict[int, int]:
+def _sides(faces: IntArray, around: IntArray, vertex: int, path_neighbours: list[int]) -> IntArray:
     """±1 for each face at a vertex of the path, with a change across the edges of the path."""
-    at_spoke: dict[int, list[int]] = {}
-    for face in around.tolist():
-        for other in faces[face].tolist():
-            if other != vertex:
-                at_spoke.setdefault(other, []).append(face)
-    side = {int(around[0]): 1}
-    stack = [int(around[0])]
-    while stack:
-        face = stack.pop()
-        for spoke in faces[face].tolist():
-            if spoke == vertex:
-                continue
-            across = -1 if spoke in path_neighbours else 1
-            for other in at_spoke[spoke]:
-                if other not in side:
-                    side[other] = across * side[face]
-                    stack.append(other)
-    return side
+    star = faces[around]
+    one, other = adjacent_sides(star)
+    path = np.array([[vertex, neighbour] for neighbour in path_neighbours])
+    pairs = np.stack([one, other], axis=1) // 3
+    return two_sides(len(star), pairs, sides_among(star, path)[one])[1]
 
 
 def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray) -> IntArray:
@@ -109,19 +96,14 @@ def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray
         vertex = working.faces[:, corner]
         beside = ~on_path[vertex] & (sign != 0)
         side[vertex[beside]] = np.sign(sign[beside])
-    graph = sparse.csr_array(working.edge_graph())
-    distance, previous, _ = csgraph.dijkstra(
-        graph,
+    _, _, nearest = csgraph.dijkstra(
+        working.edge_graph(),
         directed=False,
         indices=np.flatnonzero(side != 0),
         min_only=True,
         return_predecessors=True,
     )
-    for vertex in np.argsort(distance, kind="stable").tolist():
-        checkpoint()
-        if side[vertex] == 0:
-            side[vertex] = side[previous[vertex]] if previous[vertex] >= 0 else 1
-    return side
+    return np.where(nearest >= 0, side[nearest.clip(0)], 1)
 
 
 def local_signs(sign: IntArray, faces: IntArray, bundle: SignBundle | None) -> IntArray:

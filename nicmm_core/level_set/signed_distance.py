@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import adjacent_sides, sides_among
+from ..geometry.sides import two_sides
 from ..path.initial_loop import InitialLoop
 from ..path.virtual_splits import WorkingMesh
 from .finite_elements import FiniteElements
-from .sparse_solver import factorise
+from .sparse_solver import factorised
 
 LEAST_DISTANCE = 1e-3
 """Least distance of a vertex off the loop, in mean edge lengths; the heat method may give 0."""
@@ -62,78 +63,36 @@ def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> F
     mass = sparse.diags_array(elements.vertex_areas)
     heat = np.zeros(len(elements.vertex_areas))
     heat[sources] = 1.0
-    heat = factorise(mass + time * elements.stiffness).solve(heat)
+    heat = factorised(mass + time * elements.stiffness)(heat)
     gradient = (elements.gradient @ heat).reshape(3, -1)
     length = np.linalg.norm(gradient, axis=0)
     # Where the heat underflows to zero, there is no direction.
     direction = -gradient / np.where(length > 0.0, length, 1.0)
     flux = elements.gradient.T @ (elements.face_areas * direction).ravel()
     area = elements.vertex_areas.sum()
-    poisson = factorise(elements.stiffness + (POISSON_SHIFT / area) * mass)
-    distance = poisson.solve(flux)
+    distance = factorised(elements.stiffness + (POISSON_SHIFT / area) * mass)(flux)
     return distance - distance[sources].mean()
 
 
 def bounding_side(
     working: WorkingMesh, elements: FiniteElements, loop: InitialLoop
 ) -> IntArray | None:
-    """-1 inside a closed path, +1 outside and 0 on it, by flood fill, shape (n,).
+    """-1 inside a closed path, +1 outside and 0 on it, shape (n,).
 
     Inside is the side with the smaller area. None if the path bounds no region, such as a meridian
     of a torus.
     """
-    n_vertices = len(working.vertices)
-    on_loop = np.zeros(n_vertices, dtype=bool)
+    on_loop = np.zeros(len(working.vertices), dtype=bool)
     on_loop[loop.vertices] = True
-    start, end = working.edges[~on_loop[working.edges].any(axis=1)].T
-    graph = sparse.coo_array((np.ones(len(start)), (start, end)), shape=(n_vertices, n_vertices))
-    _, region = csgraph.connected_components(graph, directed=False)
-
-    region_side = _two_colouring(region, *_regions_across(working, loop, region).T)
-    if region_side is None:
+    beside = working.edges[~on_loop[working.edges].any(axis=1)]
+    sides = np.stack(adjacent_sides(working.faces), axis=1)
+    on_path = sides_among(working.faces, loop.edges)[sides[:, 0]]
+    across = working.faces.ravel()[sides[on_path]]  # side s is opposite corner s
+    crossed = np.arange(len(beside) + len(across)) >= len(beside)
+    _, side = two_sides(len(on_loop), np.concatenate([beside, across]), crossed)
+    if not side.all():
         return None
-    side = np.where(on_loop, 0, region_side[region])
+    side[on_loop] = 0
     inside = elements.vertex_areas[side < 0].sum()
     outside = elements.vertex_areas[side > 0].sum()
     return side if inside <= outside else -side
-
-
-def _regions_across(working: WorkingMesh, loop: InitialLoop, region: IntArray) -> IntArray:
-    """Pairs of regions on opposite sides of an edge of the loop, shape (p, 2)."""
-    n_vertices = len(working.vertices)
-    edges = np.sort(np.stack([loop.vertices, np.roll(loop.vertices, -1)], axis=1), axis=1)
-    sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    sides = np.sort(sides, axis=1)
-    opposite = working.faces[:, [2, 0, 1]].ravel()
-    keys = sides @ [n_vertices, 1]
-    beside = np.isin(keys, edges @ [n_vertices, 1])
-    by_edge = np.argsort(keys[beside], kind="stable")
-    sorted_keys = keys[beside][by_edge]
-    facing = region[opposite[beside][by_edge]]
-    pair = sorted_keys[:-1] == sorted_keys[1:]
-    return np.stack([facing[:-1][pair], facing[1:][pair]], axis=1)
-
-
-def _two_colouring(region: IntArray, first: IntArray, second: IntArray) -> IntArray | None:
-    """Opposite signs for regions across the loop; None if there is a contradiction."""
-    across: dict[int, set[int]] = {}
-    for one, other in zip(first.tolist(), second.tolist(), strict=True):
-        across.setdefault(one, set()).add(other)
-        across.setdefault(other, set()).add(one)
-    side = np.ones(region.max() + 1, dtype=np.int64)
-    seen: set[int] = set()
-    for seed in across:
-        if seed in seen:
-            continue
-        seen.add(seed)
-        stack = [seed]
-        while stack:
-            one = stack.pop()
-            for other in across[one]:
-                if other not in seen:
-                    seen.add(other)
-                    side[other] = -side[one]
-                    stack.append(other)
-                elif side[other] == side[one]:
-                    return None
-    return side

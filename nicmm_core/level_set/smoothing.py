@@ -16,7 +16,7 @@ from scipy import sparse
 from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 from .finite_elements import FiniteElements
-from .sparse_solver import Factors, factorise
+from .sparse_solver import Solve, factorised
 
 MOST_ENTRIES = 150
 """Products of entries of L per vertex up to which A is assembled; about 50 are usual."""
@@ -31,7 +31,7 @@ class Smoother:
 
     Attributes
     ----------
-    factor : Factors or MixedFactors
+    solve : callable
         Of A, with M the vertex areas and L the cotangent stiffness.
     vertex_areas : (n,) float array
     control_vertices : (k,) int array
@@ -39,14 +39,14 @@ class Smoother:
         Column j is the field of least ``cᵀ A c`` that is 1 at control vertex j and 0 at the others.
     """
 
-    factor: Factors | MixedFactors
+    solve: Solve
     vertex_areas: FloatArray
     control_vertices: IntArray
     response: FloatArray
 
     def smoothed(self, field: FloatArray) -> FloatArray:
         """The minimiser of ``∫ (φ - field)² + ℓ⁴ (Δφ)²`` that is zero at the control points."""
-        return self.interpolating(self.factor.solve(self.vertex_areas * field))
+        return self.interpolating(self.solve(self.vertex_areas * field))
 
     def interpolating(self, field: FloatArray) -> FloatArray:
         """The field with the least correction that makes it zero at the control points."""
@@ -66,47 +66,37 @@ def build_smoother(
     Detail shorter than about 2 π ℓ is removed. If the elements use a sign bundle, ``plain`` are the
     elements of ordinary functions, for the responses to the control points.
     """
-    factor = _factorised(elements, length)
-    response_factor = factor if plain is None else _factorised(plain, length)
+    solve = _factorised(elements, length)
+    solve_response = solve if plain is None else _factorised(plain, length)
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
     fields = np.empty_like(loads)
     for first in range(0, len(control_vertices), AT_ONCE):
         checkpoint()
         columns = slice(first, first + AT_ONCE)
-        fields[:, columns] = response_factor.solve(loads[:, columns])
+        fields[:, columns] = solve_response(loads[:, columns])
     response = np.linalg.solve(fields[control_vertices].T, fields.T).T
-    return Smoother(factor, elements.vertex_areas, control_vertices, response)
+    return Smoother(solve, elements.vertex_areas, control_vertices, response)
 
 
-@dataclass(frozen=True)
-class MixedFactors:
-    """Factors of A as an equivalent system of twice the size, without products of L.
+def _factorised(elements: FiniteElements, length: float) -> Solve:
+    """Factorise A, by the mixed system if vertices of high valence would fill A."""
+    valence = np.diff(elements.stiffness.indptr)
+    if (valence**2).sum() <= MOST_ENTRIES * len(valence):
+        return factorised(_bending_operator(elements, length))
+    return mixed_factorised(elements, length)
+
+
+def mixed_factorised(elements: FiniteElements, length: float) -> Solve:
+    """Factorise A as an equivalent system of twice the size, without products of L.
 
     With ψ = ℓ² M⁻¹ L φ, A φ = f is ``M φ + ℓ² L ψ = f`` and ``ℓ² L φ - M ψ = 0``. It is symmetric
     and quasi-definite, so no elimination order needs pivoting (Vanderbei 1995).
     """
-
-    factors: Factors
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solve for one right side, (n,), or several, (n, k)."""
-        return self.factors.solve(np.concatenate([right, np.zeros_like(right)]))[: len(right)]
-
-
-def _factorised(elements: FiniteElements, length: float) -> Factors | MixedFactors:
-    """Factors of A, by the mixed system if vertices of high valence would fill A."""
-    valence = np.diff(elements.stiffness.indptr)
-    if (valence**2).sum() <= MOST_ENTRIES * len(valence):
-        return factorise(_bending_operator(elements, length))
-    return mixed_factors(elements, length)
-
-
-def mixed_factors(elements: FiniteElements, length: float) -> MixedFactors:
-    """Factors of A by the mixed system."""
     mass, coupling = sparse.diags_array(elements.vertex_areas), length**2 * elements.stiffness
     system = sparse.block_array([[mass, coupling], [coupling, -mass]], format="csr")
-    return MixedFactors(factorise(system))
+    solve = factorised(system)
+    return lambda right: solve(np.concatenate([right, np.zeros_like(right)]))[: len(right)]
 
 
 def _bending_operator(elements: FiniteElements, length: float) -> sparse.sparray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from scipy import sparse
@@ -21,24 +21,12 @@ PREORDERED_FROM = 4000
 """Unknowns from which a bandwidth-reducing order is applied before the fill-reducing one."""
 
 
-@dataclass(frozen=True)
-class Factors:
-    """LU factors of a matrix with permuted rows and columns."""
-
-    factors: linalg.SuperLU
-    order: IntArray | None
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solve for one right side, (n,), or several, (n, k)."""
-        if self.order is None:
-            return self.factors.solve(right)
-        solution = np.empty_like(right)
-        solution[self.order] = self.factors.solve(right[self.order])
-        return solution
+Solve = Callable[[FloatArray], FloatArray]
+"""Solves a system for one right side, (n,), or several, (n, k)."""
 
 
-def factorise(matrix: sparse.sparray) -> Factors:
-    """LU factors of a symmetric positive definite matrix, without pivoting off the diagonal.
+def factorised(matrix: sparse.sparray) -> Solve:
+    """Factorise a symmetric positive definite matrix, without pivoting off the diagonal.
 
     SciPy has no sparse Cholesky factorisation. With an ordering for symmetric patterns its LU is
     about five times faster than with the default one. Unlike Cholesky it also handles systems of
@@ -54,7 +42,7 @@ def factorise(matrix: sparse.sparray) -> Factors:
     if not np.isfinite(matrix.data).all():
         raise MeshError(DEGENERATE)
     checkpoint()
-    order = None
+    order: IntArray | slice = slice(None)
     if matrix.shape[0] >= PREORDERED_FROM:
         rows = sparse.csr_array(matrix)
         order = csgraph.reverse_cuthill_mckee(rows, symmetric_mode=True).astype(np.int64)
@@ -70,4 +58,10 @@ def factorise(matrix: sparse.sparray) -> Factors:
         )
     except RuntimeError as error:  # "Factor is exactly singular"
         raise MeshError(DEGENERATE) from error
-    return Factors(factors, order)
+
+    def solve(right: FloatArray) -> FloatArray:
+        solution = np.empty_like(right)
+        solution[order] = factors.solve(right[order])
+        return solution
+
+    return solve

@@ -75,7 +75,9 @@ def keep_topology(
             return field, n_breaking
         checkpoint()
         radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
-        share = _smooth_step(_distance_from(working, all_breaking) / radius - 1.0)
+        graph = working.edge_graph()
+        away = csgraph.dijkstra(graph, directed=False, indices=all_breaking, min_only=True)
+        share = _smooth_step(away / radius - 1.0)
         field = start + share * (wanted - start)
         breaking = breaking_vertices(links, start, field, control_vertices)
         all_breaking = np.union1d(all_breaking, breaking)
@@ -124,11 +126,6 @@ def breaking_vertices(
                 queue.append(other)
                 queued[other] = True
     return np.flatnonzero(sign != goal)
-
-
-def _distance_from(working: WorkingMesh, sources: IntArray) -> FloatArray:
-    """Length along edges to the nearest source, shape (n,)."""
-    return csgraph.dijkstra(working.edge_graph(), directed=False, indices=sources, min_only=True)
 
 
 def _smooth_step(fraction: FloatArray) -> FloatArray:

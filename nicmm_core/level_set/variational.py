@@ -20,12 +20,12 @@ from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.distances import build_distance_surface
 from ..progress import checkpoint
 from ..status import Status
-from .losses import LossWeights, energy_surface, loss_terms
+from .losses import LossWeights, energy_of
 from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
 from .problem import Problem
 from .redistancing import redistanced
 from .solution import Solution
-from .sparse_solver import factorise
+from .sparse_solver import factorised
 from .topology import breaking_vertices
 from .vertex_links import VertexLinks
 
@@ -126,9 +126,7 @@ def solve(
             break
         field = redistanced(surface, moved, controls, reach, problem.bundle)
     field = redistanced(surface, best_field, controls, bundle=problem.bundle)
-    terms = loss_terms(energy_surface(problem), field)
-    terms = {name: float(value) for name, value in terms.items()}
-    return Solution(field, terms, losses, status, keeps_topology=True)
+    return Solution(field, energy_of(problem, field), losses, status, keeps_topology=True)
 
 
 def _is_still(least: list[float], config: VariationalConfig) -> bool:
@@ -199,5 +197,5 @@ def _damped_step(
     """Solve the damped system for the unknowns that may move, shape (u,)."""
     system = hessian + damping * band.damping
     step = np.zeros(len(gradient))
-    step[free] = factorise(system[free][:, free]).solve(-gradient[free])
+    step[free] = factorised(system[free][:, free])(-gradient[free])
     return step

@@ -90,12 +90,7 @@ class VertexLinks:
         if max(map(len, joined.values())) > 2:
             return None
         ends = [v for v, others in joined.items() if len(others) == 1]
-        ring = [ends[0] if ends else next(iter(joined))]
-        before = -1
-        while True:
-            onward = [v for v in joined[ring[-1]] if v != before and v != ring[0]]
-            if not onward:
-                break
-            before = ring[-1]
+        ring = ends[:1] or [next(iter(joined))]
+        while onward := [v for v in joined[ring[-1]] if v not in (*ring[-2:-1], ring[0])]:
             ring.append(onward[0])
         return (ring, not ends) if len(ring) == len(joined) else None

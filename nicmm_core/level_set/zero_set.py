@@ -102,8 +102,6 @@ def _length_by_map(mesh: Mesh, problem: Problem, curve: SurfaceCurve) -> float:
     phi_fea = np.ones(len(mesh.vertices))
     phi_fea[problem.working.input_vertex[known]] = problem.feature_map[known]
     factor = length_factor((phi_fea[mesh.faces[curve.faces]] * curve.barycentric).sum(axis=1))
-    positions = curve.points
-    if curve.closed:
-        positions, factor = np.concatenate([positions, positions[:1]]), np.append(factor, factor[0])
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    return float(steps @ (0.5 * (factor[:-1] + factor[1:])))
+    steps = np.linalg.norm(curve.steps, axis=1)
+    mean = 0.5 * (factor + np.roll(factor, -1))
+    return float(steps @ mean[: len(steps)])

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arguments import checked_vertex_values
+from ..arguments import checked_number, checked_vertex_values
 from ..errors import ArgumentError
 from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.mesh import Mesh, adjacent_sides, check_indices, edge_keys, side_keys, unique_edges
 from ..geometry.normals import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
@@ -106,10 +106,8 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     curvature = np.abs(principal_curvatures(mesh)).max(axis=1)
     if low is None or high is None:
         usual, striking = _quantiles_by_area(mesh, curvature, [USUAL, STRIKING])
-        low = usual if low is None else _checked_number("low", low)
-        high = (
-            max(striking, LEAST_CONTRAST * low) if high is None else _checked_number("high", high)
-        )
+        low = usual if low is None else checked_number("low", low)
+        high = max(striking, LEAST_CONTRAST * low) if high is None else checked_number("high", high)
         if high <= tolerances.FLAT / mesh.diagonal:
             return np.zeros(len(mesh.vertices))
     return value_map(mesh, curvature, low, high)
@@ -135,26 +133,20 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     ArgumentError
         If the angle is not in 0 … π.
     """
-    limit = _checked_number("angle", angle)
+    limit = checked_number("angle", angle)
     if not 0.0 <= limit <= math.pi:
         raise ArgumentError(f"angle is {angle!r}; pass radians in 0 … π")
-    sides = mesh.faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-    forward = sides[:, 0] < sides[:, 1]
-    low, high = np.sort(sides, axis=1).T
-    face = np.repeat(np.arange(len(mesh.faces)), 3)
-    solid = mesh.face_areas[face] > 0.0
-    low, high, face, forward = low[solid], high[solid], face[solid], forward[solid]
-    order = np.lexsort((high, low))
-    low, high, face, forward = low[order], high[order], face[order], forward[order]
+    solid = np.flatnonzero(mesh.face_areas > 0.0)
+    faces, normals = mesh.faces[solid], mesh.face_normals[solid]
+    start, end = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
     # At an edge with more than two faces, pairs of consecutive faces.
-    same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
-    one, other = face[:-1][same], face[1:][same]
-    turned = np.where(forward[:-1][same] == forward[1:][same], -1.0, 1.0)
-    normals = mesh.face_normals
-    cosine = turned * (normals[one] * normals[other]).sum(axis=1)
-    sine = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
-    sharp = np.arctan2(sine, cosine) >= limit
-    pairs = np.stack([low[:-1][same][sharp], high[:-1][same][sharp]], axis=1)
+    one, other = adjacent_sides(faces)
+    turned = np.where(start[one] == start[other], -1.0, 1.0)
+    normal, beyond = normals[one // 3], normals[other // 3]
+    cosine = turned * (normal * beyond).sum(axis=1)
+    sine = np.linalg.norm(np.cross(normal, beyond), axis=1)
+    sharp = one[np.arctan2(sine, cosine) >= limit]
+    pairs = np.sort(np.stack([start[sharp], end[sharp]], axis=1), axis=1)
     return np.unique(pairs, axis=0)
 
 
@@ -183,8 +175,7 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
     """
     pairs = _checked_pairs(edges, len(mesh.vertices))
     size = len(mesh.vertices)
-    known = unique_edges(mesh.faces)[0] @ [size, 1]
-    foreign = ~np.isin(np.sort(pairs, axis=1) @ [size, 1], known)
+    foreign = ~np.isin(edge_keys(pairs[:, 0], pairs[:, 1], size), side_keys(mesh.faces, size))
     if foreign.any():
         first = int(foreign.argmax())
         raise ArgumentError(
@@ -226,8 +217,8 @@ def value_map(
         first = int(bad.argmax())
         raise ArgumentError(f"values[{first}] is {checked[first]}; pass finite numbers")
     used = checked[mesh.referenced]
-    start = float(used.min()) if low is None else _checked_number("low", low)
-    end = float(used.max()) if high is None else _checked_number("high", high)
+    start = float(used.min()) if low is None else checked_number("low", low)
+    end = float(used.max()) if high is None else checked_number("high", high)
     if start == end:
         if low is None and high is None:
             return np.zeros(len(checked))
@@ -291,16 +282,6 @@ def _quantiles_by_area(mesh: Mesh, values: FloatArray, shares: list[float]) -> l
     return [float(value) for value in values[order[places]]]
 
 
-def _checked_number(name: str, value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(f"{name} is {value!r}; pass a number") from error
-    if not math.isfinite(number):
-        raise ArgumentError(f"{name} is {value!r}; pass a finite number")
-    return number
-
-
 def _checked_pairs(edges: ArrayLike, n_vertices: int) -> IntArray:
     try:
         given = np.array(edges)
@@ -316,11 +297,5 @@ def _checked_pairs(edges: ArrayLike, n_vertices: int) -> IntArray:
         ) from error
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise ArgumentError(f"edges has shape {pairs.shape}; pass vertex indices of shape (n, 2)")
-    outside: BoolArray = ((pairs < 0) | (pairs >= n_vertices)).any(axis=1)
-    if outside.any():
-        first = int(outside.argmax())
-        raise ArgumentError(
-            f"edges[{first}] = {pairs[first].tolist()} refers to vertices that do not exist; "
-            f"indices must lie in 0 … {n_vertices - 1}"
-        )
+    check_indices("edges", pairs, n_vertices)
     return pairs

@@ -22,7 +22,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import locate_control_points
 from ..level_set.features import BASE_CHANNELS
-from ..level_set.losses import EnergySurface, LossWeights, balanced, loss_terms, total_loss
+from ..level_set.losses import LossWeights, balanced, loss_terms, total_loss
 from ..level_set.problem import Problem, build_problem
 from .forward_pass import (
     DISTANCE_CHANNEL,
@@ -143,7 +143,7 @@ def pretrain(
 
     # The tensors of a set on 4,000 vertices take about 2 MB, so all stay on the device.
     prepared = [
-        _Prepared(
+        (
             surface_tensors(problem, device),
             network_input(problem, device),
             balanced(weights, problem),
@@ -161,9 +161,9 @@ def pretrain(
             chosen = order[first : first + config.batch]
             optimiser.zero_grad()
             for index in chosen:
-                one = prepared[index]
-                phi = network(turned(one.given, generator))
-                loss = total_loss(loss_terms(one.surface, phi), one.weights)
+                surface, given, own_weights = prepared[index]
+                phi = network(turned(given, generator))
+                loss = total_loss(loss_terms(surface, phi), own_weights)
                 (loss / len(chosen)).backward()
                 total += loss.item()
                 done += 1
@@ -185,15 +185,6 @@ def pretrain(
     save_weights(output, network_weights(network))
     checkpoint.unlink(missing_ok=True)
     return losses
-
-
-@dataclass(frozen=True)
-class _Prepared:
-    """The tensors of a set on the device."""
-
-    surface: EnergySurface
-    given: NetworkInput
-    weights: LossWeights
 
 
 def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.mesh import Mesh
-from ..level_set.losses import energy_surface, loss_terms
+from ..level_set.losses import energy_of
 from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
@@ -80,8 +80,7 @@ def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
     status = Status.CONVERGED
     if not np.isfinite(field).all():
         field, status = problem.initial_distance, Status.DIVERGED
-    terms = loss_terms(energy_surface(problem), field)
-    return Solution(field, {name: float(value) for name, value in terms.items()}, [], status)
+    return Solution(field, energy_of(problem, field), [], status)
 
 
 def network_input(problem: Problem) -> NetworkInput:

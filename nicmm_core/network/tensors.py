@@ -10,7 +10,7 @@ from ..level_set.losses import EnergySurface, energy_surface
 from ..level_set.problem import Problem
 from . import single_pass
 from .forward_pass import NetworkInput
-from .sparse_operator import SparseOperator
+from .sparse_operator import sparse_operator
 
 
 def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
@@ -20,9 +20,9 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
     phi_fea = arrays.feature_map
     return EnergySurface(
         face_areas=_tensor(arrays.face_areas, device),
-        gradient=SparseOperator(elements.gradient, device),
-        laplacian=SparseOperator(elements.laplacian, device),
-        centroid=SparseOperator(elements.centroid, device),
+        gradient=sparse_operator(elements.gradient, device),
+        laplacian=sparse_operator(elements.laplacian, device),
+        centroid=sparse_operator(elements.centroid, device),
         control_vertices=torch.as_tensor(arrays.control_vertices, device=device),
         delta_width=arrays.delta_width,
         feature_map=None if phi_fea is None else _tensor(phi_fea, device),

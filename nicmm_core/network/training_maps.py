@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
 
 BESIDE = 0.12
@@ -68,10 +69,7 @@ def random_maps(
 def _shortest_path(graph: sparse.csr_array, start: int, end: int) -> IntArray:
     """Vertices of the shortest path along edges."""
     _, previous = csgraph.dijkstra(graph, directed=False, indices=end, return_predecessors=True)
-    path = [start]
-    while path[-1] != end:
-        path.append(int(previous[path[-1]]))
-    return np.array(path)
+    return np.array(path_between(previous, end, start)[::-1])
 
 
 def _around(graph: sparse.csr_array, middle: int, radius: float) -> IntArray:

@@ -81,10 +81,7 @@ def build_chain(
     joins = same & (near | at_vertex)  # with the next one
     if not closed:
         joins[-1] = False
-    if joins.all():
-        begins = np.array([0])
-    else:
-        begins = np.flatnonzero(~np.roll(joins, 1))
+    begins = np.array([0]) if joins.all() else np.flatnonzero(~np.roll(joins, 1))
     # A run of near points may be long: it is split where it leaves its first point.
     begins = _broken_runs(begins, joins, faces, barycentric, corners, margin)
     ends = np.roll(begins, -1)

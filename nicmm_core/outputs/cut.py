@@ -7,6 +7,7 @@ in input faces, so that attributes can be interpolated.
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,9 +15,9 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ArgumentError, CurveError
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import ROUNDING, SurfaceCurve, checked_curve
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, adjacent_sides, sides_among
 from ..geometry.surface_points import SurfacePoints, weights_at
 from .chain import Chain, build_chain, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
@@ -75,6 +76,15 @@ class CutMesh:
         """Edges along the curve, (m, 2), or (m - 1, 2) where it is open."""
         edges = np.stack([self.chain, np.roll(self.chain, -1)], axis=1)
         return edges if self.closed else edges[:-1]
+
+    @cached_property
+    def adjacent_faces(self) -> tuple[IntArray, BoolArray]:
+        """Pairs of faces at the same edge, (p, 2), and whether it is one of the curve, (p,).
+
+        There are k - 1 pairs at an edge with k faces.
+        """
+        one, other = adjacent_sides(self.faces)
+        return np.stack([one, other], axis=1) // 3, sides_among(self.faces, self.chain_edges)[one]
 
     @cached_property
     def directed_chain_edges(self) -> frozenset[tuple[int, int]]:
@@ -243,10 +253,8 @@ def _cut(mesh: Mesh, chain: Chain) -> CutMesh:
     parts: list[tuple[int, int, int]] = []
     source: list[int] = []
     for face in sorted(affected):
-        found = _face_parts(mesh, face, chain, places, segments.get(face, []))
-        local_vertices, triangles = found
-        ids = [int(v) if kind < 0 else int(vertex[kind]) for kind, v in local_vertices]
-        parts += [(ids[a], ids[b], ids[c]) for a, b, c in triangles]
+        triangles = _face_parts(mesh, face, chain, places, vertex, segments.get(face, []))
+        parts += triangles
         source += [face] * len(triangles)
 
     stays = np.ones(len(mesh.faces), dtype=bool)
@@ -327,13 +335,9 @@ def _segments_inside(
 
 def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
     """Faces with places on one of their edges."""
-    if not places.on_edge:
-        return []
-    edges = np.array(list(places.on_edge))
+    edges = np.array(list(places.on_edge), dtype=np.int64).reshape(-1, 2)
     candidates = mesh.faces_at(np.unique(edges))
-    sides = np.sort(mesh.faces[candidates][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-    size = len(mesh.vertices)
-    cut = np.isin(sides[:, :, 0] * size + sides[:, :, 1], edges[:, 0] * size + edges[:, 1])
+    cut = sides_among(mesh.faces[candidates], edges).reshape(-1, 3)
     return candidates[cut.any(axis=1)].tolist()
 
 
@@ -342,41 +346,38 @@ def _face_parts(
     face: int,
     chain: Chain,
     places: _Places,
+    vertex: IntArray,
     segments: list[tuple[int, int]],
-) -> tuple[list[tuple[int, int]], list[tuple[int, int, int]]]:
-    """The triangles of one face.
+) -> list[tuple[int, int, int]]:
+    """The triangles of one face, by vertices of the cut mesh.
 
-    Returns
-    -------
-    list of (place, vertex)
-        The points: a corner with its vertex and the place -1, or a place and -1.
-    list of (int, int, int)
-        Triangles of them.
+    Parameters
+    ----------
+    mesh : Mesh
+    face : int
+    chain : Chain
+    places : _Places
+    vertex : (m,) int array
+        The vertex of each place.
+    segments : list of (place, place)
+        Those through the interior of the face.
     """
-    corners = [int(v) for v in mesh.faces[face]]
-    points: list[tuple[int, int]] = [(-1, corner) for corner in corners]
-    weights: list[tuple[float, float, float]] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-    local = {places.at_vertex[v]: k for k, v in enumerate(corners) if v in places.at_vertex}
+    corners = mesh.faces[face].tolist()
     sides = []
-    for corner in range(3):
-        start, end = corners[corner], corners[(corner + 1) % 3]
+    for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
         along = places.on_edge.get((min(start, end), max(start, end)), [])
-        along = along if start < end else along[::-1]
-        sides.append([len(points) + k for k in range(len(along))])
-        for place in along:
-            local[place] = len(points)
-            points.append((place, -1))
-            weights.append(_weights_in(chain, mesh, place, corners))
+        sides.append(along if start < end else along[::-1])
     inner = places.in_face.get(face, [])
-    for place in inner:
-        local[place] = len(points)
-        points.append((place, -1))
-        weights.append(_weights_in(chain, mesh, place, corners))
-
+    new = np.array([*itertools.chain(*sides), *inner], dtype=np.int64)
+    local = {places.at_vertex[v]: k for k, v in enumerate(corners) if v in places.at_vertex}
+    local.update((place, 3 + k) for k, place in enumerate(new.tolist()))
+    theirs = mesh.faces[np.full(len(new), face)]
+    inserted = weights_at(mesh.faces[chain.faces[new]], chain.barycentric[new], theirs)
+    weights = np.concatenate([np.eye(3), inserted])
     triangulation = FaceTriangulation(weights, _flattened(mesh.vertices[corners], weights))
     try:
-        for corner in range(3):
-            triangulation.add_on_side(corner, sides[corner])
+        for corner, along in enumerate(sides):
+            triangulation.add_on_side(corner, [local[place] for place in along])
         for place in inner:
             triangulation.add_inside(local[place])
         for start_place, end_place in segments:
@@ -385,18 +386,11 @@ def _face_parts(
         meeting = [place for place, at in local.items() if at in error.points]
         raise _ContactError(meeting) from error
     triangulation.improve()
-    return points, triangulation.triangles
+    ids = [*corners, *vertex[new].tolist()]
+    return [(ids[a], ids[b], ids[c]) for a, b, c in triangulation.triangles]
 
 
-def _weights_in(
-    chain: Chain, mesh: Mesh, place: int, corners: list[int]
-) -> tuple[float, float, float]:
-    theirs = mesh.faces[chain.faces[place]].tolist()
-    weight = dict(zip(theirs, chain.barycentric[place].tolist(), strict=True))
-    return (weight.get(corners[0], 0.0), weight.get(corners[1], 0.0), weight.get(corners[2], 0.0))
-
-
-def _flattened(corners: FloatArray, weights: list[tuple[float, float, float]]) -> FloatArray:
+def _flattened(corners: FloatArray, weights: FloatArray) -> FloatArray:
     """Points of a face in its plane; a face without height is replaced by an equilateral one."""
     one, other = corners[1] - corners[0], corners[2] - corners[0]
     length = np.linalg.norm(one)
@@ -406,4 +400,4 @@ def _flattened(corners: FloatArray, weights: list[tuple[float, float, float]]) -
         flat = np.array([[0.0, 0.0], [length, 0.0], [x / length, y / length]])
     else:
         flat = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
-    return np.array(weights) @ flat
+    return weights @ flat

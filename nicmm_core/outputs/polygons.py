@@ -13,7 +13,6 @@ import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
 from .cut import CutMesh
-from .shared_sides import shared_sides
 
 BENT = 0.9
 """Least cosine between the normal of a triangle and that of the polygon that it joins."""
@@ -57,13 +56,13 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
     polygon = source_polygon[cut.source_face]
     is_cut = np.zeros(len(source_polygon), dtype=bool)
     is_cut[cut.source_face[np.flatnonzero(np.diff(cut.source_face, append=-1) == 0)]] = True
-    shared = shared_sides(cut.faces, cut.chain_edges)
-    one, other = shared.faces.T
+    pairs, on_chain = cut.adjacent_faces
+    one, other = pairs.T
     # The curve may follow a diagonal and cut no triangle.
-    along = polygon[one][shared.on_chain & (polygon[one] == polygon[other])]
+    along = polygon[one][on_chain & (polygon[one] == polygon[other])]
     touched = np.isin(polygon, np.concatenate([source_polygon[is_cut], along]))
     joins = (
-        ~shared.on_chain & touched[one] & touched[other] & (polygon[one] == polygon[other])
+        ~on_chain & touched[one] & touched[other] & (polygon[one] == polygon[other])
         if joined
         else np.zeros(len(one), dtype=bool)
     )

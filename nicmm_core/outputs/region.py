@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import ControlPointError, CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, sides_among
 from ..geometry.sides import two_sides
 from ..geometry.surface_points import SurfacePoints, locate_points
 from .cut import CutMesh
-from .shared_sides import shared_sides
 
 
 @dataclass(frozen=True)
@@ -125,9 +124,8 @@ def _region(mesh: Mesh, cut: CutMesh, inside: BoolArray) -> Region:
 def _sides(cut: CutMesh) -> IntArray:
     """1 or -1 for faces that are connected to the curve, 0 for others, (F',)."""
     n_faces = len(cut.faces)
-    shared = shared_sides(cut.faces, cut.chain_edges)
-    part, side = two_sides(n_faces, shared.faces, shared.on_chain)
-    beside = _faces_beside(cut)
+    part, side = two_sides(n_faces, *cut.adjacent_faces)
+    beside = sides_among(cut.faces, cut.chain_edges).reshape(-1, 3).any(axis=1)
     with_curve = np.isin(part, part[beside])
     if (side == 0)[with_curve].any():
         closed = "It is closed, but runs round a handle, a tube or a Möbius strip"
@@ -138,14 +136,6 @@ def _sides(cut: CutMesh) -> IntArray:
             "surface"
         )
     return np.where(with_curve, side, 0)
-
-
-def _faces_beside(cut: CutMesh) -> IntArray:
-    """Faces at an edge of the chain."""
-    size = len(cut.vertices)
-    sides = np.sort(cut.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-    wanted = np.sort(cut.chain_edges, axis=1) @ np.array([size, 1])
-    return np.flatnonzero(np.isin(sides @ np.array([size, 1]), wanted).any(axis=1))
 
 
 def _side_at(mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | SurfacePoints) -> int:

@@ -56,8 +56,8 @@ class FaceTriangulation:
         The points in the plane of the face, for angles.
     """
 
-    def __init__(self, weights: list[Weights], flat: FloatArray) -> None:
-        self.weights = weights
+    def __init__(self, weights: FloatArray | list[Weights], flat: FloatArray) -> None:
+        self.weights = [(float(a), float(b), float(c)) for a, b, c in weights]
         self.flat = [(float(x), float(y)) for x, y in flat]
         self._third: dict[tuple[int, int], int] = {}
         self._fixed: set[tuple[int, int]] = set()

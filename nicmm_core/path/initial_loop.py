@@ -18,7 +18,7 @@ from scipy.sparse import csgraph
 from ..errors import UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, edge_keys, side_keys
 from ..geometry.surface_points import SurfacePoints, control_point_names
 from .band_refinement import PIECES, refine_along
 from .legs import CrossingError
@@ -55,12 +55,16 @@ class InitialLoop:
     zigzag: float
     closed: bool = True
 
+    @property
+    def edges(self) -> IntArray:
+        """Pairs of consecutive vertices, shape (l, 2), or (l - 1, 2) of an open path."""
+        pairs = np.stack([self.vertices, np.roll(self.vertices, -1)], axis=1)
+        return pairs if self.closed else pairs[:-1]
+
     def neighbours(self, place: int) -> list[int]:
         """The previous and the next vertex at an index of the path."""
-        places = [place - 1, place + 1]
-        if self.closed:
-            return [int(self.vertices[i % len(self.vertices)]) for i in places]
-        return [int(self.vertices[i]) for i in places if 0 <= i < len(self.vertices)]
+        edges = self.edges
+        return edges[(edges == self.vertices[place])[:, ::-1]].tolist()
 
 
 def build_initial_loop(
@@ -151,6 +155,7 @@ class _Tours:
 
     def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
         self._mesh, self._points, self.closed = mesh, points, closed
+        self.given = np.arange(len(points))
 
     def of(self, order: str) -> Iterator[IntArray]:
         """The orders to try for a request, the best one first."""
@@ -159,11 +164,6 @@ class _Tours:
         else:
             yield self.shortest
             yield self.along_boundaries
-
-    @property
-    def given(self) -> IntArray:
-        """The caller's order, (k,)."""
-        return np.arange(len(self._points))
 
     @cached_property
     def shortest(self) -> IntArray:
@@ -269,12 +269,11 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
     following = np.roll(path, -1)
     if not loop.closed:
         following[-1] = path[-2]  # the last point lies on the last segment
-    sides = working.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = len(working.vertices)
-    keys = np.sort(sides, axis=1) @ [size, 1]
+    keys = side_keys(working.faces, size)
     order = np.argsort(keys, kind="stable")
-    wanted = np.sort(np.stack([path, following], axis=1), axis=1) @ [size, 1]
-    face = working.parent_face[order[np.searchsorted(keys[order], wanted)] // 3]
+    first = np.searchsorted(keys[order], edge_keys(path, following, size))
+    face = working.parent_face[order[first] // 3]
     corners = mesh.faces[face]
     barycentric = np.asarray(working.interpolation[path[:, None], corners].todense())
     place = np.full(size, -1)

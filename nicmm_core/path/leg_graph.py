@@ -9,8 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.grouping import components, grouped
-from ..geometry.mesh import Mesh, side_keys
+from ..geometry.mesh import Mesh, adjacent_sides, joined_corners, side_corners
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]
@@ -27,7 +26,7 @@ class Patch:
         Vertices of the split mesh, sorted.
     edges : (E, 2) int array
         Sorted.
-    on_rim, branching : (E,) bool array
+    on_rim, nonmanifold_edges : (E,) bool array
         Edges with one face, and with more than two.
     positions : (n + E, 3) float array
         Of the nodes.
@@ -40,7 +39,7 @@ class Patch:
     vertices: IntArray
     edges: IntArray
     on_rim: BoolArray
-    branching: BoolArray
+    nonmanifold_edges: BoolArray
     positions: FloatArray
     weight: FloatArray
     arcs: IntArray
@@ -95,41 +94,11 @@ class Patch:
 
 
 def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
-    """Vertices whose faces form more than one fan, shape (V,)."""
-    _, vertex_of_fan = fans(mesh)
-    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1
-
-
-def fans(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Fans of faces about the vertices.
+    """Vertices whose faces form more than one fan, shape (V,).
 
     Faces at a vertex belong to the same fan if edges at that vertex connect them.
-
-    Returns
-    -------
-    (F, 3) int array
-        The fan of each corner.
-    (number of fans,) int array
-        The vertex of each fan.
     """
-    faces = mesh.faces
-    order, begin, _ = grouped(side_keys(faces))  # side 3 f + j opposite corner j of face f
-    # The corners at the ends of each side, in the order of their vertices.
-    corner = np.arange(faces.size).reshape(-1, 3)
-    start, end = corner[:, [1, 2, 0]].ravel(), corner[:, [2, 0, 1]].ravel()
-    turned = faces.ravel()[start] > faces.ravel()[end]
-    checkpoint()
-    start, end = np.where(turned, end, start), np.where(turned, start, end)
-    same = np.ones(len(order), dtype=bool)
-    same[begin] = False
-    place = np.flatnonzero(same)
-    one, other = order[place - 1], order[place]
-    checkpoint()
-    n_fans, fan = components(
-        faces.size,
-        np.concatenate([start[one], end[one]]),
-        np.concatenate([start[other], end[other]]),
-    )
-    vertex_of_fan = np.zeros(n_fans, dtype=np.int64)
-    vertex_of_fan[fan] = faces.ravel()
-    return fan.reshape(-1, 3), vertex_of_fan
+    ends = side_corners(mesh.faces)
+    one, other = adjacent_sides(mesh.faces)
+    _, vertex_of_fan = joined_corners(mesh.faces, ends[one].ravel(), ends[other].ravel())
+    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1

@@ -13,7 +13,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, unique_edges
+from ..geometry.grouping import components, path_between
+from ..geometry.mesh import Mesh, side_keys, unique_edges
 from ..progress import checkpoint
 from .leg_graph import Node, Patch, nonmanifold_vertices
 from .virtual_splits import SplitMesh
@@ -31,7 +32,7 @@ Two strands of a loop then pass a thin limb on opposite sides, which leaves room
 between them.
 """
 
-BRANCH_FACTOR = 20.0
+NONMANIFOLD_FACTOR = 20.0
 """Factor of lengths at non-manifold vertices and edges.
 
 These belong to several sheets and can be passed only once, so a leg uses them only where it must.
@@ -123,7 +124,7 @@ class LegSearch:
         self._component = component
         self._phi_fea = phi_fea
         self._clearance = clearance
-        self._pinched = nonmanifold_vertices(mesh)
+        self._nonmanifold = nonmanifold_vertices(mesh)
         corners = mesh.vertices[mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
@@ -160,10 +161,7 @@ class LegSearch:
         patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
         free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
-        entries = (np.ones(len(free_arcs)), (free_arcs[:, 0], free_arcs[:, 1]))
-        _, label = csgraph.connected_components(
-            sparse.coo_array(entries, shape=(patch.size, patch.size)), directed=False
-        )
+        _, label = components(patch.size, *free_arcs.T)
         whole = patch.graph(patch.lengths)
 
         def reached(vertex: int) -> set[int]:
@@ -177,7 +175,7 @@ class LegSearch:
         self, patch: Patch, source: int, target: int, obstacles: BlockedElements, limit: float
     ) -> Leg | None:
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
-        factor = self._branch_factor(patch)
+        factor = self._nonmanifold_factor(patch)
         if factor is not None:
             lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
@@ -195,10 +193,7 @@ class LegSearch:
         )
         if previous[there] < 0:
             return None
-        places = [int(there)]
-        while places[-1] != here:
-            places.append(int(previous[places[-1]]))
-        places = self._without_crossing(patch, places[::-1])
+        places = self._without_crossing(patch, path_between(previous, int(here), int(there)))
         steps = np.stack([places[:-1], places[1:]], axis=1)
         length = float(patch.step_lengths(steps).sum())
         return Leg([patch.node(place) for place in places], length)
@@ -225,10 +220,8 @@ class LegSearch:
         corner = self._split.positions(vertices)
         node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
         checkpoint()
-        sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        keys = edges[:, 0] * n_vertices + edges[:, 1]
-        side_node = n_vertices + np.searchsorted(keys, sides[:, 0] * n_vertices + sides[:, 1])
-        side_node = side_node.reshape(-1, 3)
+        keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
+        side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
         checkpoint()
         inner = count > 1
         midpoint = n_vertices + np.flatnonzero(inner)
@@ -251,7 +244,7 @@ class LegSearch:
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
-            branching=count > 2,
+            nonmanifold_edges=count > 2,
             positions=node_position,
             weight=weight,
             arcs=arcs,
@@ -263,7 +256,7 @@ class LegSearch:
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
         # A boundary vertex where fans of faces meet may be the only connection between them.
-        free[np.setdiff1d(patch.edges[patch.on_rim], self._pinched_here(patch))] = False
+        free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.places(obstacles.vertices)] = False
         if len(obstacles.edges):
@@ -275,20 +268,20 @@ class LegSearch:
         free[ends] = True
         return free
 
-    def _branch_factor(self, patch: Patch) -> FloatArray | None:
+    def _nonmanifold_factor(self, patch: Patch) -> FloatArray | None:
         """Factor of lengths at each node, or None on a manifold."""
-        pinched = self._pinched_here(patch)
-        if not (len(pinched) or patch.branching.any()):
+        nonmanifold = self._nonmanifold_here(patch)
+        if not (len(nonmanifold) or patch.nonmanifold_edges.any()):
             return None
         factor = np.ones(patch.size)
-        factor[pinched] = BRANCH_FACTOR
-        factor[patch.edges[patch.branching]] = BRANCH_FACTOR
-        factor[len(patch.vertices) + np.flatnonzero(patch.branching)] = BRANCH_FACTOR
+        factor[nonmanifold] = NONMANIFOLD_FACTOR
+        factor[patch.edges[patch.nonmanifold_edges]] = NONMANIFOLD_FACTOR
+        factor[len(patch.vertices) + np.flatnonzero(patch.nonmanifold_edges)] = NONMANIFOLD_FACTOR
         return factor
 
-    def _pinched_here(self, patch: Patch) -> IntArray:
+    def _nonmanifold_here(self, patch: Patch) -> IntArray:
         n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
-        return np.flatnonzero(self._pinched[patch.vertices[:n_input]])
+        return np.flatnonzero(self._nonmanifold[patch.vertices[:n_input]])
 
     def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
         assert self._phi_fea is not None

@@ -95,8 +95,7 @@ class Legs:
             start, end = (self._split.position(vertex) for vertex in self.ends(leg))
             lengths[leg] = self._length.get(leg, np.inf)
             if lengths[leg] > straight * np.linalg.norm(end - start):
-                for vertex in self.ends(leg):
-                    self._open_corners(vertex)
+                self._open_corners(leg)
                 alone = self._search.shortest(*self.ends(leg), free)
                 if alone is None:
                     raise CrossingError(leg)
@@ -166,10 +165,8 @@ class Legs:
         return safe, separating
 
     def _find(self, leg: int) -> Leg | None:
-        source, target = self.ends(leg)
-        for vertex in (source, target):
-            self._open_corners(vertex)
-        return self._search.shortest(source, target, self._obstacles(source, target))
+        self._open_corners(leg)
+        return self._search.shortest(*self.ends(leg), self._obstacles(*self.ends(leg)))
 
     def _keep(self, leg: int, found: Leg) -> None:
         self._paths[leg] = split_along(self._split, found.nodes)
@@ -184,8 +181,7 @@ class Legs:
         if not legs:
             return True
         for leg in legs:
-            for vertex in self.ends(leg):
-                self._open_corners(vertex)
+            self._open_corners(leg)
         return self._search.are_joinable([self.ends(leg) for leg in legs], self._obstacles())
 
     def _obstacles(self, *free: int) -> BlockedElements:
@@ -212,23 +208,22 @@ class Legs:
             for other in self._split.neighbours(vertex)
         )
 
-    def _open_corners(self, vertex: int) -> None:
-        """Split faces at a boundary waypoint in which no leg could start or end.
+    def _open_corners(self, leg: int) -> None:
+        """Split faces at boundary waypoints of a leg in which it could not start or end.
 
         A face whose two edges at the waypoint belong to the boundary or to legs has no free edge
         there.
         """
-        if not self._is_on_rim(vertex):
-            return
-        closed = {other for path in self._paths.values() for other in _beside(path, vertex)}
-        for face in sorted(self._split.faces_around(vertex)):
-            others = [corner for corner in self._split.corners(face) if corner != vertex]
-            if all(
-                other in closed
-                or len(self._split.faces_around(vertex) & self._split.faces_around(other)) == 1
-                for other in others
-            ):
-                self._split.split_face(face)
+        for vertex in filter(self._is_on_rim, self.ends(leg)):
+            around = self._split.faces_around(vertex)
+            closed = {other for path in self._paths.values() for other in _beside(path, vertex)}
+            for face in sorted(around):
+                others = [corner for corner in self._split.corners(face) if corner != vertex]
+                if all(
+                    other in closed or len(around & self._split.faces_around(other)) == 1
+                    for other in others
+                ):
+                    self._split.split_face(face)
 
 
 def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:

@@ -20,6 +20,7 @@ from ..geometry.surface_points import (
     check_distinct,
     check_one_component,
     control_point_names,
+    joined,
     locate_points,
 )
 
@@ -113,14 +114,13 @@ def with_via_points(
     """
     located = located_via_points(mesh, points, via_points, order, closed)
     controls = control_point_names(np.arange(len(points)))
-    faces, barycentric, is_control, names = [], [], [], []
+    parts, is_control, names = [], [], []
     for index, control in enumerate(controls):
-        via = located.get(index, SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3))))
-        faces += [points.faces[index : index + 1], via.faces]
-        barycentric += [points.barycentric[index : index + 1], via.barycentric]
+        via = located.get(index, points[:0])
+        parts += [points[index : index + 1], via]
         is_control += [True] + [False] * len(via)
         names += [control, *(PointName(f"via_points[{index}]", place) for place in range(len(via)))]
-    together = SurfacePoints(np.concatenate(faces), np.concatenate(barycentric))
+    together = joined(parts)
     check_distinct(mesh, together, names)
     check_one_component(mesh, together, names)
     controls_only = np.array(is_control)

@@ -7,6 +7,7 @@ mesh.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, triangle_areas, unique_edges
+from ..geometry.mesh import Mesh, edge_lengths, triangle_areas, unique_edges
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 
@@ -58,8 +59,7 @@ class WorkingMesh:
     @cached_property
     def edge_lengths(self) -> FloatArray:
         """Length of each edge, shape (E,)."""
-        start, end = self.edges.T
-        return np.linalg.norm(self.vertices[start] - self.vertices[end], axis=1)
+        return edge_lengths(self.vertices, self.edges)
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -97,7 +97,6 @@ class SplitMesh:
         self._alive = np.ones(len(mesh.faces), dtype=bool)
         self._new_alive = bytearray()
         self._faces_around: dict[int, set[int]] = {}
-        self._children: dict[int, set[int]] = {}
 
     def corners(self, face: int) -> tuple[int, int, int]:
         """Vertices of a face."""
@@ -115,9 +114,7 @@ class SplitMesh:
     def faces_around(self, vertex: int) -> set[int]:
         """Living faces at a vertex."""
         if vertex not in self._faces_around:
-            incidence = self._mesh.vertex_faces
-            start, end = incidence.indptr[vertex : vertex + 2]
-            self._faces_around[vertex] = {int(face) for face in incidence.indices[start:end]}
+            self._faces_around[vertex] = set(self._mesh.faces_at(np.array([vertex])).tolist())
         return self._faces_around[vertex]
 
     def position(self, vertex: int) -> FloatArray:
@@ -181,7 +178,8 @@ class SplitMesh:
 
     def split_edge(self, start: int, end: int) -> int:
         """Insert the midpoint of an edge and bisect the faces at it."""
-        return self._split_edge_at(start, end, _mixed(self.weights(start), self.weights(end), 0.5))
+        middle = _centroid([self.weights(start), self.weights(end)])
+        return self._split_edge_at(start, end, middle)
 
     def join(self, first: int, second: int) -> bool:
         """Join two vertices opposite a common edge inside an input face by flipping that edge.
@@ -207,12 +205,7 @@ class SplitMesh:
 
     def split_face(self, face: int) -> int:
         """Insert the centroid of a face, which becomes three faces."""
-        third = 1.0 / 3.0
-        weights: Weights = {}
-        for corner in self.corners(face):
-            for vertex, weight in self.weights(corner).items():
-                weights[vertex] = weights.get(vertex, 0.0) + third * weight
-        return self._split_face_at(face, weights)
+        return self._split_face_at(face, _centroid([self.weights(v) for v in self.corners(face)]))
 
     def assemble(self, component: int) -> tuple[WorkingMesh, IntArray]:
         """Arrays of one connected component of the input mesh, with its splits.
@@ -246,18 +239,15 @@ class SplitMesh:
 
     def _interpolation(self, used: IntArray) -> sparse.csr_array:
         n_input = len(self._mesh.vertices)
-        n_kept = int(np.searchsorted(used, n_input))
-        rows = [np.arange(n_kept)]
-        columns = [used[:n_kept]]
-        values = [np.ones(n_kept)]
-        for row, vertex in enumerate(used[n_kept:], start=n_kept):
-            checkpoint()
-            weights = self._new_weights[vertex - n_input]
-            rows.append(np.full(len(weights), row))
-            columns.append(np.fromiter(weights.keys(), dtype=np.int64))
-            values.append(np.fromiter(weights.values(), dtype=np.float64))
-        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_array(sparse.coo_array(entries, shape=(len(used), n_input)))
+        kept = used[used < n_input]
+        new = [self._new_weights[vertex - n_input] for vertex in used[len(kept) :]]
+        columns = np.concatenate([kept, *(list(weights) for weights in new)])
+        values = np.concatenate([np.ones(len(kept)), *(list(w.values()) for w in new)])
+        ends = len(kept) + np.cumsum([0, *map(len, new)])
+        indptr = np.concatenate([np.arange(len(kept)), ends])
+        matrix = sparse.csr_array((values, columns, indptr), shape=(len(used), n_input))
+        matrix.sort_indices()
+        return matrix
 
     def _insert_point(self, input_face: int, barycentric: FloatArray) -> int:
         corners = self.corners(input_face)
@@ -281,23 +271,24 @@ class SplitMesh:
         self, input_face: int, input_corners: tuple[int, int, int], barycentric: FloatArray
     ) -> tuple[int, FloatArray]:
         """The living face inside an input face that contains a point, and its coordinates there."""
-        best: tuple[int, FloatArray] = (input_face, barycentric)
         if self._alive[input_face]:
-            return best
-        best_inside = -np.inf
-        for face in sorted(self._children[input_face]):
-            # Columns: the child's corners in the input face's barycentric coordinates.
-            child = np.array(
-                [
-                    [self.weights(corner).get(vertex, 0.0) for corner in self.corners(face)]
-                    for vertex in input_corners
-                ]
-            )
-            local = np.linalg.solve(child, barycentric)
-            if local.min() > best_inside:
-                best_inside = float(local.min())
-                best = (face, local)
-        return best
+            return input_face, barycentric
+        n_input = len(self._mesh.faces)
+        inside = [
+            n_input + child
+            for child, parent in enumerate(self._new_parents)
+            if parent == input_face and self._new_alive[child]
+        ]
+        # Columns: the corners of each child in the input face's barycentric coordinates.
+        matrices = [
+            [[self.weights(corner).get(vertex, 0.0) for corner in self.corners(face)]
+             for vertex in input_corners]
+            for face in inside
+        ]  # fmt: skip
+        right = np.tile(barycentric[:, None], (len(inside), 1, 1))
+        local = np.linalg.solve(np.array(matrices), right)[..., 0]
+        best = int(local.min(axis=1).argmax())
+        return inside[best], local[best]
 
     def _split_edge_at(self, start: int, end: int, weights: Weights) -> int:
         middle = self._add_vertex(weights)
@@ -340,8 +331,6 @@ class SplitMesh:
     def _replace_face(self, face: int, children: list[tuple[int, ...]]) -> None:
         n_input = len(self._mesh.faces)
         parent = self._parent(face)
-        siblings = self._children.setdefault(parent, set())
-        siblings.discard(face)
         if face < n_input:
             self._alive[face] = False
         else:
@@ -349,18 +338,18 @@ class SplitMesh:
         for corner in self.corners(face):
             self.faces_around(corner).discard(face)
         for a, b, c in children:
-            child = n_input + len(self._new_faces)
+            for corner in (a, b, c):
+                self.faces_around(corner).add(self.n_faces)
             self._new_faces.append((a, b, c))
             self._new_parents.append(parent)
             self._new_alive.append(True)
-            siblings.add(child)
-            for corner in (a, b, c):
-                self.faces_around(corner).add(child)
 
 
-def _mixed(first: Weights, second: Weights, fraction: float) -> Weights:
-    """The point at a fraction of the segment from one point to another."""
-    mixed = {vertex: (1.0 - fraction) * weight for vertex, weight in first.items()}
-    for vertex, weight in second.items():
-        mixed[vertex] = mixed.get(vertex, 0.0) + fraction * weight
-    return mixed
+def _centroid(points: Sequence[Weights]) -> Weights:
+    """The centroid of some points."""
+    share = 1.0 / len(points)
+    centroid: Weights = {}
+    for point in points:
+        for vertex, weight in point.items():
+            centroid[vertex] = centroid.get(vertex, 0.0) + share * weight
+    return centroid

@@ -6,13 +6,15 @@ a possible one.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 
 EXACT_UP_TO = 9
-"""Tours of more points are improved by exchanges instead of being optimal (2^k states)."""
+"""Tours of more points are improved by exchanges instead of being optimal."""
 
 LONGEST_MOVE = 3
 """Most consecutive points moved together to another position in the tour."""
@@ -34,7 +36,7 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
     Returns
     -------
     (k,) int array
-        Optimal for up to `EXACT_UP_TO` points (Held and Karp 1962). Beyond, the nearest-neighbour
+        Optimal for up to `EXACT_UP_TO` points. Beyond, the nearest-neighbour
         tour, improved until no reversal of a section (2-opt, Croes 1958) and no move of up to three
         points (Or 1976) shortens it.
     """
@@ -55,7 +57,7 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
 def _tour(distance: FloatArray) -> IntArray:
     """A short cyclic tour through all points, starting at point 0."""
     if len(distance) <= EXACT_UP_TO:
-        return _held_karp(distance)
+        return _shortest(distance)
     return _improved(distance, _nearest_neighbour(distance))
 
 
@@ -103,43 +105,23 @@ def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArr
     return np.concatenate([tour[: place + 1], np.roll(chain, -int(start)), tour[place + 1 :]])
 
 
-def _held_karp(distance: FloatArray) -> IntArray:
-    k = len(distance)
-    if k <= 3:
-        return np.arange(k)
-    # best[subset, last]: shortest path from 0 through the subset of 1 … k-1 that ends at last.
-    n_subsets = 1 << (k - 1)
-    best = np.full((n_subsets, k - 1), np.inf)
-    previous = np.zeros((n_subsets, k - 1), dtype=np.int64)
-    between = distance[1:, 1:]
-    for last in range(k - 1):
-        best[1 << last, last] = distance[0, last + 1]
-    for subset in range(1, n_subsets):
-        checkpoint()
-        for last in range(k - 1):
-            rest = subset ^ (1 << last)
-            if subset >> last & 1 and rest:
-                through = best[rest] + between[:, last]
-                previous[subset, last] = through.argmin()
-                best[subset, last] = through.min()
-    subset = n_subsets - 1
-    last = int((best[subset] + distance[1:, 0]).argmin())
-    tour = []
-    while subset:
-        tour.append(last + 1)
-        subset, last = subset ^ (1 << last), int(previous[subset, last])
-    return np.array([0, *reversed(tour)], dtype=np.int64)
+def _shortest(distance: FloatArray) -> IntArray:
+    """The shortest cyclic tour of at most `EXACT_UP_TO` points, by trying all."""
+    if len(distance) <= 3:
+        return np.arange(len(distance))
+    checkpoint()
+    # Of tours of equal length, the one that ends at the first points.
+    others = np.array(list(itertools.permutations(range(1, len(distance)))))[:, ::-1]
+    tours = np.pad(others, ((0, 0), (1, 0)))
+    lengths = np.cumsum(distance[tours, np.roll(tours, -1, axis=1)], axis=1)[:, -1]
+    return tours[lengths.argmin()]
 
 
 def _nearest_neighbour(distance: FloatArray) -> IntArray:
-    unvisited = np.ones(len(distance), dtype=bool)
-    tour = [0]
-    unvisited[0] = False
-    while unvisited.any():
+    tour, unvisited = [0], list(range(1, len(distance)))
+    while unvisited:
         checkpoint()
-        nearest = int(np.where(unvisited, distance[tour[-1]], np.inf).argmin())
-        tour.append(nearest)
-        unvisited[nearest] = False
+        tour.append(unvisited.pop(int(distance[tour[-1], unvisited].argmin())))
     return np.array(tour, dtype=np.int64)
 
 
@@ -190,9 +172,9 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
         if gain[i, j] > best:
             best = float(gain[i, j])
             onward = np.roll(tour, -int(i))
-            section, rest = onward[:count], onward[count:]
+            section, others = onward[:count], onward[count:]
             if turned[i, j] < straight[i, j]:
                 section = section[::-1]
             place = int(offset[i, j]) - count + 1
-            moved = np.concatenate([rest[:place], section, rest[place:]])
+            moved = np.concatenate([others[:place], section, others[place:]])
     return best, moved

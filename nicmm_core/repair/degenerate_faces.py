@@ -17,7 +17,7 @@ SEED = 0
 """Seed of the random moves, so that the same mesh always gets the same moves."""
 
 
-def flat_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
+def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
     """Which faces have no area: two corners coincide, or one lies on the opposite edge.
 
     A needle has an area, however thin it is, since its shortest edge is transverse to the longest.
@@ -70,7 +70,7 @@ def with_areas(
     short : float
         Length up to which the ends of an edge coincide.
     flat : (f,) bool array
-        The result of `flat_faces`.
+        The result of `degenerate_faces`.
     moving : (v,) bool array, optional
         Vertices that are always moved.
     """
@@ -81,9 +81,11 @@ def with_areas(
     for _ in range(ATTEMPTS):
         moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()
         moves[faces[still]] = True
+        checkpoint()
         move = generator.uniform(-1.0, 1.0, start.shape) * reach[:, None]
+        checkpoint()
         vertices = np.where(moves[:, None], start + move, vertices)
-        still = flat_faces(vertices, faces, short)
+        still = degenerate_faces(vertices, faces, short)
         if not still.any():
             break
     return vertices
@@ -100,5 +102,6 @@ def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> Floa
     n_places, place = components(len(vertices), *edges[lengths <= short].T)
     shortest = np.full(n_places, np.inf)
     for end in edges[lengths > short].T:
+        checkpoint()
         np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]

@@ -22,8 +22,6 @@ class SubdividedFaces:
         The face that each is a part of.
     corners : (m, 3, 3) float array
         Barycentric coordinates of the corners in the parent.
-    edge_points : (p, 3) float array
-        New vertices on edges: both ends, and the weight of the second one.
     first_child : (3 f,) int array
         The child at the first segment of each side, -1 for sides of undivided faces. The children
         at the other segments have the following numbers. The segment is opposite corner 2 of its
@@ -33,7 +31,6 @@ class SubdividedFaces:
     faces: IntArray
     parent: IntArray
     corners: FloatArray
-    edge_points: FloatArray
     first_child: IntArray
 
 
@@ -81,15 +78,11 @@ def subdivided(
         weights = (1.0 - share)[:, None] * np.eye(3)[here % 3]
         return vertex, weights + share[:, None] * np.eye(3)[there % 3]
 
-    (start, start_weights), (stop, stop_weights) = end(step), end(step + 1)
     middle = n_vertices + n_points + row // 3
     middle_weights = np.full((len(row), 3), 1.0 / 3.0)
     # Side j runs from corner j + 1 to corner j + 2 in the orientation of the face.
     along = (low[side] % 3 == (side % 3 + 1) % 3)[row]
-    swap = ~along
-    one, other = np.where(swap, stop, start), np.where(swap, start, stop)
-    one_weights = np.where(swap[:, None], stop_weights, start_weights)
-    other_weights = np.where(swap[:, None], start_weights, stop_weights)
+    (one, one_weights), (other, other_weights) = end(step + ~along), end(step + along)
     checkpoint()
     first_child = np.full(faces.size, -1)
     first_child[side] = len(whole) + first
@@ -98,22 +91,5 @@ def subdivided(
         faces=np.concatenate([faces[whole], np.stack([one, other, middle], axis=1)]),
         parent=np.concatenate([whole, split[row // 3]]),
         corners=np.concatenate([np.broadcast_to(np.eye(3), (len(whole), 3, 3)), corners]),
-        edge_points=_edge_points(faces, low, high, edge_of_side, segments),
         first_child=first_child,
     )
-
-
-def _edge_points(
-    faces: IntArray, low: IntArray, high: IntArray, edge_of_side: IntArray, segments: IntArray
-) -> FloatArray:
-    """Ends and weight of the second one, (p, 3), of the new vertices on edges."""
-    side = np.full(len(segments), -1)
-    sides = np.flatnonzero(edge_of_side >= 0)[::-1]
-    side[edge_of_side[sides]] = sides  # the first side of each edge
-    edge = np.repeat(np.arange(len(segments)), segments - 1)
-    number = np.arange(len(edge)) - np.repeat(
-        np.cumsum(segments - 1) - (segments - 1), segments - 1
-    )
-    corner = faces.ravel()
-    ends = corner[low[side[edge]]], corner[high[side[edge]]]
-    return np.stack([*ends, (number + 1) / segments[edge]], axis=1)

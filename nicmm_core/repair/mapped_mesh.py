@@ -6,7 +6,6 @@ and curves on the original, which is not changed. `nonmanifold` creates such mes
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
@@ -16,9 +15,9 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
-from ..geometry.grouping import grouped
+from ..geometry.grouping import stable_order
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, joined
 from ..progress import checkpoint
 from .strand_separation import separated
 
@@ -90,24 +89,14 @@ class MappedMesh:
     def common_component(self, holding: Holding) -> int | None:
         """The largest component of the mesh that contains all points, or None."""
         component = self.mesh.face_component
-        common: set[int] | None = None
-        for point in holding:
-            here = set(component[point.faces].tolist())
-            common = here if common is None else common & here
+        common = set.intersection(*(set(component[point.faces].tolist()) for point in holding))
         areas = np.bincount(component, weights=self.mesh.face_areas)
-        return max(common or (), key=lambda label: float(areas[label]), default=None)
+        return max(common, key=lambda label: float(areas[label]), default=None)
 
     def points(self, holding: Holding, component: int) -> SurfacePoints:
         """The points in faces of one component."""
-        faces, barycentric = [], []
-        for point in holding:
-            first = int((self.mesh.face_component[point.faces] == component).argmax())
-            faces.append(point.faces[first])
-            barycentric.append(point.barycentric[first])
-        shape = (len(faces), 3)
-        return SurfacePoints(
-            np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64).reshape(shape)
-        )
+        there = self.mesh.face_component == component
+        return joined([point[np.flatnonzero(there[point.faces])[:1]] for point in holding])
 
     def weights(self, weights: FloatArray | None) -> FloatArray | None:
         """Weights at the vertices of the mesh; the greatest one where vertices are joined."""
@@ -200,23 +189,15 @@ class MappedMesh:
     @cached_property
     def _by_original(self) -> tuple[IntArray, IntArray]:
         """Faces of the mesh sorted by original face, and the start index of each original face."""
-        order, first, count = grouped(self.face)
-        size = np.zeros(len(self.original.faces) + 1, dtype=np.int64)
-        size[self.face[order[first]] + 1] = count
-        return order, np.cumsum(size)
+        order = stable_order(self.face)
+        counts = np.bincount(self.face, minlength=len(self.original.faces))
+        return order, np.cumsum([0, *counts])
 
 
 def _faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
     """The faces that contain each point, its own face first."""
-    around = mesh.vertex_faces
     found = []
-    checkpoint()
     for face, barycentric in zip(points.faces, points.barycentric, strict=True):
-        at_corners = [
-            around.indices[around.indptr[corner] : around.indptr[corner + 1]]
-            for corner in mesh.faces[face][barycentric > 0.0]
-        ]
-        shared = functools.reduce(np.intersect1d, at_corners).tolist()
-        own_first = [int(face), *(other for other in shared if other != face)]
-        found.append(np.array(own_first, dtype=np.int64))
+        shared = mesh.faces_with(mesh.faces[face][barycentric > 0.0])
+        found.append(np.append(face, shared[shared != face]))
     return found

@@ -20,10 +20,10 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import components, distinct_rows, grouped
-from ..geometry.mesh import Mesh, corners_differ
+from ..geometry.grouping import distinct_rows, grouped
+from ..geometry.mesh import Mesh, corners_differ, joined_corners
 from ..progress import checkpoint
-from .degenerate_faces import flat_faces, with_areas
+from .degenerate_faces import degenerate_faces, with_areas
 from .edge_subdivision import SubdividedFaces, subdivided
 from .mapped_mesh import MappedMesh
 
@@ -71,28 +71,32 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
         welded = welded_vertices(mesh)
         if (welded == np.arange(len(welded))).all():
             return None
-    is_welded = number >= 2
     kept = usable
-    if mesh.has_nonmanifold_edges or is_welded or _has_lone_twins(mesh):
-        kept = kept[_without_twins(welded[mesh.faces[kept]])]
+    if mesh.has_nonmanifold_edges or number >= 2 or _has_lone_twins(mesh):
+        kept = usable[_without_twins(welded[mesh.faces[usable]])]
     sides = _Sides(mesh.faces[kept], welded)
-    if not sides.branching:
+    if not sides.nonmanifold_edges:
         if connected:
             return None
         corners, vertex = sides.cut(sides.plain_pairs, len(mesh.vertices))
         vertices, place = mesh.vertices[vertex], welded[vertex]
         return _with_areas(mesh, welded, corners, vertices, kept, None, place)
-    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.branching]
+    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.nonmanifold_edges]
     parts = sides.subdivided([SEGMENTS * len(pieces) for pieces in joins], len(mesh.vertices))
-    start, end = mesh.vertices[parts.edge_points[:, :2].astype(np.int64)].transpose(1, 0, 2)
-    share = parts.edge_points[:, 2:]
-    centroids = mesh.vertices[mesh.faces[kept]].mean(axis=1)[np.unique(parts.parent[_split(parts)])]
-    vertices = np.concatenate([mesh.vertices, (1.0 - share) * start + share * end, centroids])
+    vertices = np.empty((int(parts.faces.max()) + 1, 3))
+    vertices[: len(mesh.vertices)] = mesh.vertices
+    face = kept[parts.parent]
+    new = parts.faces >= len(mesh.vertices)
+    corners = mesh.vertices[mesh.faces[face]]
+    vertices[parts.faces[new]] = np.einsum("fcd,fdk->fck", parts.corners, corners)[new]
+    centroid = new[:, 2]  # no other new vertex is the last corner of a face
+    vertices[parts.faces[centroid, 2]] = corners[centroid].mean(axis=1)
     place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
     pieces = _Sides(parts.faces, place)
-    pairs = np.concatenate([pieces.plain_pairs, _piece_pairs(sides.branching, joins, parts)])
+    pairs = np.concatenate(
+        [pieces.plain_pairs, _piece_pairs(sides.nonmanifold_edges, joins, parts)]
+    )
     corners, vertex = pieces.cut(pairs, len(vertices))
-    face = kept[parts.parent]
     vertices, place = vertices[vertex], place[vertex]
     return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
 
@@ -159,19 +163,16 @@ def _without_twins(faces: IntArray) -> IntArray:
     return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
 
 
-def _split(parts: SubdividedFaces) -> IntArray:
-    """The children of divided faces, ascending."""
-    return np.flatnonzero((parts.corners[:, 2] < 1.0).all(axis=1))
-
-
 Joins = list[IntArray]
 """For each piece of an edge, the pairs of its sides that are joined there, (p, 2)."""
 
 
-def _piece_pairs(branching: list[IntArray], joins: list[Joins], parts: SubdividedFaces) -> IntArray:
+def _piece_pairs(
+    nonmanifold_edges: list[IntArray], joins: list[Joins], parts: SubdividedFaces
+) -> IntArray:
     """Pairs of joined sides of the subdivided faces at edges of more than two faces, (p, 2)."""
     pairs = []
-    for at_edge, pieces in zip(branching, joins, strict=True):
+    for at_edge, pieces in zip(nonmanifold_edges, joins, strict=True):
         checkpoint()
         child = parts.first_child[at_edge]
         for number, chosen in enumerate(pieces):
@@ -200,6 +201,7 @@ class _Sides:
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
+        checkpoint()
         one = welded[vertices[first]]
         other = welded[vertices[second]]
         checkpoint()
@@ -221,7 +223,7 @@ class _Sides:
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
     @cached_property
-    def branching(self) -> list[IntArray]:
+    def nonmanifold_edges(self) -> list[IntArray]:
         """Sides of each edge with more than two faces."""
         several = self._count > 2
         return [
@@ -257,7 +259,7 @@ class _Sides:
     def subdivided(self, segments: list[int], n_vertices: int) -> SubdividedFaces:
         """The faces with edges of more than two faces divided into segments."""
         edge_of_side = np.full(self._faces.size, -1)
-        for number, at_edge in enumerate(self.branching):
+        for number, at_edge in enumerate(self.nonmanifold_edges):
             edge_of_side[at_edge] = number
         counts = np.array(segments, dtype=np.int64)
         return subdivided(self._faces, self._low, self._high, edge_of_side, counts, n_vertices)
@@ -293,24 +295,18 @@ class _Sides:
         (v,) int array
             The original vertex of each vertex.
         """
-        corner = self._faces.ravel()
         one, other = pairs.T
         checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
         columns = np.concatenate([self._low[other], self._high[other]])
-        n_labels, label = components(len(corner), rows, columns)
-        source = np.zeros(n_labels, dtype=np.int64)
-        source[label] = corner
+        group, source = joined_corners(self._faces, rows, columns)
         # One of the copies keeps the number of the vertex.
         order, begin, _ = grouped(source)
-        first = order[begin]
-        number = np.full(n_labels, -1)
-        number[first] = source[first]
-        new = np.flatnonzero(number < 0)
+        new = np.delete(np.arange(len(source)), order[begin])
         checkpoint()
+        number = source.copy()
         number[new] = n_vertices + np.arange(len(new))
-        vertex = np.concatenate([np.arange(n_vertices), source[new]])
-        return number[label].reshape(-1, 3), vertex
+        return number[group], np.concatenate([np.arange(n_vertices), source[new]])
 
 
 def _opposite(outward: FloatArray) -> IntArray:
@@ -341,7 +337,7 @@ def _with_areas(
         corners = None if corners is None else corners[whole]
     checkpoint()
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
-    flat = flat_faces(vertices, faces, short)
+    flat = degenerate_faces(vertices, faces, short)
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
     origin = np.zeros(3)

@@ -12,10 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import IntArray
 from ..geometry.crossings import crossing_segments
+from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, weights_at
+from ..geometry.surface_points import SurfacePoints, joined, weights_at
 
 REACH = 0.05
 """Greatest distance at which a strand passes a vertex, in lengths of the edges there."""
@@ -33,10 +34,6 @@ ROUNDS = 4
 
 SAME_POINT = 1e-9
 """Difference of weights up to which points on copies of one edge coincide."""
-
-Moved = Callable[[float], tuple[SurfacePoints, IntArray]]
-"""A function that moves one strand by a fraction of the greatest distance, and returns the polyline
-and the new index of each old point."""
 
 
 def separated(
@@ -152,33 +149,20 @@ def _round_vertex(
     mesh: Mesh, polyline: SurfacePoints, point: int, share: float
 ) -> tuple[SurfacePoints, IntArray]:
     """Replace a point at a vertex by points on the edges round it."""
-    n = len(polyline)
-    faces = polyline.faces
+    n, faces = len(polyline), polyline.faces
     vertex = int(mesh.faces[faces[point]][polyline.barycentric[point].argmax()])
     fan = _faces_between(mesh, vertex, int(faces[point - 1]), int(faces[point]))
-    near = _weight_at(mesh, polyline, vertex)
+    near = (polyline.barycentric * (mesh.faces[faces] == vertex)).sum(axis=1)
     near[point] = 0.0
     reach = share * min(REACH, SHARE * (1.0 - float(near.max())))
-    new_faces, new_barycentric = [], []
-    for before, after in zip(fan[:-1], fan[1:], strict=True):
-        corners = mesh.faces[after]
-        common = np.isin(corners, mesh.faces[before])
-        weights = np.where(corners == vertex, 1.0 - reach, np.where(common, reach, 0.0))
-        new_faces.append(after)
-        new_barycentric.append(weights)
-    added = len(new_faces)
-    number = np.arange(n) + (added - 1) * (np.arange(n) > point)
+    corners = mesh.faces[fan]
+    # Each new point is on the edge from the vertex that a face shares with the one before.
+    common = (corners[1:, :, None] == corners[:-1, None, :]).any(axis=2)
+    weights = np.where(corners[1:] == vertex, 1.0 - reach, np.where(common, reach, 0.0))
+    around = SurfacePoints(np.array(fan[1:], dtype=np.int64), weights)
+    number = np.arange(n) + (len(around) - 1) * (np.arange(n) > point)
     number[point] = -1
-    return SurfacePoints(
-        np.concatenate([faces[:point], np.array(new_faces, dtype=np.int64), faces[point + 1 :]]),
-        np.concatenate(
-            [
-                polyline.barycentric[:point],
-                np.array(new_barycentric).reshape(-1, 3),
-                polyline.barycentric[point + 1 :],
-            ]
-        ),
-    ), number
+    return joined([polyline[:point], around, polyline[point + 1 :]]), number
 
 
 def _along_edge(
@@ -225,12 +209,4 @@ def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
             if corner != vertex and beyond >= 0 and int(beyond) not in previous:
                 previous[int(beyond)] = face
                 queue.append(int(beyond))
-    chain = [end]
-    while chain[-1] != start:
-        chain.append(previous[chain[-1]])
-    return chain[::-1]
-
-
-def _weight_at(mesh: Mesh, points: SurfacePoints, vertex: int) -> FloatArray:
-    """The weight of each point at a vertex, (n,)."""
-    return (points.barycentric * (mesh.faces[points.faces] == vertex)).sum(axis=1)
+    return path_between(previous, start, end)

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.distances import distance_to_segments
 from ..geometry.tolerances import TINY
-from .polyline import CORNER, CutPolyline, angles, cut_polyline, distances_to_segments
+from .polyline import CORNER, CutPolyline, angles, cut_polyline
 
 SAMPLES = 16
 """Points of the polyline that each cubic is fitted to, besides its vertices."""
@@ -103,8 +104,9 @@ def fit_bezier(
 
     count = len(knots) - 1 if closed else len(knots)
     places = line.points[knots]
-    right = places[:-1] + handles[:, :1] * tangents.after[:-1]
-    left = places[1:] - handles[:, 1:] * tangents.before[1:]
+    before, after = tangents
+    right = places[:-1] + handles[:, :1] * after[:-1]
+    left = places[1:] - handles[:, 1:] * before[1:]
     if closed:
         left = np.concatenate([left[-1:], left[:-1]])
     else:
@@ -115,25 +117,9 @@ def fit_bezier(
     return BezierSpline(closed, places[:count], left, right, knot_of[control_index])
 
 
-@dataclass(frozen=True)
-class _Tangents:
-    """Unit tangents, forward, at k knots; the two differ at corners only."""
-
-    before: FloatArray
-    after: FloatArray
-
-    def __getitem__(self, index: IntArray | BoolArray) -> _Tangents:
-        return _Tangents(self.before[index], self.after[index])
-
-
-@dataclass(frozen=True)
-class _Fits:
-    """Cubics over s spans of the polyline."""
-
-    handles: FloatArray
-    """(s, 2) lengths of the handles at the start and at the end."""
-    deviation: FloatArray
-    """(s,) greatest distance, infinite where the cubic runs backward."""
+Fits = tuple[FloatArray, FloatArray]
+"""Lengths of the handles of s cubics at the start and at the end, (s, 2), and the greatest distance
+of each from its span of the polyline, (s,), infinite where the cubic runs backward."""
 
 
 @dataclass(frozen=True)
@@ -194,10 +180,10 @@ class _Fitter:
         self.sharp = self.corner.copy()
         if not line.closed:
             self.sharp[ends] = True
-        self.fixed = _union(line.bounds, np.flatnonzero(self.corner))
+        self.fixed = np.union1d(line.bounds, np.flatnonzero(self.corner))
         if line.closed and len(self.fixed) == 2:  # one cubic would start where it ends
             halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
-            self.fixed = _union(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
+            self.fixed = np.union1d(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
 
     def _corners(self) -> BoolArray:
         """Where the polyline turns sharply: (n,), one vertex at each place."""
@@ -213,8 +199,11 @@ class _Fitter:
             found[[0, -1]] = found[0] | found[-1]
         return found
 
-    def tangents(self, knots: IntArray) -> _Tangents:
-        """Tangents at knots, measured over a part of the spans next to each."""
+    def tangents(self, knots: IntArray) -> FloatArray:
+        """Unit tangents, forward, before and after k knots, (2, k, 3); they differ at corners only.
+
+        They are measured over a part of the spans next to each knot.
+        """
         arc = self.line.arc[knots]
         spans = np.diff(arc)
         if self.line.closed:
@@ -225,7 +214,7 @@ class _Fitter:
         sharp = self.sharp[knots][:, None]
         before = np.where(sharp, -self._one_sided(arc, -TANGENT_REACH_AT_END * back), both)
         after = np.where(sharp, self._one_sided(arc, TANGENT_REACH_AT_END * ahead), both)
-        return _Tangents(_unit(before, after), _unit(after, before))
+        return np.stack([_unit(before, after), _unit(after, before)])
 
     def _two_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
         """Directions of cubics through points at arc lengths, fitted to both sides."""
@@ -242,7 +231,7 @@ class _Fitter:
         chords = self.line.positions(arc[:, None] + share * reach[:, None])
         return np.einsum("s,ksd->kd", weights, chords - self.line.positions(arc)[:, None])
 
-    def fit(self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray) -> _Fits:
+    def fit(self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray) -> Fits:
         """Fit cubics over spans of the polyline.
 
         Parameters
@@ -252,16 +241,15 @@ class _Fitter:
         first, last : (s, 3) float array
             Unit tangents there, forward.
         """
-        fits = self._fit(start, end, first, last, None)
-        far = np.flatnonzero(fits.deviation > self.tolerance)
+        handles, deviation = self._fit(start, end, first, last, None)
+        far = np.flatnonzero(deviation > self.tolerance)
         if len(far):
             start, end, first, last = start[far], end[far], first[far], last[far]
             short = self._short_handles(start, end, first, last)
-            straight = self._fit(start, end, first, last, short)
-            better = straight.deviation < fits.deviation[far]
-            fits.handles[far[better]] = straight.handles[better]
-            fits.deviation[far[better]] = straight.deviation[better]
-        return fits
+            _, straight = self._fit(start, end, first, last, short)
+            better = straight < deviation[far]
+            handles[far[better]], deviation[far[better]] = short[better], straight[better]
+        return handles, deviation
 
     def _short_handles(
         self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray
@@ -285,7 +273,7 @@ class _Fitter:
         first: FloatArray,
         last: FloatArray,
         handles: FloatArray | None,
-    ) -> _Fits:
+    ) -> Fits:
         """Fit cubics with handles of given lengths (s, 2), or by least squares."""
         span, arc, first_row = self._data(start, end)
         target = self.line.positions(arc)
@@ -306,7 +294,7 @@ class _Fitter:
         deviation = _deviations(cubic, span, parameter, target, first_row)
         # A cubic over one segment cannot be split, and its handles are short if need be.
         deviation[_turns_back(cubic, first, last) & (end - start > 1)] = np.inf
-        return _Fits(lengths, deviation)
+        return lengths, deviation
 
     def _data(self, start: IntArray, end: IntArray) -> tuple[IntArray, FloatArray, IntArray]:
         """Points on spans: the span and arc length of each, and the first one of each span."""
@@ -349,31 +337,29 @@ def _split(fitter: _Fitter) -> IntArray:
     # By the start of a cubic that is good: its end, and its tangents, which later knots may change.
     known_end, known = np.full(count, -1), np.zeros((count, 2, 3))
     while True:
-        tangents = fitter.tangents(knots)
+        before, after = fitter.tangents(knots)
         start, end = knots[:-1], knots[1:]
-        both = np.stack([tangents.after[:-1], tangents.before[1:]], axis=1)
+        both = np.stack([after[:-1], before[1:]], axis=1)
         new = (known_end[start] != end) | (known[start] != both).any(axis=(1, 2))
         start, end, both = start[new], end[new], both[new]
-        deviation = fitter.fit(start, end, both[:, 0], both[:, 1]).deviation
+        _, deviation = fitter.fit(start, end, both[:, 0], both[:, 1])
         bad = (deviation > fitter.tolerance) & (end - start > 1)
         if not bad.any():
             return knots
         known_end[start], known[start] = np.where(bad, -1, end), both
-        knots = _union(knots, fitter.splits(start[bad], end[bad], deviation[bad]))
+        knots = np.union1d(knots, fitter.splits(start[bad], end[bad], deviation[bad]))
 
 
-def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, _Tangents, FloatArray]:
+def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Remove knots where one cubic is enough; the tangents at the others stay."""
     tangents = fitter.tangents(knots)
     untested = ~np.isin(knots, fitter.fixed)
     while untested.any():
         at = np.flatnonzero(untested)
-        before, after = at - 1, at + 1
-        fits = fitter.fit(
-            knots[before], knots[after], tangents.after[before], tangents.before[after]
-        )
+        before, after = tangents
+        _, found = fitter.fit(knots[at - 1], knots[at + 1], after[at - 1], before[at + 1])
         deviation = np.full(len(knots), np.inf)
-        deviation[at] = np.where(fits.deviation <= fitter.tolerance, fits.deviation, np.inf)
+        deviation[at] = np.where(found <= fitter.tolerance, found, np.inf)
         # Of neighbours, only the better one: the other's spans are no longer the same.
         removed = np.isfinite(deviation)
         removed[1:] &= deviation[1:] < deviation[:-1]
@@ -382,9 +368,10 @@ def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, _Tangents, Float
         untested[:-1] |= removed[1:]
         untested[1:] |= removed[:-1]
         untested &= ~np.isin(knots, fitter.fixed)
-        knots, tangents, untested = knots[~removed], tangents[~removed], untested[~removed]
-    fits = fitter.fit(knots[:-1], knots[1:], tangents.after[:-1], tangents.before[1:])
-    return knots, tangents, fits.handles
+        knots, tangents, untested = knots[~removed], tangents[:, ~removed], untested[~removed]
+    before, after = tangents
+    handles, _ = fitter.fit(knots[:-1], knots[1:], after[:-1], before[1:])
+    return knots, tangents, handles
 
 
 def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
@@ -396,11 +383,6 @@ def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
         points[-1] = points[0]
     bounds = np.unique(kept[line.bounds])
     return CutPolyline(points, line.arc[moves], line.closed, line.vertex[moves], bounds), kept
-
-
-def _union(first: IntArray, second: IntArray) -> IntArray:
-    joined: IntArray = np.unique(np.concatenate([first, second]))
-    return joined
 
 
 def _unit(vectors: FloatArray, others: FloatArray) -> FloatArray:
@@ -462,7 +444,7 @@ def _deviations(
     """
     distance = np.linalg.norm(target - _at(cubic, span, parameter), axis=1)
     middle = _at(cubic, span[:-1], 0.5 * (parameter[:-1] + parameter[1:]))
-    off = distances_to_segments(middle, target[:-1], target[1:])
+    off = distance_to_segments(middle, target[:-1], target[1:])
     off[first_row[1:] - 1] = 0.0  # from one span to the next
     distance[:-1] = np.maximum(distance[:-1], off)
     return np.maximum.reduceat(distance, first_row)

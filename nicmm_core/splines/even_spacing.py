@@ -14,9 +14,10 @@ import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve
+from ..geometry.distances import distance_to_segments
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import weights_at
-from .polyline import CutPolyline, cut_polyline, distances_to_segments
+from .polyline import CutPolyline, cut_polyline
 
 SHORTEST = 0.5
 """Least segment of a leg, in mean segments of that leg."""
@@ -211,7 +212,7 @@ class _Division:
         """The greatest distance of the leg from each chord, and its vertex there, (count,) each."""
         arc, places = self.leg.arc, self.leg.alone.positions(self.at)
         span = np.clip(np.searchsorted(self.at, arc, side="right") - 1, 0, self.count - 1)
-        distance = distances_to_segments(self.leg.points, places[span], places[span + 1])
+        distance = distance_to_segments(self.leg.points, places[span], places[span + 1])
         first = np.flatnonzero(np.diff(span, prepend=-1))
         greatest, worst = np.zeros(self.count), np.zeros(self.count, dtype=np.int64)
         greatest[span[first]] = np.maximum.reduceat(distance, first)

@@ -1,4 +1,4 @@
-"""Points lifted off the surface."""
+"""Points at a distance above the surface."""
 
 from __future__ import annotations
 

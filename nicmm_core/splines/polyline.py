@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.tolerances import TINY
 
 CORNER = np.radians(30.0)
 """Turn at one place from which a polyline has a corner there, in radians."""
@@ -105,10 +104,3 @@ def _sharpest(points: FloatArray) -> int:
     turn = angles(before, after)
     # Between corners that differ by rounding, the first one.
     return int((turn >= turn.max() - 1e-9).argmax()) if turn.max() > CORNER else 0
-
-
-def distances_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Distances of points (k, 3) to line segments, a segment for each point, shape (k,)."""
-    step, offset = end - start, points - start
-    along = (offset * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), TINY)
-    return np.linalg.norm(offset - np.clip(along, 0.0, 1.0)[:, None] * step, axis=1)

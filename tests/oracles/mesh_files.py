@@ -14,7 +14,7 @@ INDEX = COLLECTIONS / "index.csv"
 
 
 def mesh_files(folder: str) -> list[Path]:
-    """Mesh files of a collection, sorted; stops with a word where there is none."""
+    """Mesh files of a collection, sorted; stops with a message if it has no such file."""
     root = COLLECTIONS / folder
     files = sorted(path for path in root.rglob("*") if path.suffix.lower() in MESH_FORMATS)
     if not files:

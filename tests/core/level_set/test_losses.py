@@ -14,15 +14,15 @@ from nicmm_core.level_set.losses import (
     EnergySurface,
     LossWeights,
     feature_loss,
-    gaussian_delta,
     interpolation_loss,
     loss_terms,
+    root_delta,
     sdf_loss,
     smoothness_loss,
     total_loss,
 )
 from nicmm_core.level_set.problem import build_problem
-from nicmm_core.network.sparse_operator import SparseOperator
+from nicmm_core.network.sparse_operator import sparse_operator
 from nicmm_core.network.tensors import surface_tensors
 from nicmm_core.path.virtual_splits import SplitMesh
 
@@ -119,8 +119,8 @@ def test_feature_term_weighs_the_map_where_the_curve_runs(flat_disc):
 @pytest.mark.parametrize("width", [0.01, 0.3, 5.0])
 def test_delta_integrates_to_one(width):
     values = torch.linspace(-10 * width, 10 * width, 20001, dtype=torch.float64)
-    assert torch.trapezoid(gaussian_delta(values, width), values).item() == pytest.approx(1.0)
-    assert gaussian_delta(values, width).argmax() == 10000
+    assert torch.trapezoid(root_delta(values, width) ** 2, values).item() == pytest.approx(1.0)
+    assert root_delta(values, width).argmax() == 10000
 
 
 def test_total_is_the_weighted_sum():
@@ -168,7 +168,7 @@ def test_interpolation_vanishes_for_the_initial_field(problem):
 
 def test_sparse_operator_and_its_gradient_equal_the_dense_matrix():
     matrix = sparse.random_array((40, 30), density=0.2, rng=np.random.default_rng(0))
-    operator = SparseOperator(matrix, CPU)
+    operator = sparse_operator(matrix, CPU)
     generator = torch.Generator().manual_seed(1)
     vector = torch.randn(30, generator=generator, requires_grad=True)
     weight = torch.randn(40, generator=generator)

@@ -203,7 +203,7 @@ def test_attention_couples_neighbouring_channels_only():
 
 
 def test_attention_sees_the_mean_over_the_area():
-    """A vertex of no area has no say."""
+    """A vertex without area is ignored."""
     inner = np.random.default_rng(0).random((3, 6), dtype=np.float32)
     share = np.array([0.5, 0.5, 0.0], dtype=np.float32)
     changed = inner.copy()

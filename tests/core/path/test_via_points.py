@@ -91,7 +91,7 @@ class TestWhichWay:
 
     @pytest.mark.slow
     def test_impossible_ones_are_named_and_left_out_in_the_advice(self, ball, monkeypatch):
-        """Through many points to and fro the path winds more often than it may."""
+        """Through many points back and forth the path winds more often than it may."""
         monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
         chosen = np.random.default_rng(0).choice(len(ball.vertices), 40, replace=False)
         points = locate_control_points(ball, chosen[:3], closed=True)

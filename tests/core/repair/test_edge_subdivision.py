@@ -33,9 +33,12 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     for vertex in range(n_vertices):
         here = places[parts.faces == vertex]
         np.testing.assert_allclose(here, here[:1].repeat(len(here), axis=0), atol=1e-15)
-    start, end, share = parts.edge_points.T
-    start, end = mesh.vertices[start.astype(int)], mesh.vertices[end.astype(int)]
-    expected = (1.0 - share[:, None]) * start + share[:, None] * end
+    # New vertices at equal steps along each subdivided edge, edge by edge.
+    expected = [
+        mesh.vertices[low] + step / count * (mesh.vertices[high] - mesh.vertices[low])
+        for (low, high), count in zip(edges[chosen], segments, strict=True)
+        for step in range(1, count)
+    ]
     for point, place in enumerate(expected, start=len(mesh.vertices)):
         np.testing.assert_allclose(places[parts.faces == point][0], place, atol=1e-15)
     # No crack: the rim is as long as before.
