@@ -64,7 +64,7 @@ def test_a_mesh_taken_for_a_manifold_needs_no_cut(seed):
         meshes = [nicmm.Mesh(ball.vertices, faces_between(number[ball.faces]))]
     for mesh in meshes:
         sides = _Sides(mesh.faces, np.arange(len(mesh.vertices)))
-        needs_none = not sides.branching and np.array_equal(
+        needs_none = not sides.nonmanifold_edges and np.array_equal(
             sides.cut(sides.plain_pairs, len(mesh.vertices))[0], mesh.faces
         )
         assert needs_none or not is_manifold(mesh)
