@@ -36,8 +36,8 @@ class _ChangesPoints(LongSolves):
 
     @classmethod
     def poll(cls, context):
-        has_curve = edited_curve.active(context) is not None or context.mode == "OBJECT"
-        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
+        has_mesh = curve_record.mesh_of_context(context) is not None
+        return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
     def requests(self, context) -> list:
         self._opened = self.opened(context)
@@ -96,11 +96,6 @@ class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     curve: CURVE
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
-
-    @classmethod
-    def poll(cls, context):
-        has_mesh = curve_record.mesh_of_context(context) is not None
-        return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
     def opened(self, context):
         return edited_curve.opened(context, edited_curve.chosen(context, self.curve))

@@ -98,6 +98,21 @@ def test_a_curve_is_edited_in_place(kept, name):
     assert len(drawn(curve)) != len(before) or not np.allclose(drawn(curve), before)
 
 
+@pytest.mark.parametrize("name", CURVES)
+def test_points_of_a_curve_are_changed(kept, name):
+    curve = bpy.data.objects[name]
+    assert bpy.ops.nicmm.activate_curve(curve=name) == {"FINISHED"}
+    assert bpy.context.active_object == curve
+    before = controls(kept, curve)
+    for setting in ("smoothness", "closed", "spline", "radius", "offset"):
+        getattr(curve.nicmm_settings, setting)
+    assert bpy.ops.nicmm.remove_point(index=1) == {"FINISHED"}
+    np.testing.assert_allclose(controls(kept, curve), np.delete(before, 1, axis=0), atol=ROUNDING)
+    assert bpy.ops.nicmm.insert_point(index=1, position=before[1]) == {"FINISHED"}
+    np.testing.assert_allclose(controls(kept, curve), before, atol=ROUNDING)
+    assert scenes.distances_to(before, drawn(curve)).max() < ROUNDING
+
+
 @pytest.mark.parametrize(("name", "output"), [("Closed", "STICKY"), ("Sticky", "CURVE")])
 def test_a_curve_is_converted(kept, name, output):
     curve = bpy.data.objects[name]

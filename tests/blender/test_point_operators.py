@@ -268,6 +268,19 @@ def test_settings_of_what_is_no_curve(sphere):
     assert sphere.nicmm_settings.closed and sphere.nicmm_settings.radius == 0.0
 
 
+def test_live_has_nothing_to_do_after_a_point(empty_scene, curve, places):
+    """What the operators write is up to date."""
+    live = module(empty_scene, "operators.live_update")
+    bpy.context.scene.nicmm_live_update = True
+    call("move_point", index=0, position=np.add(places[0], 0.0))
+    curve.nicmm_settings.smoothness = 3.0
+    before = content()
+    live._updates.note(set(), everything=True)
+    live._updates.last_change = 0.0
+    assert live.tick() is None and not live._updates.requests
+    assert content() == before
+
+
 ANOTHER_MESH = 2
 """The damage whose triangles are those of another mesh: the points are still known."""
 

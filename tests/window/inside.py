@@ -152,6 +152,7 @@ class Helper:
         """Make the first designed curve active."""
         found = next(each for each in bpy.data.objects if "nicmm_curve" in each)
         Helper.switch(found.name, "OBJECT")
+        bpy.ops.ed.undo_push(message="Activate")
 
     @staticmethod
     def activate_mesh():
