@@ -79,18 +79,26 @@ class Mesh:
         return normal / np.where(length > 0.0, length, 1.0)
 
     @cached_property
+    def opposite_sides(self) -> IntArray:
+        """The same edge as a side of the face beyond, for side 3 f + j opposite corner j of face f.
+
+        The side itself at a boundary edge, or at an edge of more than two faces; shape (3 F,).
+        """
+        order, first, count = grouped(side_keys(self.faces))
+        one, other = order[first[count == 2]], order[first[count == 2] + 1]
+        checkpoint()
+        sides = np.arange(3 * len(self.faces))
+        sides[one], sides[other] = other, one
+        return sides
+
+    @cached_property
     def face_neighbours(self) -> IntArray:
         """The face across the side opposite each corner, shape (F, 3).
 
         -1 at a boundary edge, or at an edge of more than two faces.
         """
-        n_faces = len(self.faces)
-        order, first, count = grouped(side_keys(self.faces))  # side 3 f + j of face f, corner j
-        one, other = order[first[count == 2]], order[first[count == 2] + 1]
-        checkpoint()
-        neighbours = np.full(3 * n_faces, -1)
-        neighbours[one], neighbours[other] = other // 3, one // 3
-        return neighbours.reshape(n_faces, 3)
+        beyond, face = self.opposite_sides.reshape(-1, 3) // 3, np.arange(len(self.faces))[:, None]
+        return np.where(beyond == face, -1, beyond)
 
     @cached_property
     def edges(self) -> IntArray:
