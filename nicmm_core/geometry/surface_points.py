@@ -16,6 +16,7 @@ from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
+from .vectors import dot
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        return np.einsum("kc,kcd->kd", self.barycentric, mesh.vertices[mesh.faces[self.faces]])
+        return positions_in(corners_of(mesh, self.faces), self.barycentric.T).T
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -45,7 +46,18 @@ class SurfacePoints:
 
     def __getitem__(self, index: IntArray | BoolArray) -> SurfacePoints:
         """Some of the points, by an array of indices or a mask."""
-        return SurfacePoints(self.faces[index], self.barycentric[index])
+        which = np.flatnonzero(index) if index.dtype == bool else index
+        return SurfacePoints(self.faces.take(which), self.barycentric.take(which, axis=0))
+
+
+def corners_of(mesh: Mesh, faces: IntArray) -> FloatArray:
+    """Positions of the corners of some faces, (3, 3, k): corner, component, face."""
+    return mesh.vertices.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
+
+
+def positions_in(corners: FloatArray, barycentric: FloatArray) -> FloatArray:
+    """Positions, (3, k), of points with coordinates, (3, k), in faces with corners, (3, 3, k)."""
+    return dot(barycentric[:, None], corners)
 
 
 def locate_control_points(

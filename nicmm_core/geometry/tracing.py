@@ -19,7 +19,8 @@ from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
-from .surface_points import SurfacePoints
+from .surface_points import SurfacePoints, corners_of, positions_in
+from .vectors import cross, dot, lengths
 
 MOST_FACES = 4096
 """Most faces of a trace; a longer one runs round the surface and is not a short connection."""
@@ -82,14 +83,16 @@ def trace_between(
         Directions in which the traces leave; by default towards the ends. Round the edge of a thin
         part the trace may begin in another direction.
     """
-    origin = start.positions(mesh)
-    forward = end.positions(mesh) - origin
+    origin, goal = start.positions(mesh).T, end.positions(mesh).T
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
     reached = _holds(mesh, end, start.faces[None])[0]
-    ahead = forward if ahead is None else ahead
-    fronts = _fronts(
-        mesh, start.faces, origin, _cross(normals, forward), ahead, np.flatnonzero(~reached)
-    )
+    index = np.flatnonzero(~reached)
+    origin, forward = origin[:, index], (goal - origin)[:, index]
+    ahead = forward if ahead is None else ahead.T[:, index]
+    across = cross(normals.T[:, index], forward)
+    first = start.faces[index]
+    offset = corners_of(mesh, first) - origin
+    fronts = _fronts(index, first, origin, across, offset, ahead)
     travelled = covered = np.zeros(len(fronts.index))
     parts, passed = [], 0
     while passed < MOST_FACES and len(fronts.index):
@@ -166,12 +169,25 @@ def trace_from(
     int
         Greatest number of faces passed by a point, which is the cost of the call.
     """
-    origin = start.positions(mesh)
-    across = _cross(mesh.face_normals[start.faces], direction)
-    blocked = length > 0.0
-    fronts = _fronts(mesh, start.faces, origin, across, direction, np.flatnonzero(blocked))
+    corners, weights = corners_of(mesh, start.faces), start.barycentric.T
+    origin = positions_in(corners, weights)
+    across = cross(mesh.face_normals.take(start.faces, axis=0).T, direction.T)
+    offset = corners - origin
+    height = dot(offset.swapaxes(0, 1), across[:, None])
+    # Most points stay in their faces: there the coordinates change by the differences of heights.
+    change = height.take(FIRST_END, axis=0) - height.take(SECOND_END, axis=0)
+    speed = lengths(positions_in(offset, change))
+    inside = weights + length / np.where(speed > 0.0, speed, 1.0) * change
+    index = np.flatnonzero(~(inside >= tolerances.INSIDE).all(axis=0) & (length > 0.0))
+    faces, barycentric = start.faces.copy(), inside.T.copy()
+    barycentric[index] = start.barycentric[index]
+    blocked = np.zeros(len(length), dtype=bool)
+    blocked[index] = True
+    fronts = _fronts(
+        index, faces[index], origin[:, index], across[:, index], offset[:, :, index],
+        direction.T[:, index],
+    )  # fmt: skip
     blocked[fronts.index] = False
-    faces, barycentric = start.faces.copy(), start.barycentric.copy()
     left, passed, most_passed = length[fronts.index], 0, 0
     while passed < MOST_FACES and len(fronts.index):
         checkpoint()
@@ -222,23 +238,24 @@ class _Fronts:
 
     index: IntArray  # (w,) of the caller's traces
     start: IntArray  # (w,) first faces
-    origin: FloatArray  # (w, 3)
-    across: FloatArray  # (w, 3) normals of the planes
+    origin: FloatArray  # (3, w)
+    across: FloatArray  # (3, w) normals of the planes
     side: IntArray  # (w,) sides ahead
     first: FloatArray  # (w,) heights of their two ends above the planes
     second: FloatArray
     crossed: IntArray  # (w,) sides crossed last, and where
     share: FloatArray
-    position: FloatArray  # (w, 3) there
+    position: FloatArray  # (3, w) there
 
     def taken(self, which: IntArray) -> _Fronts:
         """Some of the traces."""
         if len(which) == len(self.index):
             return self
         return _Fronts(
-            self.index[which], self.start[which], self.origin[which], self.across[which],
-            self.side[which], self.first[which], self.second[which], self.crossed[which],
-            self.share[which], self.position[which],
+            self.index.take(which), self.start.take(which), self.origin.take(which, axis=1),
+            self.across.take(which, axis=1), self.side.take(which), self.first.take(which),
+            self.second.take(which), self.crossed.take(which), self.share.take(which),
+            self.position.take(which, axis=1),
         )  # fmt: skip
 
 
@@ -255,32 +272,38 @@ class _Strip:
 
 
 def _fronts(
-    mesh: Mesh,
-    faces: IntArray,
+    index: IntArray,
+    start: IntArray,
     origin: FloatArray,
     across: FloatArray,
+    offset: FloatArray,
     forward: FloatArray,
-    index: IntArray,
 ) -> _Fronts:
-    """Traces with some indices at their starts, except where a plane does not cross the face."""
-    start, origin, across = faces[index], origin[index], across[index]
-    offset = mesh.vertices[mesh.faces[start]] - origin[:, None]  # (w, 3, 3)
-    height, along = _dot(offset, across[:, None]), _dot(offset, forward[index][:, None])
+    """Traces at their starts, except where a plane does not cross the face.
+
+    Parameters
+    ----------
+    index, start : (w,) int arrays
+    origin, across, forward : (3, w) float array
+    offset : (3, 3, w) float array
+        From the origins to the corners of the faces.
+    """
+    corners = offset.swapaxes(0, 1)
+    height, along = dot(corners, across[:, None]), dot(corners, forward[:, None])
+    first, second = height.take(FIRST_END, axis=0), height.take(SECOND_END, axis=0)
     # Two sides are crossed, one of them ahead.
-    above = height >= 0.0
-    crossed = above[:, FIRST_END] != above[:, SECOND_END]
-    first, second = height[:, FIRST_END], height[:, SECOND_END]
-    share = first / np.where(crossed, first - second, 1.0)
-    ahead = along[:, FIRST_END]
-    ahead = ahead + share * (along[:, SECOND_END] - ahead)
-    corner = np.where(crossed, ahead, -np.inf).argmax(axis=1)
-    rows = np.arange(len(index))
+    crossed = (first >= 0.0) != (second >= 0.0)
+    shares = first / np.where(crossed, first - second, 1.0)
+    along, ends = along.take(FIRST_END, axis=0), along.take(SECOND_END, axis=0)
+    along = along + shares * (ends - along)
+    corner = np.where(crossed, along, -np.inf).argmax(axis=0)
+    ahead = corner, np.arange(len(index))
     side = 3 * start + corner
     fronts = _Fronts(
-        index, start, origin, across, side, first[rows, corner], second[rows, corner],
-        side, share[rows, corner], origin,
+        index, start, origin, across, side, first[ahead], second[ahead], side, shares[ahead],
+        origin,
     )  # fmt: skip
-    return fronts.taken(np.flatnonzero(crossed[rows, corner]))
+    return fronts.taken(np.flatnonzero(crossed[ahead]))
 
 
 def _advanced(mesh: Mesh, fronts: _Fronts, passed: int) -> tuple[_Strip, _Fronts]:
@@ -289,34 +312,38 @@ def _advanced(mesh: Mesh, fronts: _Fronts, passed: int) -> tuple[_Strip, _Fronts
     Beyond a blocked side a trace goes on in the face before, which means nothing.
     """
     count = min(max(passed, FIRST_FACES), MORE_FACES)
-    vertex, opposite = mesh.faces.ravel(), mesh.opposite_sides
+    vertex = mesh.faces.ravel()
     size = count, len(fronts.index)
     sides, entered, shares = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
     side, first, second = fronts.side, fronts.first, fronts.second
     for row in range(count):
-        beyond = opposite[side]
+        beyond = mesh.opposite_sides.take(side)
         sides[row], entered[row], shares[row] = side, beyond, first / (first - second)
         # Faces of one orientation have a common side in opposite directions.
         before, after = second, first
+        begin, end = _ends(beyond)
         if not mesh.is_oriented:
-            same = vertex[_first_end(side)] == vertex[_first_end(beyond)]
+            same = vertex.take(_ends(side)[0]) == vertex.take(begin)
             before, after = np.where(same, first, second), np.where(same, second, first)
         # The trace leaves between the third corner and the end on the other side of the plane.
-        height = _dot(mesh.vertices[vertex[beyond]] - fronts.origin, fronts.across)
+        position = mesh.vertices.take(vertex.take(beyond), axis=0).T
+        height = dot(position - fronts.origin, fronts.across)
         like_before = (height >= 0.0) == (before >= 0.0)
-        side = np.where(like_before, _first_end(beyond), _second_end(beyond))
+        side = np.where(like_before, begin, end)
         first, second = np.where(like_before, after, height), np.where(like_before, height, before)
-    low, high = mesh.vertices[vertex[_first_end(sides)]], mesh.vertices[vertex[_second_end(sides)]]
-    crossings = low + shares[:, :, None] * (high - low)
-    step = np.concatenate([fronts.position[None], crossings])
-    step = step[1:] - step[:-1]
+    begin, end = _ends(sides)
+    low = mesh.vertices.take(vertex.take(begin), axis=0).transpose(2, 0, 1)
+    high = mesh.vertices.take(vertex.take(end), axis=0).transpose(2, 0, 1)
+    points = np.empty((3, count + 1, size[1]))
+    points[:, 0], points[:, 1:] = fronts.position, low + shares * (high - low)
+    face = entered // 3
     strip = _Strip(
-        sides, entered // 3, shares, np.sqrt(_dot(step, step)), entered == sides,
-        entered // 3 == fronts.start,
+        sides, face, shares, lengths(points[:, 1:] - points[:, :-1]), entered == sides,
+        face == fronts.start,
     )  # fmt: skip
     onward = _Fronts(
         fronts.index, fronts.start, fronts.origin, fronts.across, side, first, second,
-        sides[-1], shares[-1], crossings[-1],
+        sides[-1], shares[-1], points[:, -1],
     )  # fmt: skip
     return strip, onward
 
@@ -325,14 +352,11 @@ FIRST_END, SECOND_END = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Corners at the ends of the side opposite each corner."""
 
 
-def _first_end(side: IntArray) -> IntArray:
-    """Corners at which sides begin, as indices of all corners; also the sides opposite them."""
-    return side + (FIRST_END - np.arange(3))[side % 3]
-
-
-def _second_end(side: IntArray) -> IntArray:
-    """The same where sides end."""
-    return side + (SECOND_END - np.arange(3))[side % 3]
+def _ends(side: IntArray) -> tuple[IntArray, IntArray]:
+    """Corners at which sides begin and end, as indices of all corners; also the sides opposite."""
+    corner = side % 3
+    face = side - corner
+    return face + FIRST_END.take(corner), face + SECOND_END.take(corner)
 
 
 def _first(events: BoolArray) -> tuple[IntArray, BoolArray]:
@@ -345,10 +369,9 @@ def _first(events: BoolArray) -> tuple[IntArray, BoolArray]:
 
 def _on_sides(mesh: Mesh, faces: IntArray, sides: IntArray, shares: FloatArray) -> FloatArray:
     """Coordinates in faces, (p, 3), of points at a share of some of their sides."""
-    corners, vertex = mesh.faces[faces], mesh.faces.ravel()
-    first, second = vertex[_first_end(sides)], vertex[_second_end(sides)]
-    shares = shares[:, None]
-    return (corners == first[:, None]) * (1.0 - shares) + (corners == second[:, None]) * shares
+    vertex, corners = mesh.faces.ravel(), mesh.faces.take(faces, axis=0).T
+    first, second = (vertex.take(end) for end in _ends(sides))
+    return ((corners == first) * (1.0 - shares) + (corners == second) * shares).T
 
 
 def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
@@ -361,18 +384,3 @@ def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
         found = (support[:, :, None] == corners[:, :, None, :]).any(axis=3)
         holds[:, on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=2)
     return holds
-
-
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Dot products of vectors, (…, 3)."""
-    product = one * other
-    return product[..., 0] + product[..., 1] + product[..., 2]
-
-
-def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Cross products of vectors, (n, 3)."""
-    result = np.empty(one.shape)
-    result[:, 0] = one[:, 1] * other[:, 2] - one[:, 2] * other[:, 1]
-    result[:, 1] = one[:, 2] * other[:, 0] - one[:, 0] * other[:, 2]
-    result[:, 2] = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    return result
