@@ -36,7 +36,7 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        return positions_in(corners_of(mesh, self.faces), self.barycentric.T).T
+        return interpolated(corners_of(mesh, self.faces), self.barycentric.T).T
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -50,14 +50,22 @@ class SurfacePoints:
         return SurfacePoints(self.faces.take(which), self.barycentric.take(which, axis=0))
 
 
+def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
+    """Vectors at vertices, (V, 3), taken at the corners of faces, (3, 3, k).
+
+    The axes are corner, component and face.
+    """
+    return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
+
+
 def corners_of(mesh: Mesh, faces: IntArray) -> FloatArray:
     """Positions of the corners of some faces, (3, 3, k): corner, component, face."""
-    return mesh.vertices.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
+    return at_corners(mesh, faces, mesh.vertices)
 
 
-def positions_in(corners: FloatArray, barycentric: FloatArray) -> FloatArray:
-    """Positions, (3, k), of points with coordinates, (3, k), in faces with corners, (3, 3, k)."""
-    return dot(barycentric[:, None], corners)
+def interpolated(at_corners: FloatArray, barycentric: FloatArray) -> FloatArray:
+    """Vectors, (3, k), at coordinates, (3, k), between those at corners, (3, 3, k)."""
+    return dot(barycentric[:, None], at_corners)
 
 
 def locate_control_points(

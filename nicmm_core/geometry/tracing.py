@@ -19,7 +19,7 @@ from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
-from .surface_points import SurfacePoints, corners_of, positions_in
+from .surface_points import SurfacePoints, corners_of, interpolated
 from .vectors import cross, dot, lengths
 
 MOST_FACES = 4096
@@ -170,13 +170,13 @@ def trace_from(
         Greatest number of faces passed by a point, which is the cost of the call.
     """
     corners, weights = corners_of(mesh, start.faces), start.barycentric.T
-    origin = positions_in(corners, weights)
+    origin = interpolated(corners, weights)
     across = cross(mesh.face_normals.take(start.faces, axis=0).T, direction.T)
     offset = corners - origin
     height = dot(offset.swapaxes(0, 1), across[:, None])
     # Most points stay in their faces: there the coordinates change by the differences of heights.
     change = height.take(FIRST_END, axis=0) - height.take(SECOND_END, axis=0)
-    speed = lengths(positions_in(offset, change))
+    speed = lengths(interpolated(offset, change))
     inside = weights + length / np.where(speed > 0.0, speed, 1.0) * change
     index = np.flatnonzero(~(inside >= tolerances.INSIDE).all(axis=0) & (length > 0.0))
     faces, barycentric = start.faces.copy(), inside.T.copy()
@@ -224,8 +224,8 @@ def trace_from(
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:
     """Coordinates moved away from the sides and corners of their faces by `tolerances.INSIDE`."""
-    moved = np.maximum(barycentric, tolerances.INSIDE)
-    return moved / moved.sum(axis=1, keepdims=True)
+    moved = np.maximum(barycentric, tolerances.INSIDE).T
+    return (moved / (moved[0] + moved[1] + moved[2])).T
 
 
 @dataclass(frozen=True)
@@ -321,15 +321,14 @@ def _advanced(mesh: Mesh, fronts: _Fronts, passed: int) -> tuple[_Strip, _Fronts
         sides[row], entered[row], shares[row] = side, beyond, first / (first - second)
         # Faces of one orientation have a common side in opposite directions.
         before, after = second, first
-        begin, end = _ends(beyond)
         if not mesh.is_oriented:
-            same = vertex.take(_ends(side)[0]) == vertex.take(begin)
+            same = vertex.take(_ends(side)[0]) == vertex.take(_ends(beyond)[0])
             before, after = np.where(same, first, second), np.where(same, second, first)
         # The trace leaves between the third corner and the end on the other side of the plane.
         position = mesh.vertices.take(vertex.take(beyond), axis=0).T
         height = dot(position - fronts.origin, fronts.across)
         like_before = (height >= 0.0) == (before >= 0.0)
-        side = np.where(like_before, begin, end)
+        side = beyond + TURNS.take(2 * (beyond % 3) + like_before)
         first, second = np.where(like_before, after, height), np.where(like_before, height, before)
     begin, end = _ends(sides)
     low = mesh.vertices.take(vertex.take(begin), axis=0).transpose(2, 0, 1)
@@ -350,6 +349,9 @@ def _advanced(mesh: Mesh, fronts: _Fronts, passed: int) -> tuple[_Strip, _Fronts
 
 FIRST_END, SECOND_END = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Corners at the ends of the side opposite each corner."""
+
+TURNS = np.stack([SECOND_END, FIRST_END], axis=1) - np.arange(3)[:, None]
+"""From each side to the sides opposite its second and its first end."""
 
 
 def _ends(side: IntArray) -> tuple[IntArray, IntArray]:

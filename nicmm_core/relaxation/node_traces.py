@@ -16,7 +16,8 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import overlapping_segments, segments_meet
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
 from ..geometry.tracing import Traces, strictly_inside, trace_between
-from .curve_nodes import CurveSurface, Nodes, nodes_at, unit_vectors
+from ..geometry.vectors import unit
+from .curve_nodes import CurveSurface, Nodes, nodes_at
 
 DETOUR = 3.0
 """Longest trace between two nodes, relative to their distance in space; longer ones fail."""
@@ -201,7 +202,7 @@ def traces_of_steps(
     before = np.where(goes_on, -backward[start], -onward[start])
     after = np.where(goes_on, -onward[end], -backward[end])
     length = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
-    ahead = unit_vectors(before) + unit_vectors(after)
+    ahead = unit(before.T).T + unit(after.T).T
     longest = DETOUR * np.maximum(distance[lost], length)
     found = trace_between(mesh, places[start], places[end], ahead, longest, surface.folded, ahead)
     reached = traces.reached.copy()

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.vectors import dot, lengths
 from .curve_nodes import Nodes
 
 CLEARANCE = 2.0
@@ -55,7 +56,8 @@ def close_pairs(nodes: Nodes) -> IntArray:
         # Another dimension keeps curves apart.
         curve = nodes.spread(2.0 * np.arange(nodes.curves))
         places = np.concatenate([places, curve[:, None]], axis=1)
-    pairs = cKDTree(places).query_pairs(1.0, output_type="ndarray")
+    tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
+    pairs = tree.query_pairs(1.0, output_type="ndarray")
     arc = (np.cumsum(lengths, axis=1) - lengths).ravel()
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
@@ -65,16 +67,19 @@ def close_pairs(nodes: Nodes) -> IntArray:
 
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
     """Those of some pairs that are closer than the clearance, on the same side of the surface."""
-    clearance = _clearance(nodes)[pairs[:, 0]]
-    normals, positions = nodes.normals[pairs], nodes.positions[pairs]
-    offset = positions[:, 0] - positions[:, 1]
-    distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
-    kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
-    kept &= distance < clearance
-    pairs, distance, clearance = pairs[kept], distance[kept], clearance[kept]
-    direction = offset[kept] / distance[:, None]
-    approach = np.einsum("pd,pkd->pk", direction, nodes.conormals[pairs]) * [-1.0, 1.0]
-    return Contacts(pairs, 1.0 - distance / clearance, approach / clearance[:, None])
+    ends, clearance = pairs.T, _clearance(nodes)[pairs[:, 0]]
+    one, other = (nodes.positions.take(end, axis=0).T for end in ends)
+    distance = np.maximum(lengths(one - other), tolerances.TINY)
+    close = np.flatnonzero(distance < clearance)
+    pairs, ends, offset = pairs[close], ends[:, close], (one - other)[:, close]
+    distance, clearance = distance[close], clearance[close]
+    facing = dot(*(nodes.normals.take(end, axis=0).T for end in ends)) > SAME_SIDE
+    pairs, distance, clearance = pairs[facing], distance[facing], clearance[facing]
+    away, towards = (
+        dot(offset[:, facing], nodes.conormals.take(end[facing], axis=0).T) for end in ends
+    )
+    approach = np.array([-away, towards]) / (distance * clearance)
+    return Contacts(pairs, 1.0 - distance / clearance, approach.T)
 
 
 def _clearance(nodes: Nodes) -> FloatArray:
