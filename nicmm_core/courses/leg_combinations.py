@@ -161,12 +161,20 @@ def combined(
             total = total + junction_cost(graph, last[number], first[0])[:, choice[:, 0]].T
         for earlier in range(number):
             total += price * crosses[offset[earlier] + choice[:, earlier]][:, here]
-        best = np.argsort(rounded(total), axis=None, kind="stable")[:BEAM]
+        best = _least(rounded(total).ravel(), BEAM)
         best = best[np.isfinite(total.ravel()[best])]
         row, route = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], route[:, None]], axis=1)
         cost = total.ravel()[best]
     return Combinations(choice, cost)
+
+
+def _least(values: FloatArray, most: int) -> IntArray:
+    """Indices of the least values, ascending."""
+    among = np.arange(len(values))
+    if len(values) > most:
+        among = np.flatnonzero(values <= np.partition(values, most - 1)[most - 1])
+    return among[np.argsort(values[among], kind="stable")[:most]]
 
 
 def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:

@@ -117,9 +117,9 @@ def feature_energy(nodes: Nodes) -> float:
     return float((nodes.phi_fea**2 * nodes.ds).sum())
 
 
-def elastic_energy(nodes: Nodes, weights: Balance) -> float:
+def elastic_energy(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> float:
     """E of one curve, with the contact term if it has a weight."""
-    return float(curve_energies(nodes, weights)[0])
+    return float(curve_energies(nodes, weights, contacts)[0])
 
 
 def comparable_energies(

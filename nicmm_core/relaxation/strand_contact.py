@@ -22,6 +22,10 @@ SAME_SIDE = 0.3
 """Least cosine between two normals; excludes strands on opposite sides of a thin part."""
 
 
+NEARBY = 2.0
+"""Distance, in clearances, of nodes that are tested for contact again after short moves."""
+
+
 @dataclass(frozen=True)
 class Contacts:
     """Pairs of close nodes of different strands.
@@ -46,23 +50,49 @@ def contacts_between(nodes: Nodes) -> Contacts:
     return contacts_of_pairs(nodes, close_pairs(nodes))
 
 
-def close_pairs(nodes: Nodes) -> IntArray:
-    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve."""
+def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
+    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve.
+
+    Close are those within a reach, in clearances.
+    """
     lengths = nodes.by_curve(nodes.step_lengths)
     total = lengths.sum(axis=1)
     clearance = _clearance(nodes)
     places = nodes.positions / clearance[:, None]
     if nodes.curves > 1:
         # Another dimension keeps curves apart.
-        curve = nodes.spread(2.0 * np.arange(nodes.curves))
+        curve = nodes.spread(2.0 * reach * np.arange(nodes.curves))
         places = np.concatenate([places, curve[:, None]], axis=1)
     tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
-    pairs = tree.query_pairs(1.0, output_type="ndarray")
+    pairs = tree.query_pairs(reach, output_type="ndarray")
     arc = (np.cumsum(lengths, axis=1) - lengths).ravel()
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
         along = np.minimum(along, nodes.spread(total)[pairs[:, 0]] - along)
     return pairs[along > ALONG * clearance[pairs[:, 0]]]
+
+
+class NearStrands:
+    """Pairs of nodes of one curve that may be in contact, sought again only after long moves.
+
+    Parameters
+    ----------
+    nodes : Nodes
+    """
+
+    def __init__(self, nodes: Nodes) -> None:
+        self._seek(nodes)
+
+    def contacts(self, nodes: Nodes) -> Contacts:
+        """Contacts of the same nodes at other places."""
+        moved = float(lengths(nodes.positions.T - self._positions.T).max())
+        if 2.0 * moved + _clearance(nodes)[0] > self._reach:
+            self._seek(nodes)
+        return contacts_of_pairs(nodes, self._pairs)
+
+    def _seek(self, nodes: Nodes) -> None:
+        self._positions, self._reach = nodes.positions, NEARBY * _clearance(nodes)[0]
+        self._pairs = close_pairs(nodes, NEARBY)
 
 
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
