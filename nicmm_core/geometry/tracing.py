@@ -25,7 +25,7 @@ from .vectors import cross, dot, lengths
 MOST_FACES = 4096
 """Most faces of a trace; a longer one runs round the surface and is not a short connection."""
 
-FIRST_FACES, MORE_FACES = 2, 16
+FIRST_FACES, MORE_FACES = 4, 16
 """Faces that traces pass before it is asked for the first time which have ended, and the most
 between two such questions; in between the number doubles."""
 
@@ -189,36 +189,45 @@ def trace_from(
     )  # fmt: skip
     blocked[fronts.index] = False
     left, passed, most_passed = length[fronts.index], 0, 0
+    ends = []
     while passed < MOST_FACES and len(fronts.index):
         checkpoint()
         strip, onward = _advanced(mesh, fronts, passed)
-        index, step = fronts.index, strip.lengths
-        signed, back = step, np.zeros(1, dtype=bool)
+        step = signed = strip.lengths
+        back = np.zeros(1, dtype=bool)
         if folded is not None:
-            back = folded[strip.sides // 3] & ~folded[start.faces[index]]
+            back = folded[strip.sides // 3] & ~folded[fronts.start]
             signed = np.where(back, -step, step)
         covered = signed.cumsum(0)
         stops = (~back & (covered >= left)) | strip.blocked
         last, going = _first(stops | strip.closed)
         most_passed = passed + int(last.max()) + 1
-        column = np.flatnonzero(stops[last, np.arange(len(index))])
-        row, ends = last[column], index[column]
-        faces[ends] = strip.sides[row, column] // 3
-        # A trace enters its first face at its start, the others over the side before.
-        later = np.flatnonzero(row + passed)
-        before = row[later] - 1, column[later]
-        entry = np.where(before[0] < 0, fronts.crossed[before[1]], strip.sides[before])
-        share = np.where(before[0] < 0, fronts.share[before[1]], strip.shares[before])
-        barycentric[ends[later]] = _on_sides(mesh, faces[ends[later]], entry, share)
-        step = step[row, column]
-        to_go = left[column] - covered[row, column] + signed[row, column]
-        blocked[ends] = to_go > step
-        share = np.minimum(to_go, step) / np.maximum(step, tolerances.TINY)
-        at_exit = _on_sides(mesh, faces[ends], strip.sides[row, column], strip.shares[row, column])
-        barycentric[ends] += share[:, None] * (at_exit - barycentric[ends])
-        passed += len(signed)
+        column = np.flatnonzero(stops[last, np.arange(len(last))])
+        row = last[column]
+        here = row, column
+        to_go = left[column] - covered[here] + signed[here]
+        # The side over which the trace has entered its last face; in the first one, any.
+        crossed = np.where(row > 0, strip.sides[row - 1, column], fronts.crossed[column])
+        share = np.where(row > 0, strip.shares[row - 1, column], fronts.share[column])
+        ends.append(
+            (fronts.index[column], row + passed, crossed, share, strip.sides[here],
+             strip.shares[here], to_go, step[here])
+        )  # fmt: skip
+        passed += len(step)
         further = np.flatnonzero(going)
         left, fronts = left[further] - covered[-1, further], onward.taken(further)
+    if ends:
+        index, row, crossed, entry, side, share, to_go, step = (
+            np.concatenate(part) for part in zip(*ends, strict=True)
+        )
+        faces[index] = side // 3
+        blocked[index] = to_go > step
+        begin = np.where(
+            row == 0, start.barycentric[index].T, _on_sides(mesh, faces[index], crossed, entry).T
+        )
+        end = _on_sides(mesh, faces[index], side, share).T
+        share = np.minimum(to_go, step) / np.maximum(step, tolerances.TINY)
+        barycentric[index] = (begin + share * (end - begin)).T
     return SurfacePoints(faces, strictly_inside(barycentric)), blocked, most_passed
 
 
