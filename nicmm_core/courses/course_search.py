@@ -50,6 +50,7 @@ def find_courses(
     graph: HopGraph,
     surface: CurveSurface,
     points: SurfacePoints,
+    along: FloatArray,
     fixed: BoolArray,
     closed: bool,
     smoothness: float,
@@ -68,6 +69,8 @@ def find_courses(
         With the maps of the request.
     points : SurfacePoints
         k points in the order visited.
+    along : (k, V + k) float array
+        Distances from them along edges to the vertices and to them.
     fixed : (k,) bool array
         The control points among them; curves pass the others only at the start.
     closed : bool
@@ -88,7 +91,7 @@ def find_courses(
         chance = np.random.default_rng(draw).standard_normal(len(surface.mesh.vertices))
         factor = np.exp(DRAWN * chance) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
-    courses = with_control_points(graph, points, legs, factor, tension)
+    courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
     routes = routes_of_legs(courses, legs, closed)
     if not routes or not all(len(leg.cells) for leg in routes):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .array_types import BoolArray, FloatArray, IntArray
+from .grouping import grouped
 from .surface_points import SurfacePoints, weights_at
 
 TOUCHING = 1e-12
@@ -57,8 +58,7 @@ def overlapping_segments(
     start, end : (s, 2) float array
         Barycentric coordinates in this face.
     """
-    order = np.argsort(group, kind="stable")
-    count = np.unique(group, return_counts=True)[1]
+    order, _, count = grouped(group)
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
     # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if

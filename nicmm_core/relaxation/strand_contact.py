@@ -57,7 +57,7 @@ def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
     """
     lengths = nodes.by_curve(nodes.step_lengths)
     total = lengths.sum(axis=1)
-    clearance = _clearance(nodes)
+    clearance = nodes.spread(_clearances(nodes))
     places = nodes.positions / clearance[:, None]
     if nodes.curves > 1:
         # Another dimension keeps curves apart.
@@ -86,18 +86,19 @@ class NearStrands:
     def contacts(self, nodes: Nodes) -> Contacts:
         """Contacts of the same nodes at other places."""
         moved = float(lengths(nodes.positions.T - self._positions.T).max())
-        if 2.0 * moved + _clearance(nodes)[0] > self._reach:
+        if 2.0 * moved + _clearances(nodes)[0] > self._reach:
             self._seek(nodes)
         return contacts_of_pairs(nodes, self._pairs)
 
     def _seek(self, nodes: Nodes) -> None:
-        self._positions, self._reach = nodes.positions, NEARBY * _clearance(nodes)[0]
+        self._positions, self._reach = nodes.positions, NEARBY * _clearances(nodes)[0]
         self._pairs = close_pairs(nodes, NEARBY)
 
 
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
     """Those of some pairs that are closer than the clearance, on the same side of the surface."""
-    ends, clearance = pairs.T, _clearance(nodes)[pairs[:, 0]]
+    ends, size = pairs.T, len(nodes.positions) // nodes.curves
+    clearance = _clearances(nodes).take(ends[0] // size)
     one, other = (nodes.positions.take(end, axis=0).T for end in ends)
     distance = np.maximum(lengths(one - other), tolerances.TINY)
     close = np.flatnonzero(distance < clearance)
@@ -112,11 +113,10 @@ def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
     return Contacts(pairs, 1.0 - distance / clearance, approach.T)
 
 
-def _clearance(nodes: Nodes) -> FloatArray:
-    """The clearance of the curve of each node, (n,)."""
+def _clearances(nodes: Nodes) -> FloatArray:
+    """The clearance of each curve, (c,)."""
     lengths = nodes.by_curve(nodes.step_lengths)
     steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
     # A curve without length has a clearance too.
     least = max(tolerances.TINY, tolerances.ROUNDED * float(np.abs(nodes.positions).max()))
-    mean = np.maximum(lengths.sum(axis=1) / steps, least)
-    return nodes.spread(CLEARANCE * mean)
+    return CLEARANCE * np.maximum(lengths.sum(axis=1) / steps, least)

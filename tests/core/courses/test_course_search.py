@@ -7,7 +7,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
 from nicmm_core.courses.course_search import farthest_between, find_courses
-from nicmm_core.courses.hop_graph import build_hop_graph
+from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
 from nicmm_core.courses.leg_combinations import CROSSING, combined, crossing_routes, laid_routes
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
@@ -57,7 +57,8 @@ def test_courses_pass_their_points(body, closed):
     points = random_surface_points(body, 4, seed=3)
     graph, fixed = build_hop_graph(surface, 0), np.ones(4, dtype=bool)
     for any_order in (False, True):
-        found = list(find_courses(graph, surface, points, fixed, closed, 1.0, any_order))
+        along = distances_along_edges(surface, points)
+        found = list(find_courses(graph, surface, points, along, fixed, closed, 1.0, any_order))
         assert found
         for nodes, visit in found:
             order = visit[visit >= 0]
@@ -76,7 +77,8 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
     points = points_near(ball, on_circle)
     graph = build_hop_graph(surface, 0)
-    nodes, _ = next(find_courses(graph, surface, points, np.ones(3, bool), True, 1.0, False))
+    along, fixed = distances_along_edges(surface, points), np.ones(3, bool)
+    nodes, _ = next(find_courses(graph, surface, points, along, fixed, True, 1.0, False))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
     energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
     assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nicmm_core import shapes
-from nicmm_core.courses.hop_graph import build_hop_graph, with_control_points
+from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges, with_control_points
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.core.checks import grid, points_near
@@ -15,7 +15,8 @@ LEGS = np.array([[0, 1], [1, 2], [2, 0]])
 def graph_through(mesh, positions, legs=LEGS, tension=160.0):
     surface = curve_surface(mesh)
     points = points_near(mesh, np.asarray(positions, dtype=float))
-    return with_control_points(build_hop_graph(surface, 0), points, legs, None, tension)
+    along = distances_along_edges(surface, points)
+    return with_control_points(build_hop_graph(surface, 0), points, along, legs, None, tension)
 
 
 @pytest.fixture(scope="module")
