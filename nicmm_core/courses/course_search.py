@@ -17,7 +17,7 @@ from ..path.leg_search import length_factor
 from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
-from ..relaxation.node_traces import with_midpoints
+from ..relaxation.node_traces import traces_between_nodes, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .hop_graph import HopGraph, with_control_points
 from .leg_combinations import combined, course_nodes, crossing_routes, different, laid_routes
@@ -98,12 +98,13 @@ def find_courses(
         return
     with subrange(0.2, 0.3):
         on_routes = laid_routes(courses, routes, smoothness)
-    crosses = crossing_routes(courses, routes, on_routes)
+    traces = traces_between_nodes(surface, on_routes)
+    crosses = crossing_routes(courses, routes, on_routes, traces)
     combinations = combined(courses, routes, crosses, closed)
     choice = different(routes, combinations, CANDIDATES)
     if not len(choice):
         return
-    nodes, at_points = course_nodes(courses, routes, on_routes, choice, closed)
+    nodes, at_points = course_nodes(courses, routes, on_routes, traces, choice, closed)
     # Control points are numbered without the others.
     number = np.where(fixed, np.cumsum(fixed) - 1, -1)
     visit = np.full(len(at_points), -1)

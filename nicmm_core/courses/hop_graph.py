@@ -364,10 +364,14 @@ def _no_hops() -> Hops:
 
 def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:
     """Row and column of the least finite distances of each row, rows ascending."""
-    nearest = np.argsort(distance, axis=1, kind="stable")[:, :count]
-    row, column = np.repeat(np.arange(len(distance)), nearest.shape[1]), nearest.ravel()
-    finite = np.isfinite(distance[row, column])
-    return row[finite], column[finite]
+    if distance.shape[1] > count:
+        farthest = np.partition(distance, count - 1, axis=1)[:, count - 1, None]
+        distance = np.where(distance <= farthest, distance, np.inf)
+    row, column = np.nonzero(np.isfinite(distance))
+    order = np.lexsort((distance[row, column], row))  # stable
+    row, column = row[order], column[order]
+    place = np.arange(len(row)) - np.searchsorted(row, row)
+    return row[place < count], column[place < count]
 
 
 def _hops(
@@ -399,11 +403,11 @@ def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> Float
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
     # A length of zero would not be stored as an arc.
     away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
-    edges = surface.edge_graph.tocoo()
+    edges = surface.edge_graph
     values = np.concatenate([edges.data, away.ravel()])
-    rows = np.concatenate([edges.coords[0], np.repeat(size + np.arange(k), 3)])
-    columns = np.concatenate([edges.coords[1], corners.ravel()])
-    matrix = sparse.csr_array((values, (rows, columns)), shape=(size + k, size + k))
+    columns = np.concatenate([edges.indices, corners.ravel()])
+    rows = np.concatenate([edges.indptr, edges.indptr[-1] + 3 * np.arange(1, k + 1)])
+    matrix = sparse.csr_array((values, columns, rows), shape=(size + k, size + k))
     return csgraph.dijkstra(matrix, directed=False, indices=size + np.arange(k))
 
 

@@ -17,7 +17,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import Nodes, nodes_at
-from ..relaxation.node_traces import places_along, traced_segments, with_midpoints
+from ..relaxation.node_traces import NodeTraces, places_along, traced_segments, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, rounded
@@ -111,12 +111,23 @@ def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
     return joined([SurfacePoints(faces, barycentric), graph.points])
 
 
-def crossing_routes(graph: CourseGraph, routes: list[Routes], nodes: Nodes) -> BoolArray:
+def crossing_routes(
+    graph: CourseGraph, routes: list[Routes], nodes: Nodes, traces: NodeTraces
+) -> BoolArray:
     """Which pairs of routes of different legs cross, and which routes cross themselves, (r, r).
 
     Routes that leave the same control point may touch there.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+    routes : list of Routes
+    nodes : Nodes
+        On all routes.
+    traces : NodeTraces
+        Between these.
     """
-    segments = traced_segments(graph.graph.surface, nodes)
+    segments = traced_segments(graph.graph.surface.mesh, traces)
     count = len(nodes.positions) // nodes.curves
     legs = np.concatenate([np.full((len(leg.cells), 2), [leg.start, leg.end]) for leg in routes])
     leg = np.repeat(np.arange(len(routes)), [len(leg.cells) for leg in routes])
@@ -197,7 +208,12 @@ def different(routes: list[Routes], combinations: Combinations, most: int) -> In
 
 
 def course_nodes(
-    graph: CourseGraph, routes: list[Routes], nodes: Nodes, choice: IntArray, closed: bool
+    graph: CourseGraph,
+    routes: list[Routes],
+    nodes: Nodes,
+    traces: NodeTraces,
+    choice: IntArray,
+    closed: bool,
 ) -> tuple[Nodes, BoolArray]:
     """Nodes on courses, and which of them are control points.
 
@@ -207,6 +223,8 @@ def course_nodes(
     routes : list of Routes
     nodes : Nodes
         On all routes.
+    traces : NodeTraces
+        Between these.
     choice : (c, l) int array
     closed : bool
     """
@@ -222,7 +240,11 @@ def course_nodes(
     at = place * (size - 1) / counts[leg]
     node = np.floor(at).astype(np.int64)
     places = places_along(
-        surface, nodes, (curve[:, leg] * size + node).ravel(), np.tile(at - node, len(choice))
+        surface,
+        nodes,
+        traces,
+        (curve[:, leg] * size + node).ravel(),
+        np.tile(at - node, len(choice)),
     )
     starts = np.tile(place == 0, len(choice))
     own = nodes.places[(curve * size).ravel()]

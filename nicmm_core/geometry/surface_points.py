@@ -424,5 +424,5 @@ def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> 
     (n, m) float array
         Zero at vertices that are not among the corners.
     """
-    same = corners[:, :, None] == others[:, None, :]
-    return (barycentric[:, :, None] * same).sum(axis=1)
+    same = corners.T[:, None] == others.T
+    return dot(barycentric.T[:, None], same).T

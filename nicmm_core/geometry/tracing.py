@@ -25,9 +25,9 @@ from .vectors import cross, dot, lengths
 MOST_FACES = 4096
 """Most faces of a trace; a longer one runs round the surface and is not a short connection."""
 
-FIRST_FACES, MORE_FACES = 4, 16
-"""Faces that traces pass before it is asked for the first time which have ended, and the most
-between two such questions; in between the number doubles."""
+SIDES_AT_ONCE, FEWEST_AT_ONCE, MOST_AT_ONCE = 800, 3, 16
+"""Sides that all traces together cross before it is asked which of them have ended, and the least
+and the greatest number for each."""
 
 FOLDS = 4.0
 """Extra length allowed to a trace over folded faces, in mean edge lengths."""
@@ -97,7 +97,7 @@ def trace_between(
     parts, passed = [], 0
     while passed < MOST_FACES and len(fronts.index):
         checkpoint()
-        strip, onward = _advanced(mesh, fronts, passed)
+        strip, onward = _advanced(mesh, fronts)
         step, index = strip.lengths, fronts.index
         signed = step if folded is None else np.where(folded[strip.sides // 3], -step, step)
         travelled, covered = travelled + step.cumsum(0), covered + signed.cumsum(0)
@@ -126,9 +126,9 @@ def trace_between(
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
     """Crossings with only the last of consecutive ones of a trace at the same vertex."""
-    inside = crossings.barycentric > 0.0
-    place = np.flatnonzero(inside.sum(axis=1) == 1)
-    vertex = mesh.faces[crossings.faces[place], inside[place].argmax(axis=1)]
+    inside = crossings.barycentric.T > 0.0
+    place = np.flatnonzero(inside.sum(axis=0) == 1)
+    vertex = mesh.faces[crossings.faces[place], inside[:, place].argmax(axis=0)]
     again = (place[1:] - place[:-1] == 1) & (vertex[1:] == vertex[:-1])
     again &= pair[place[1:]] == pair[place[:-1]]
     last = np.ones(len(pair), dtype=bool)
@@ -192,7 +192,7 @@ def trace_from(
     ends = []
     while passed < MOST_FACES and len(fronts.index):
         checkpoint()
-        strip, onward = _advanced(mesh, fronts, passed)
+        strip, onward = _advanced(mesh, fronts)
         step = signed = strip.lengths
         back = np.zeros(1, dtype=bool)
         if folded is not None:
@@ -315,12 +315,13 @@ def _fronts(
     return fronts.taken(np.flatnonzero(crossed[ahead]))
 
 
-def _advanced(mesh: Mesh, fronts: _Fronts, passed: int) -> tuple[_Strip, _Fronts]:
+def _advanced(mesh: Mesh, fronts: _Fronts) -> tuple[_Strip, _Fronts]:
     """Traces followed over the next faces, and their fronts there.
 
     Beyond a blocked side a trace goes on in the face before, which means nothing.
     """
-    count = min(max(passed, FIRST_FACES), MORE_FACES)
+    at_once = SIDES_AT_ONCE // max(1, len(fronts.index))
+    count = min(max(at_once, FEWEST_AT_ONCE), MOST_AT_ONCE)
     vertex = mesh.faces.ravel()
     size = count, len(fronts.index)
     sides, entered, shares = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
@@ -388,7 +389,7 @@ def _on_sides(mesh: Mesh, faces: IntArray, sides: IntArray, shares: FloatArray) 
 def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
     """Whether each point lies in the faces of its column, (s, m); a vertex lies in all round it."""
     holds = faces == points.faces
-    on_side = np.flatnonzero((points.barycentric == 0.0).any(axis=1))
+    on_side = np.flatnonzero((points.barycentric.T == 0.0).any(axis=0))
     if len(on_side):
         support = mesh.faces[points.faces[on_side]]
         corners = mesh.faces[faces[:, on_side]]

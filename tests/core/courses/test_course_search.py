@@ -13,6 +13,7 @@ from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from nicmm_core.relaxation.elastic_energy import bending_energy, comparable_energies
+from nicmm_core.relaxation.node_traces import traces_between_nodes
 from tests.core.checks import assert_valid_design, points_near, random_surface_points
 from tests.core.courses.test_hop_graph import LEGS, graph_through
 
@@ -26,7 +27,8 @@ def test_combinations_that_cross_cost_more(body):
     graph = graph_through(body, body.vertices[[5, 100, 700]])
     routes = routes_of_legs(graph, LEGS, closed=True)
     nodes = laid_routes(graph, routes, 1.0)
-    crosses = crossing_routes(graph, routes, nodes)
+    traces = traces_between_nodes(graph.graph.surface, nodes)
+    crosses = crossing_routes(graph, routes, nodes, traces)
     assert crosses.any() and not crosses.all()
     offset = np.cumsum([0, *(len(leg.cells) for leg in routes)])[:-1]
 
