@@ -319,14 +319,14 @@ def _linearised(
     before, out_before, out_after, product, sine, cosine, angle = nodes.turns
     after = nodes.steps.T
     length_before, length_after = nodes.before_each(nodes.step_lengths), nodes.step_lengths
-    # Squares of the steps in the tangent plane.
-    flat_before = np.maximum(length_before**2 - out_before**2, tolerances.TINY)
-    flat_after = np.maximum(length_after**2 - out_after**2, tolerances.TINY)
-    by_before = cross(before, normal) / flat_before
-    by_after = cross(normal, after) / flat_after
+    flat_before, flat_after = before - out_before * normal, after - out_after * normal
+    squared_before = np.maximum(dot(flat_before, flat_before), tolerances.TINY)
+    squared_after = np.maximum(dot(flat_after, flat_after), tolerances.TINY)
+    by_before = cross(flat_before, normal) / squared_before
+    by_after = cross(normal, flat_after) / squared_after
     by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
     # Divided one after the other: the product of two tiny squares may underflow.
-    by_normal = (by_normal + cosine * dot(product, turn)) / flat_before / flat_after
+    by_normal = (by_normal + cosine * dot(product, turn)) / squared_before / squared_after
     angle_by = np.array(
         [
             -dot(by_before, here_before),
