@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from .array_types import BoolArray, FloatArray, IntArray
-from .grouping import grouped
 from .surface_points import SurfacePoints, weights_at
 
 TOUCHING = 1e-12
@@ -58,7 +57,11 @@ def overlapping_segments(
     start, end : (s, 2) float array
         Barycentric coordinates in this face.
     """
-    order, _, count = grouped(group)
+    # Not `grouped`, which may cancel: a curve is tested after its relaxation was cancelled.
+    order = np.argsort(group, kind="stable")
+    in_order = group[order]
+    begins = np.flatnonzero(np.append(True, in_order[1:] != in_order[:-1])[: len(group)])
+    count = np.append(begins[1:], len(group))[: len(begins)] - begins
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
     # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if
