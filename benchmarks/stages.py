@@ -1,4 +1,4 @@
-"""Where the time of a design goes, by stage, and how it grows with the mesh."""
+"""Where the time and the calls of a design go, by stage, and how they grow with the mesh."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import multiprocessing
 import resource
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from types import ModuleType
 from typing import Any
@@ -15,7 +15,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import design, shapes, surface_designer
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
@@ -34,25 +34,36 @@ SETS = 5
 DRAGS = 5
 POINTS = 4
 
-STAGES: dict[str, list[tuple[ModuleType, str]]] = {
-    "normals": [(surface_designer, "curve_surface")],
+STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
+    "checks, manifold": [
+        (design, "checked_options"),
+        (design, "locate_control_points"),
+        (design.Designer, "_on_manifold"),
+    ],
+    "normals": [(surface_designer, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "copy in its frame": [(course_surface, "renumbered")],
     "hop graph": [(course_surface, "build_hop_graph")],
-    "order of the points": [(course_surface, "visiting_order")],
+    "distances, order of the points": [
+        (course_surface, "distances_along_edges"),
+        (course_surface, "shortest_order"),
+    ],
     "least costs, routes": [
         (course_search, "with_control_points"),
         (course_search, "routes_of_legs"),
     ],
     "combinations": [
         (course_search, "laid_routes"),
+        (course_search, "traces_between_nodes"),
         (course_search, "crossing_routes"),
         (course_search, "combined"),
+        (course_search, "different"),
         (course_search, "course_nodes"),
     ],
     "crossings removed": [(course_search, "uncrossed")],
     "courses relaxed together": [(course_search, "relax_together")],
-    "courses compared": [(course_search, "_best")],
+    "courses compared, denser": [(course_search, "_best"), (course_search, "_denser")],
+    "course traced": [(surface_designer, "traced_through"), (surface_designer, "is_simple")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
     "network": [(single_pass, "infer_level_set")],
@@ -74,35 +85,67 @@ REST = "rest"
 TOTAL = "together"
 
 Times = dict[str, float]
-"""Milliseconds by stage."""
+"""Milliseconds, or calls, by stage."""
 
 
 def run(scale: Scale) -> None:
     """Measure generated bodies of three sizes."""
     sizes = ((200, 1),) if scale is Scale.SMOKE else SIZES[: scale.choose(3, 2)]
     columns: list[tuple[str, Times]] = []
+    calls: list[tuple[str, Times]] = []
     memory = []
     for faces, subdivisions in sizes:
         mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
         label = f"{len(mesh.faces):,}"
         print(f"  {label} faces", flush=True)
         columns += [(f"{label}, {kind}", times) for kind, times in _measured(mesh).items()]
+        calls += [(f"{label}, {kind}", counts) for kind, counts in _counted(mesh).items()]
         memory.append((label, _bytes_a_vertex(faces, subdivisions)))
-    rows = [
-        (stage, *(f"{times[stage]:.1f}" if times[stage] else "–" for _, times in columns))
-        for stage in (*STAGES, REST, TOTAL)
-    ]
     bytes_each = ", ".join(f"{count:,.0f} with {label} faces" for label, count in memory)
     body = (
         f"Seed {SEED}, {SETS} sets of {POINTS} random vertices on a generated body of each size, "
         "shortest order; medians in milliseconds. *First*: the first curve on a mesh, whose arrays "
         "have been checked and no more. *Another*: through other points on the same Designer. "
         f"*Dragged*: after a point has moved to a neighbouring vertex, {DRAGS} times a set.\n\n"
-        + report.table(("stage", *(label for label, _ in columns)), rows)
+        + _table(columns, 1)
+        + "\n\nCalls of functions in Python and C (`sys.setprofile`), of one set.\n\n"
+        + _table(calls, 0)
         + "\n\nGreatest memory that a first curve takes beyond what the process had with the "
         f"mesh's arrays, in bytes a vertex: {bytes_each}."
     )
     report.write_section("stages", "Where the time goes", body, scale)
+
+
+def _table(columns: list[tuple[str, Times]], digits: int) -> str:
+    rows = [
+        (
+            stage,
+            *(f"{values[stage]:,.{digits}f}" if values[stage] else "–" for _, values in columns),
+        )
+        for stage in (*STAGES, REST, TOTAL)
+    ]
+    return report.table(("stage", *(label for label, _ in columns)), rows)
+
+
+def _counted(mesh: Mesh) -> dict[str, Times]:
+    """Calls of a first curve and of another one on the same Designer."""
+    generator = np.random.default_rng(SEED)
+    designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))
+    calls = 0
+
+    def count(frame: object, event: str, argument: object) -> None:
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    counts = {}
+    for kind in ("first", "another"):
+        points = generator.choice(len(mesh.vertices), POINTS, replace=False)
+        sys.setprofile(count)
+        try:
+            counts[kind], _ = _measured_by(lambda: calls, designer, points)
+        finally:
+            sys.setprofile(None)
+    return counts
 
 
 def _measured(mesh: Mesh) -> dict[str, Times]:
@@ -113,11 +156,11 @@ def _measured(mesh: Mesh) -> dict[str, Times]:
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
         runs["first"].append(_timed(designer, points)[0])
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
-        times, design = _timed(designer, points)
+        times, before = _timed(designer, points)
         runs["another"].append(times)
         for _ in range(DRAGS):
             points = _dragged(designer.mesh, points)
-            times, design = _timed(designer, points, design)
+            times, before = _timed(designer, points, before)
             runs["dragged"].append(times)
     return {
         kind: {stage: float(np.median([one[stage] for one in times])) for stage in times[0]}
@@ -135,27 +178,38 @@ def _dragged(mesh: Mesh, points: IntArray) -> IntArray:
 def _timed(
     designer: nicmm.Designer, points: IntArray, start: nicmm.Design | None = None
 ) -> tuple[Times, nicmm.Design]:
-    with _stopwatches() as seconds:
-        started = time.perf_counter()
-        design = designer.design(points, order="shortest", start=start)
-        total = time.perf_counter() - started
-    seconds[REST] = total - sum(seconds.values())
-    seconds[TOTAL] = total
-    return {stage: 1000.0 * value for stage, value in seconds.items()}, design
+    times, found = _measured_by(time.perf_counter, designer, points, start)
+    return {stage: 1000.0 * value for stage, value in times.items()}, found
+
+
+def _measured_by(
+    clock: Callable[[], float],
+    designer: nicmm.Designer,
+    points: IntArray,
+    start: nicmm.Design | None = None,
+) -> tuple[Times, nicmm.Design]:
+    """By how much a clock moves on in every stage of a design."""
+    with _stopwatches(clock) as spent:
+        started = clock()
+        found = designer.design(points, order="shortest", start=start)
+        total = clock() - started
+    spent[REST] = total - sum(spent.values())
+    spent[TOTAL] = total
+    return spent, found
 
 
 @contextmanager
-def _stopwatches() -> Iterator[Times]:
-    """Add up the seconds spent in every stage."""
-    seconds = dict.fromkeys(STAGES, 0.0)
+def _stopwatches(clock: Callable[[], float]) -> Iterator[Times]:
+    """Add up by how much a clock moves on in every stage."""
+    spent = dict.fromkeys(STAGES, 0.0)
 
     def timed(stage: str, function: Any) -> Any:
         def wrapped(*arguments: Any, **named: Any) -> Any:
-            started = time.perf_counter()
+            started = clock()
             try:
                 return function(*arguments, **named)
             finally:
-                seconds[stage] += time.perf_counter() - started
+                spent[stage] += clock() - started
 
         return wrapped
 
@@ -164,7 +218,7 @@ def _stopwatches() -> Iterator[Times]:
             for module, name in functions:
                 wrapped = timed(stage, getattr(module, name))
                 patches.enter_context(mock.patch.object(module, name, wrapped))
-        yield seconds
+        yield spent
 
 
 def _bytes_a_vertex(faces: int, subdivisions: int) -> float:
