@@ -77,13 +77,6 @@ def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
     return TracedSegments(traces.node[begins], face, points.barycentric[begins, :2], end)
 
 
-def simple_curves(surface: CurveSurface, nodes: Nodes) -> BoolArray:
-    """Which curves do not cross themselves, (c,), where traces succeed."""
-    simple = np.ones(nodes.curves, dtype=bool)
-    simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
-    return simple
-
-
 def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next ones cross."""
     segments = traced_segments(surface.mesh, traces_between_nodes(surface, nodes))

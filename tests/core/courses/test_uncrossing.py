@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from nicmm_core import shapes
 from nicmm_core.courses.uncrossing import reordered, uncrossed
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
-from nicmm_core.relaxation.node_traces import crossing_steps, simple_curves
-from tests.core.checks import points_near
+from nicmm_core.relaxation.node_traces import crossing_steps
+from tests.core.checks import points_near, simple_curves
 
 
 @pytest.fixture(scope="module")
