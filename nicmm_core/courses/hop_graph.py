@@ -127,10 +127,9 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
         vertex = spread_vertices(
             mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
         )
-    graph = HopGraph(surface, vertex, spacing, _no_hops(), np.zeros(0, dtype=np.int64))
     checkpoint()
     along = csgraph.dijkstra(
-        graph.surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
+        surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
     )[:, vertex]
     np.fill_diagonal(along, np.inf)
     start, end = _nearest(along, HOPS)
@@ -355,11 +354,6 @@ def joined_hops(parts: list[Hops]) -> Hops:
             for name in ("start", "end", "length", "leaving", "arriving")
         )
     )
-
-
-def _no_hops() -> Hops:
-    none, vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-    return Hops(none, none, np.zeros(0), vectors, vectors)
 
 
 def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:

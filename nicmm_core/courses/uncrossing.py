@@ -70,6 +70,8 @@ def uncrossed(
             break
         which = np.array(changed)
         now = _in_order(surface, nodes, order[which])
+    if now is nodes:
+        return nodes, visit, ~crossing
     return _in_order(surface, nodes, order), visit[order.ravel()], ~crossing
 
 

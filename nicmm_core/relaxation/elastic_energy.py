@@ -438,8 +438,10 @@ def _product(system: ElasticSystem, move: FloatArray) -> FloatArray:
     """The matrix times moves, shape (n,)."""
     result = system.bands[0] * move
     for offset in (1, 2):
-        result += system.bands[offset] * np.roll(move, -offset)
-        result += np.roll(system.bands[offset] * move, offset)
+        band = system.bands[offset]
+        onward = band * move
+        result += band * np.concatenate([move[offset:], move[:offset]])
+        result += np.concatenate([onward[-offset:], onward[:-offset]])
     if not len(system.pairs):
         return result
     one, other = system.pairs.T
