@@ -75,6 +75,8 @@ def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
 class NearStrands:
     """Pairs of nodes of one curve that may be in contact, sought again only after long moves.
 
+    Where they are sought it is also decided which nodes are far enough apart along the curve.
+
     Parameters
     ----------
     nodes : Nodes
