@@ -87,10 +87,10 @@ def trace_between(
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
     reached = _holds(mesh, end, start.faces[None])[0]
     index = np.flatnonzero(~reached)
-    origin, forward = origin[:, index], (goal - origin)[:, index]
-    ahead = forward if ahead is None else ahead.T[:, index]
-    across = cross(normals.T[:, index], forward)
-    first = start.faces[index]
+    origin, forward = origin.take(index, axis=1), (goal - origin).take(index, axis=1)
+    ahead = forward if ahead is None else ahead.T.take(index, axis=1)
+    across = cross(normals.T.take(index, axis=1), forward)
+    first = start.faces.take(index)
     offset = corners_of(mesh, first) - origin
     fronts = _fronts(index, first, origin, across, offset, ahead)
     travelled = covered = np.zeros(len(fronts.index))
@@ -184,8 +184,8 @@ def trace_from(
     blocked = np.zeros(len(length), dtype=bool)
     blocked[index] = True
     fronts = _fronts(
-        index, faces[index], origin[:, index], across[:, index], offset[:, :, index],
-        direction.T[:, index],
+        index, faces.take(index), origin.take(index, axis=1), across.take(index, axis=1),
+        offset.take(index, axis=2), direction.T.take(index, axis=1),
     )  # fmt: skip
     blocked[fronts.index] = False
     left, passed, most_passed = length[fronts.index], 0, 0

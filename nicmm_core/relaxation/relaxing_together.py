@@ -134,8 +134,8 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     size = len(nodes.positions) // nodes.curves
     place = (which[:, None] * size + np.arange(size)).ravel()
     return Nodes(
-        nodes.places[place], nodes.closed, nodes.positions[place], nodes.normals[place],
-        nodes.phi_fea[place], len(which),
+        nodes.places[place], nodes.closed, nodes.positions.T.take(place, axis=1).T,
+        nodes.normals.T.take(place, axis=1).T, nodes.phi_fea.take(place), len(which),
     )  # fmt: skip
 
 
