@@ -201,9 +201,10 @@ def _random_weights(generator: np.random.Generator) -> Iterator[None]:
     """Hop graphs with random factors of the lengths."""
     build = course_search.with_control_points
 
-    def with_weights(graph, points, legs, factor, tension):  # type: ignore[no-untyped-def]
+    def with_weights(graph, points, along, legs, factor, tension):  # type: ignore[no-untyped-def]
         weights = np.exp(WEIGHTS * generator.standard_normal(len(graph.surface.mesh.vertices)))
-        return build(graph, points, legs, weights if factor is None else factor * weights, tension)
+        factor = weights if factor is None else factor * weights
+        return build(graph, points, along, legs, factor, tension)
 
     with mock.patch.object(course_search, "with_control_points", with_weights):
         yield

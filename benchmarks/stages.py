@@ -1,4 +1,4 @@
-"""Where the time of a design goes, by stage, and how it grows with the mesh."""
+"""Where the time and the calls of a design go, by stage, and how they grow with the mesh."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import multiprocessing
 import resource
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from types import ModuleType
 from typing import Any
@@ -15,7 +15,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import design, shapes, surface_designer
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
@@ -39,25 +39,36 @@ SETS = 5
 DRAGS = 5
 POINTS = 4
 
-STAGES: dict[str, list[tuple[ModuleType, str]]] = {
-    "normals": [(surface_designer, "curve_surface")],
+STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
+    "checks, manifold": [
+        (design, "checked_options"),
+        (design, "locate_control_points"),
+        (design.Designer, "_on_manifold"),
+    ],
+    "normals": [(surface_designer, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "copy in its frame": [(course_surface, "renumbered")],
     "hop graph": [(course_surface, "build_hop_graph")],
-    "order of the points": [(course_surface, "visiting_order")],
+    "distances, order of the points": [
+        (course_surface, "distances_along_edges"),
+        (course_surface, "shortest_order"),
+    ],
     "least costs, routes": [
         (course_search, "with_control_points"),
         (course_search, "routes_of_legs"),
     ],
     "combinations": [
         (course_search, "laid_routes"),
+        (course_search, "traces_between_nodes"),
         (course_search, "crossing_routes"),
         (course_search, "combined"),
+        (course_search, "different"),
         (course_search, "course_nodes"),
     ],
     "crossings removed": [(course_search, "uncrossed")],
     "courses relaxed together": [(course_search, "relax_together")],
-    "courses compared": [(course_search, "_best")],
+    "courses compared, denser": [(course_search, "_best"), (course_search, "_denser")],
+    "course traced": [(surface_designer, "traced_through"), (surface_designer, "is_simple")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
     "network": [(single_pass, "infer_level_set")],
@@ -79,7 +90,7 @@ REST = "rest"
 TOTAL = "together"
 
 Times = dict[str, float]
-"""Milliseconds by stage."""
+"""Milliseconds, or calls, by stage."""
 
 
 def measure(scale: Scale) -> Results:
@@ -89,25 +100,27 @@ def measure(scale: Scale) -> Results:
     for faces, subdivisions in sizes:
         mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
         print(f"  {len(mesh.faces):,} faces", flush=True)
-        runs = _measured(mesh)
-        memory = round(_bytes_a_vertex(faces, subdivisions), 1)
-        bodies.append({"faces": len(mesh.faces), "milliseconds": runs, "bytes_a_vertex": memory})
+        bodies.append(
+            {
+                "faces": len(mesh.faces),
+                "milliseconds": _measured(mesh),
+                "calls": _counted(mesh),
+                "bytes_a_vertex": round(_bytes_a_vertex(faces, subdivisions), 1),
+            }
+        )
     return {"seed": SEED, "sets": SETS, "points": POINTS, "drags": DRAGS, "bodies": bodies}
 
 
 def section(results: Results) -> str:
-    """Medians of every stage, and the memory."""
+    """Medians and calls of every stage, and the memory."""
     bodies = results["bodies"]
-    columns = {
-        f"{body['faces']:,}, {kind}": {stage: np.median(each) for stage, each in stages.items()}
-        for body in bodies
-        for kind, stages in body["milliseconds"].items()
-    }
-    stages = next(iter(columns.values()))
-    rows = [
-        (stage, *(f"{times[stage]:.1f}" if times[stage] else "–" for times in columns.values()))
-        for stage in stages
-    ]
+    medians, calls = {}, {}
+    for body in bodies:
+        for kind, stages in body["milliseconds"].items():
+            label = f"{body['faces']:,}, {kind}"
+            medians[label] = {stage: float(np.median(each)) for stage, each in stages.items()}
+        for kind, counts in body["calls"].items():
+            calls[f"{body['faces']:,}, {kind}"] = counts
     bytes_each = report.listed(
         f"{body['bytes_a_vertex']:,.0f} with {body['faces']:,} faces" for body in bodies
     )
@@ -117,10 +130,48 @@ def section(results: Results) -> str:
         "first curve on a mesh, whose arrays have been checked and no more. *Another*: through "
         "other points on the same Designer. *Dragged*: after a point has moved to a neighbouring "
         f"vertex, {results['drags']} times a set.\n\n"
-        + report.table(("stage", *columns), rows)
+        + _table(medians, 1)
+        + "\n\nCalls of functions in Python and C (`sys.setprofile`), of one set.\n\n"
+        + _table(calls, 0)
         + "\n\nGreatest memory that a first curve takes beyond what the process had with the "
         f"mesh's arrays, in bytes a vertex: {bytes_each}."
     )
+
+
+def _table(columns: dict[str, Times], digits: int) -> str:
+    stages = next(iter(columns.values()))
+    rows = [
+        (
+            stage,
+            *(
+                f"{values[stage]:,.{digits}f}" if values[stage] else "–"
+                for values in columns.values()
+            ),
+        )
+        for stage in stages
+    ]
+    return report.table(("stage", *columns), rows)
+
+
+def _counted(mesh: Mesh) -> dict[str, Times]:
+    """Calls of a first curve and of another one on the same Designer."""
+    generator = np.random.default_rng(SEED)
+    designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))
+    calls = 0
+
+    def count(frame: object, event: str, argument: object) -> None:
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    counts = {}
+    for kind in ("first", "another"):
+        points = generator.choice(len(mesh.vertices), POINTS, replace=False)
+        sys.setprofile(count)
+        try:
+            counts[kind], _ = _measured_by(lambda: calls, designer, points)
+        finally:
+            sys.setprofile(None)
+    return counts
 
 
 def _measured(mesh: Mesh) -> dict[str, dict[str, list[float]]]:
@@ -132,11 +183,11 @@ def _measured(mesh: Mesh) -> dict[str, dict[str, list[float]]]:
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
         runs["first"].append(_timed(designer, points)[0])
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
-        times, design = _timed(designer, points)
+        times, before = _timed(designer, points)
         runs["another"].append(times)
         for _ in range(DRAGS):
             points = _dragged(designer.mesh, points)
-            times, design = _timed(designer, points, design)
+            times, before = _timed(designer, points, before)
             runs["dragged"].append(times)
     return {
         kind: {stage: [round(one[stage], 3) for one in times] for stage in (*STAGES, REST, TOTAL)}
@@ -154,27 +205,38 @@ def _dragged(mesh: Mesh, points: IntArray) -> IntArray:
 def _timed(
     designer: nicmm.Designer, points: IntArray, start: nicmm.Design | None = None
 ) -> tuple[Times, nicmm.Design]:
-    with _stopwatches() as seconds:
-        started = time.perf_counter()
-        design = designer.design(points, order="shortest", start=start)
-        total = time.perf_counter() - started
-    seconds[REST] = total - sum(seconds.values())
-    seconds[TOTAL] = total
-    return {stage: 1000.0 * value for stage, value in seconds.items()}, design
+    times, found = _measured_by(time.perf_counter, designer, points, start)
+    return {stage: 1000.0 * value for stage, value in times.items()}, found
+
+
+def _measured_by(
+    clock: Callable[[], float],
+    designer: nicmm.Designer,
+    points: IntArray,
+    start: nicmm.Design | None = None,
+) -> tuple[Times, nicmm.Design]:
+    """By how much a clock moves on in every stage of a design."""
+    with _stopwatches(clock) as spent:
+        started = clock()
+        found = designer.design(points, order="shortest", start=start)
+        total = clock() - started
+    spent[REST] = total - sum(spent.values())
+    spent[TOTAL] = total
+    return spent, found
 
 
 @contextmanager
-def _stopwatches() -> Iterator[Times]:
-    """Add up the seconds spent in every stage."""
-    seconds = dict.fromkeys(STAGES, 0.0)
+def _stopwatches(clock: Callable[[], float]) -> Iterator[Times]:
+    """Add up by how much a clock moves on in every stage."""
+    spent = dict.fromkeys(STAGES, 0.0)
 
     def timed(stage: str, function: Any) -> Any:
         def wrapped(*arguments: Any, **named: Any) -> Any:
-            started = time.perf_counter()
+            started = clock()
             try:
                 return function(*arguments, **named)
             finally:
-                seconds[stage] += time.perf_counter() - started
+                spent[stage] += clock() - started
 
         return wrapped
 
@@ -183,7 +245,7 @@ def _stopwatches() -> Iterator[Times]:
             for module, name in functions:
                 wrapped = timed(stage, getattr(module, name))
                 patches.enter_context(mock.patch.object(module, name, wrapped))
-        yield seconds
+        yield spent
 
 
 def _bytes_a_vertex(faces: int, subdivisions: int) -> float:

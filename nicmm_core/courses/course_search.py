@@ -17,7 +17,7 @@ from ..path.leg_search import length_factor
 from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
-from ..relaxation.node_traces import simple_curves, with_midpoints
+from ..relaxation.node_traces import traces_between_nodes, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .hop_graph import HopGraph, with_control_points
 from .leg_combinations import combined, course_nodes, crossing_routes, different, laid_routes
@@ -50,6 +50,7 @@ def find_courses(
     graph: HopGraph,
     surface: CurveSurface,
     points: SurfacePoints,
+    along: FloatArray,
     fixed: BoolArray,
     closed: bool,
     smoothness: float,
@@ -68,6 +69,8 @@ def find_courses(
         With the maps of the request.
     points : SurfacePoints
         k points in the order visited.
+    along : (k, V + k) float array
+        Distances from them along edges to the vertices and to them.
     fixed : (k,) bool array
         The control points among them; curves pass the others only at the start.
     closed : bool
@@ -88,35 +91,35 @@ def find_courses(
         chance = np.random.default_rng(draw).standard_normal(len(surface.mesh.vertices))
         factor = np.exp(DRAWN * chance) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
-    courses = with_control_points(graph, points, legs, factor, tension)
+    courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
     routes = routes_of_legs(courses, legs, closed)
     if not routes or not all(len(leg.cells) for leg in routes):
         return
     with subrange(0.2, 0.3):
         on_routes = laid_routes(courses, routes, smoothness)
-    crosses = crossing_routes(courses, routes, on_routes)
+    traces = traces_between_nodes(surface, on_routes)
+    crosses = crossing_routes(courses, routes, on_routes, traces)
     combinations = combined(courses, routes, crosses, closed)
     choice = different(routes, combinations, CANDIDATES)
     if not len(choice):
         return
-    nodes, at_points = course_nodes(courses, routes, on_routes, choice, closed)
+    nodes, at_points = course_nodes(courses, routes, on_routes, traces, choice, closed)
     # Control points are numbered without the others.
     number = np.where(fixed, np.cumsum(fixed) - 1, -1)
     visit = np.full(len(at_points), -1)
     visit[at_points] = np.tile(number, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
-    nodes, visit = uncrossed(surface, nodes, visit, any_order)
+    nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
     for stage, config in enumerate(STAGES):
         if stage:
-            best = np.concatenate(_best(surface, nodes, smoothness))[:FINALISTS]
+            best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
             nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
             nodes, visit = _denser(surface, nodes, visit)
         with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):
             nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
-        nodes, visit = uncrossed(surface, nodes, visit, any_order)
-    simple, _ = _best(surface, nodes, smoothness)
-    for one in simple.tolist():
+        nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
+    for one in _best(surface, nodes, simple, smoothness)[0].tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
         for _ in range(2):
             yield own, visited
@@ -137,21 +140,31 @@ def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatAr
     return comparable_energies(surface, nodes, smoothness, shortest)
 
 
-def _best(surface: CurveSurface, nodes: Nodes, smoothness: float) -> tuple[IntArray, IntArray]:
-    """Courses that differ by ascending energy: those that are simple, and the others."""
+def _best(
+    surface: CurveSurface, nodes: Nodes, simple: BoolArray, smoothness: float
+) -> tuple[IntArray, IntArray]:
+    """Courses that differ by ascending energy: those that are `simple`, (c,), and the others."""
     energy = _energies(surface, nodes, smoothness)
     positions = nodes.positions.reshape(nodes.curves, -1, 3)
-    trees = [cKDTree(points) for points in positions]
     limit = APART * surface.mesh.diagonal
+    # Curves near each other have about the same bounding boxes.
+    boxes = np.concatenate([positions.min(axis=1), positions.max(axis=1)], axis=1)
+    may_be_near = (np.abs(boxes[:, None] - boxes) <= limit).all(axis=2)
+    trees: dict[int, cKDTree] = {}
+
+    def near(one: int, other: int) -> bool:
+        for number in (one, other):
+            if number not in trees:
+                trees[number] = cKDTree(positions[number])
+        return _near(positions[one], trees[other], limit) and _near(
+            positions[other], trees[one], limit
+        )
+
     chosen: list[int] = []
     for number in np.argsort(energy, kind="stable").tolist():
-        if not any(
-            _near(positions[number], trees[other], limit)
-            and _near(positions[other], trees[number], limit)
-            for other in chosen
-        ):
+        if not any(near(number, other) for other in chosen if may_be_near[number, other]):
             chosen.append(number)
-    order, simple = np.array(chosen), simple_curves(surface, nodes)[chosen]
+    order, simple = np.array(chosen), simple[chosen]
     return order[simple], order[~simple]
 
 

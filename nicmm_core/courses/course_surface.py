@@ -19,12 +19,12 @@ from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.refinement import Refined, refined
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import component_unit
-from ..path.initial_loop import visiting_order
 from ..path.via_points import with_via_points
+from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from ..request import Request, renumbered_request
 from .course_search import find_courses
-from .hop_graph import CELLS, HopGraph, build_hop_graph
+from .hop_graph import CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
 """`edges_crossed` above which no courses are sought: on needles moves pass thousands of faces."""
@@ -116,14 +116,22 @@ class CourseSurface:
         """
         there = renumbered_request(self.copy, request)
         mesh = self.copy.mesh
-        visited = visiting_order(mesh, there.points, there.order, there.closed)
-        points, fixed = there.points[visited], np.ones(len(visited), dtype=bool)
+        on_refined = self._refined.in_parts(there.points)
+        along = distances_along_edges(self._surface, on_refined)
+        size = len(self._refined.mesh.vertices)
+        visited = np.arange(len(on_refined))
+        if there.order == "shortest":
+            visited = shortest_order(along[:, size:], there.closed)
         if there.via_points:
             waypoints = with_via_points(
                 mesh, there.points, there.via_points, there.order, there.closed
             )
-            points, fixed = waypoints.points, waypoints.is_control
-        on_refined = self._refined.in_parts(points)
+            fixed = waypoints.is_control
+            on_refined = self._refined.in_parts(waypoints.points)
+            along = distances_along_edges(self._surface, on_refined)
+        else:
+            fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
+            along = along[visited][:, np.append(np.arange(size), size + visited)]
         component = int(self._refined.mesh.face_component[on_refined.faces[0]])
         if edges_crossed(self._refined.mesh, component) > MOST_CROSSED:
             return
@@ -132,6 +140,7 @@ class CourseSurface:
             self._graph(component),
             surface,
             on_refined,
+            along,
             fixed,
             there.closed,
             there.smoothness,

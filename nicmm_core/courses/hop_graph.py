@@ -8,7 +8,7 @@ other along the surface. A state is a directed hop; from hop (p, q) to hop (q, r
 with the turn θ between them in the tangent plane at q and h their mean length: the energy of
 `relaxation.elastic_energy` for a polyline. So a shortest path in the graph is a discrete elastica
 (after Ulén, Strandmark and Kahl, "Shortest paths with higher-order regularization", PAMI 2015).
-A course may turn by any angle, so paths round the tips of limbs are found too.
+A course may turn by 120° at a cell, so paths round the tips of limbs are found too.
 
 Control points are more cells, from which paths start with any direction. A path and its reverse
 have the same cost; so paths from both ends of a leg meet in every hop, and give the best course of
@@ -28,6 +28,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints
+from ..geometry.vectors import dot
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 
@@ -48,6 +49,9 @@ SAME_SHEET = 1.6
 
 Beyond that the two cells lie on different sheets of the surface.
 """
+
+SHARPEST = 2.0 * np.pi / 3.0
+"""Greatest turn at a cell. A third of all continuations turn more; two turns cost less there."""
 
 EDGE_DETOUR = 1.07
 """Mean length of the shortest path along edges, relative to the distance along the surface."""
@@ -101,7 +105,7 @@ class HopGraph:
         hops = self.hops
         first = np.searchsorted(hops.start, np.arange(len(self.vertex) + 1))
         before, after = continuations(hops.end, first)
-        kept = after != self.reverse[before]
+        kept = np.flatnonzero(turning(hops, before, hops, after) <= SHARPEST)
         before, after = before[kept], after[kept]
         indptr = np.searchsorted(before, np.arange(len(hops.start) + 1))
         return indptr, after, bending(hops, before, hops, after)
@@ -123,10 +127,9 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
         vertex = spread_vertices(
             mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
         )
-    graph = HopGraph(surface, vertex, spacing, _no_hops(), np.zeros(0, dtype=np.int64))
     checkpoint()
     along = csgraph.dijkstra(
-        graph.surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
+        surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
     )[:, vertex]
     np.fill_diagonal(along, np.inf)
     start, end = _nearest(along, HOPS)
@@ -205,6 +208,7 @@ class CourseGraph:
 def with_control_points(
     graph: HopGraph,
     points: SurfacePoints,
+    along: FloatArray,
     legs: IntArray,
     factor: FloatArray | None,
     tension: float,
@@ -216,6 +220,8 @@ def with_control_points(
     graph : HopGraph
     points : SurfacePoints
         k points of its component.
+    along : (k, V + k) float array
+        `distances_along_edges` from them.
     legs : (l, 2) int array
         Consecutive points.
     factor : (V,) float array or None
@@ -224,7 +230,6 @@ def with_control_points(
         τ L² for the length L of the shortest path through the points.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
-    along = _along_edges(graph, points)
     length = along[:, len(surface.mesh.vertices) :][legs[:, 0], legs[:, 1]].sum()
     cells = np.concatenate([graph.vertex, len(surface.mesh.vertices) + np.arange(k)])
     to_cells = along[:, cells]
@@ -321,11 +326,16 @@ def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
     return hop, first[ends[hop]] + place
 
 
+def turning(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
+    """θ from hops to their continuations."""
+    arriving, leaving = one.arriving.take(before, axis=0), other.leaving.take(after, axis=0)
+    return np.arccos(dot(arriving.T, leaving.T).clip(-1.0, 1.0))
+
+
 def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
     """θ² / h from hops to their continuations."""
-    cosine = np.einsum("ad,ad->a", one.arriving[before], other.leaving[after])
     step = 0.5 * (one.length[before] + other.length[after])
-    return np.arccos(cosine.clip(-1.0, 1.0)) ** 2 / np.maximum(step, tolerances.TINY)
+    return turning(one, before, other, after) ** 2 / np.maximum(step, tolerances.TINY)
 
 
 def taken(hops: Hops, which: IntArray | BoolArray) -> Hops:
@@ -346,17 +356,16 @@ def joined_hops(parts: list[Hops]) -> Hops:
     )
 
 
-def _no_hops() -> Hops:
-    none, vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-    return Hops(none, none, np.zeros(0), vectors, vectors)
-
-
 def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:
     """Row and column of the least finite distances of each row, rows ascending."""
-    nearest = np.argsort(distance, axis=1, kind="stable")[:, :count]
-    row, column = np.repeat(np.arange(len(distance)), nearest.shape[1]), nearest.ravel()
-    finite = np.isfinite(distance[row, column])
-    return row[finite], column[finite]
+    if distance.shape[1] > count:
+        farthest = np.partition(distance, count - 1, axis=1)[:, count - 1, None]
+        distance = np.where(distance <= farthest, distance, np.inf)
+    row, column = np.nonzero(np.isfinite(distance))
+    order = np.lexsort((distance[row, column], row))  # stable
+    row, column = row[order], column[order]
+    place = np.arange(len(row)) - np.searchsorted(row, row)
+    return row[place < count], column[place < count]
 
 
 def _hops(
@@ -380,19 +389,19 @@ def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
     return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
 
 
-def _along_edges(graph: HopGraph, points: SurfacePoints) -> FloatArray:
-    """Distances along edges from points to the vertices and the points, (k, V + k)."""
-    mesh, k = graph.surface.mesh, len(points)
+def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> FloatArray:
+    """Distances along edges from k points to the vertices and the points, (k, V + k)."""
+    mesh, k = surface.mesh, len(points)
     corners = mesh.faces[points.faces]
     size = len(mesh.vertices)
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
     # A length of zero would not be stored as an arc.
     away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
-    edges = graph.surface.edge_graph.tocoo()
+    edges = surface.edge_graph
     values = np.concatenate([edges.data, away.ravel()])
-    rows = np.concatenate([edges.coords[0], np.repeat(size + np.arange(k), 3)])
-    columns = np.concatenate([edges.coords[1], corners.ravel()])
-    matrix = sparse.csr_array((values, (rows, columns)), shape=(size + k, size + k))
+    columns = np.concatenate([edges.indices, corners.ravel()])
+    rows = np.concatenate([edges.indptr, edges.indptr[-1] + 3 * np.arange(1, k + 1)])
+    matrix = sparse.csr_array((values, columns, rows), shape=(size + k, size + k))
     return csgraph.dijkstra(matrix, directed=False, indices=size + np.arange(k))
 
 

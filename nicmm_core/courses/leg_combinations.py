@@ -17,7 +17,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import Nodes, nodes_at
-from ..relaxation.node_traces import places_along, traced_segments, with_midpoints
+from ..relaxation.node_traces import NodeTraces, places_along, traced_segments, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, rounded
@@ -67,22 +67,22 @@ def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> 
     surface = graph.graph.surface
     count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // len(routes)))
     paths = [path for leg in routes for path in leg.cells]
-    from_cell, to_cell, share = [], [], []
-    for path in paths:
-        steps = np.linalg.norm(np.diff(graph.positions[path], axis=0), axis=1)
-        arc = np.append(0.0, np.cumsum(steps))
-        at = np.linspace(0.0, arc[-1], count)
-        hop = np.searchsorted(arc, at, side="right").clip(1, len(steps)) - 1
-        along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0)
-        nearer = along <= 0.5
-        from_cell.append(np.where(nearer, path[hop], path[hop + 1]))
-        to_cell.append(np.where(nearer, path[hop + 1], path[hop]))
-        share.append(np.where(nearer, along, 1.0 - along))
-    start, end = np.concatenate(from_cell), np.concatenate(to_cell)
+    cells = np.concatenate(paths)
+    begins = np.cumsum([0, *(len(path) for path in paths)])
+    steps = np.linalg.norm(np.diff(graph.positions[cells], axis=0), axis=1)
+    steps[begins[1:-1] - 1] = 0.0  # from one path to the next
+    arc = np.append(0.0, np.cumsum(steps))
+    at = np.linspace(arc[begins[:-1]], arc[begins[1:] - 1], count, axis=1)
+    hop = np.searchsorted(arc, at, side="right") - 1
+    hop = hop.clip(begins[:-1, None], begins[1:, None] - 2)
+    along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0).ravel()
+    one, other = cells[hop.ravel()], cells[hop.ravel() + 1]
+    nearer = along <= 0.5 + tolerances.ROUNDED  # halfway is nearer to the first
+    start, end = np.where(nearer, one, other), np.where(nearer, other, one)
     places = _places_of_cells(graph)[start]
     offset = graph.positions[end] - graph.positions[start]
     direction = tangents(offset, graph.normals[start])
-    length = np.concatenate(share) * np.linalg.norm(offset, axis=1)
+    length = np.where(nearer, along, 1.0 - along) * np.linalg.norm(offset, axis=1)
     ends = _is_end(count, paths)
     length[ends | (length <= tolerances.AT_ONE_PLACE * surface.mesh.diagonal)] = 0.0
     inside = SurfacePoints(places.faces, strictly_inside(places.barycentric))
@@ -111,12 +111,23 @@ def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
     return joined([SurfacePoints(faces, barycentric), graph.points])
 
 
-def crossing_routes(graph: CourseGraph, routes: list[Routes], nodes: Nodes) -> BoolArray:
+def crossing_routes(
+    graph: CourseGraph, routes: list[Routes], nodes: Nodes, traces: NodeTraces
+) -> BoolArray:
     """Which pairs of routes of different legs cross, and which routes cross themselves, (r, r).
 
     Routes that leave the same control point may touch there.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+    routes : list of Routes
+    nodes : Nodes
+        On all routes.
+    traces : NodeTraces
+        Between these.
     """
-    segments = traced_segments(graph.graph.surface, nodes)
+    segments = traced_segments(graph.graph.surface.mesh, traces)
     count = len(nodes.positions) // nodes.curves
     legs = np.concatenate([np.full((len(leg.cells), 2), [leg.start, leg.end]) for leg in routes])
     leg = np.repeat(np.arange(len(routes)), [len(leg.cells) for leg in routes])
@@ -146,8 +157,6 @@ def combined(
     """The cheapest combinations of routes, by beam search leg by leg."""
     count = len(routes)
     offset = np.cumsum([0] + [len(leg.cells) for leg in routes])
-    first = [np.array([_state(graph, path[0], path[1]) for path in leg.cells]) for leg in routes]
-    last = [np.array([_state(graph, path[-2], path[-1]) for path in leg.cells]) for leg in routes]
     price = CROSSING * sum(leg.cost.min() for leg in routes)
     of_itself = np.where(np.diagonal(crosses), price, 0.0)
     choice = np.arange(offset[1])[:, None]
@@ -156,17 +165,31 @@ def combined(
         checkpoint()
         here = slice(offset[number], offset[number + 1])
         total = cost[:, None] + routes[number].cost + of_itself[here]
-        total = total + junction_cost(graph, last[number - 1], first[number])[choice[:, -1]]
+        total = (
+            total
+            + junction_cost(graph, routes[number - 1].last, routes[number].first)[choice[:, -1]]
+        )
         if closed and number == count - 1:
-            total = total + junction_cost(graph, last[number], first[0])[:, choice[:, 0]].T
+            total = (
+                total
+                + junction_cost(graph, routes[number].last, routes[0].first)[:, choice[:, 0]].T
+            )
         for earlier in range(number):
-            total += price * crosses[offset[earlier] + choice[:, earlier]][:, here]
-        best = np.argsort(rounded(total), axis=None, kind="stable")[:BEAM]
+            total += price * crosses[:, here].take(offset[earlier] + choice[:, earlier], axis=0)
+        best = _least(rounded(total).ravel(), BEAM)
         best = best[np.isfinite(total.ravel()[best])]
         row, route = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], route[:, None]], axis=1)
         cost = total.ravel()[best]
     return Combinations(choice, cost)
+
+
+def _least(values: FloatArray, most: int) -> IntArray:
+    """Indices of the least values, ascending."""
+    among = np.arange(len(values))
+    if len(values) > most:
+        among = np.flatnonzero(values <= np.partition(values, most - 1)[most - 1])
+    return among[np.argsort(values[among], kind="stable")[:most]]
 
 
 def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
@@ -185,7 +208,12 @@ def different(routes: list[Routes], combinations: Combinations, most: int) -> In
 
 
 def course_nodes(
-    graph: CourseGraph, routes: list[Routes], nodes: Nodes, choice: IntArray, closed: bool
+    graph: CourseGraph,
+    routes: list[Routes],
+    nodes: Nodes,
+    traces: NodeTraces,
+    choice: IntArray,
+    closed: bool,
 ) -> tuple[Nodes, BoolArray]:
     """Nodes on courses, and which of them are control points.
 
@@ -195,6 +223,8 @@ def course_nodes(
     routes : list of Routes
     nodes : Nodes
         On all routes.
+    traces : NodeTraces
+        Between these.
     choice : (c, l) int array
     closed : bool
     """
@@ -210,7 +240,11 @@ def course_nodes(
     at = place * (size - 1) / counts[leg]
     node = np.floor(at).astype(np.int64)
     places = places_along(
-        surface, nodes, (curve[:, leg] * size + node).ravel(), np.tile(at - node, len(choice))
+        surface,
+        nodes,
+        traces,
+        (curve[:, leg] * size + node).ravel(),
+        np.tile(at - node, len(choice)),
     )
     starts = np.tile(place == 0, len(choice))
     own = nodes.places[(curve * size).ravel()]
@@ -224,9 +258,3 @@ def course_nodes(
         starts = np.insert(starts, after, True)
     places = SurfacePoints(faces, barycentric)
     return nodes_at(surface, places, closed, len(choice)), starts
-
-
-def _state(graph: CourseGraph, start: int, end: int) -> int:
-    """The state from one cell to another."""
-    hops = graph.hops
-    return int(np.flatnonzero((hops.start == start) & (hops.end == end))[0])

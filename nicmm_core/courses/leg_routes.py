@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
@@ -52,6 +53,8 @@ class Routes:
         Control points.
     cells : list of (c,) int arrays
         Cells of each of r routes, with both control points.
+    first, last : (r,) int array
+        The states at both ends of each.
     cost : (r,) float array
     alike : (r, r) bool array
         Pairs of routes that run beside each other.
@@ -60,6 +63,8 @@ class Routes:
     start: int
     end: int
     cells: list[IntArray]
+    first: IntArray
+    last: IntArray
     cost: FloatArray
     alike: BoolArray
 
@@ -72,6 +77,14 @@ class _ByState:
     cost: FloatArray
     first: IntArray  # states at both ends
     last: IntArray
+
+
+@dataclass(frozen=True)
+class _Paths:
+    """Paths one after another, each as the states on it."""
+
+    states: IntArray
+    begins: IntArray  # (p + 1,)
 
 
 def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Routes]:
@@ -90,10 +103,13 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
     for start, end in legs.tolist():
         total = rounded(graph.by_state(start, end))
         first, last = graph.first[start], graph.reverse[graph.first[end][graph.reverse]]
-        directions = _least_of_each(first * len(total) + last, total)[:n_directions]
-        cells = _least_of_each(graph.hops.end, total)
-        cells = cells[total[cells] <= WORST * total[cells[0]]] if len(cells) else cells
-        cells = cells[:: -(-len(cells) // VIA_CELLS)] if len(cells) else cells
+        ascending = np.argsort(total, kind="stable")
+        ascending = ascending[: np.count_nonzero(np.isfinite(total))]
+        both_ends = first[ascending] * len(total) + last[ascending]
+        directions = _least_of_each(both_ends, ascending, total)[:n_directions]
+        cells = _least_of_each(graph.hops.end[ascending], ascending, total)
+        cells = cells[total[cells] <= WORST * total[cells[:1]]]
+        cells = cells[:: max(1, -(-len(cells) // VIA_CELLS))]
         by_direction.append(
             _ByState(directions, total[directions], first[directions], last[directions])
         )
@@ -109,13 +125,27 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
         states = np.concatenate([aligned.state[best], other.state])
         cost = np.concatenate([aligned.cost[best], other.cost])
         paths = _paths(graph, start, end, states)
-        alike = _alike(beside, paths)
-        chosen = _different(paths, alike, len(best), n_aligned, n_different)
+        passed = _passed_cells(graph, paths)
+        alike = _alike(beside, passed)
+        first, last = paths.states[paths.begins[:-1]], paths.states[paths.begins[1:] - 1]
+        # A path that passes each cell once has as many of them as states, and its start.
+        simple = passed.sum(axis=1) == 1 + np.diff(paths.begins)
+        # A hop between two control points is a departure and an arrival too.
+        ends = np.stack([graph.hops.end[first], graph.hops.start[last]], axis=1)
+        chosen = _different(simple, ends, alike, len(best), n_aligned, n_different)
+        passes = [
+            np.append(
+                graph.hops.start[first[path]],
+                graph.hops.end[paths.states[paths.begins[path] : paths.begins[path + 1]]],
+            )
+            for path in chosen
+        ]
         routes.append(
             Routes(
-                start, end, [paths[i] for i in chosen], cost[chosen], alike[np.ix_(chosen, chosen)]
+                start, end, passes, first[chosen], last[chosen], cost[chosen],
+                alike[np.ix_(chosen, chosen)],
             )
-        )
+        )  # fmt: skip
     return routes
 
 
@@ -133,12 +163,10 @@ def rounded(cost: FloatArray) -> FloatArray:
     return np.round(cost / unit) * unit if 0.0 < unit < np.inf else cost
 
 
-def _least_of_each(key: IntArray, value: FloatArray) -> IntArray:
-    """The index of the least finite value of each key, by ascending value."""
-    order = np.lexsort((value, key))
-    least = order[np.unique(key[order], return_index=True)[1]]
-    least = least[np.isfinite(value[least])]
-    return least[np.argsort(value[least], kind="stable")]
+def _least_of_each(key: IntArray, ascending: IntArray, cost: FloatArray) -> IntArray:
+    """The first state of each key by ascending cost; states and their keys ascend by cost."""
+    least = ascending[np.unique(key, return_index=True)[1]]
+    return least[np.argsort(cost[least], kind="stable")]
 
 
 def _least_totals(graph: CourseGraph, legs: list[_ByState], closed: bool) -> list[FloatArray]:
@@ -165,18 +193,24 @@ def _least_totals(graph: CourseGraph, legs: list[_ByState], closed: bool) -> lis
     return [(f + b.T).min(axis=0) for f, b in zip(forward, backward, strict=True)]
 
 
-def _paths(graph: CourseGraph, start: int, end: int, states: IntArray) -> list[IntArray]:
-    """The cells of the best leg through each state."""
+def _paths(graph: CourseGraph, start: int, end: int, states: IntArray) -> _Paths:
+    """The best leg through each state."""
     before = _states_before(graph, start, states)
-    after = graph.reverse[_states_before(graph, end, graph.reverse[states])]
-    there = _states_before(graph, end, graph.reverse[states]) >= 0
-    paths = []
-    for number in range(len(states)):
-        one = before[:, number]
-        other = after[:, number][there[:, number]][::-1]
-        hops = np.concatenate([one[one >= 0], other[1:]])
-        paths.append(np.append(graph.hops.start[hops[0]], graph.hops.end[hops]))
-    return paths
+    after = _states_before(graph, end, graph.reverse[states])[-2::-1]
+    # Paths from the end pass states in the other direction.
+    whole = np.concatenate([before, np.where(after < 0, -1, graph.reverse[after])]).T
+    passed = whole >= 0
+    return _Paths(whole[passed], np.append(0, np.cumsum(passed.sum(axis=1))))
+
+
+def _passed_cells(graph: CourseGraph, paths: _Paths) -> NDArray[np.float32]:
+    """1 at the cells that each path passes, (p, n + k)."""
+    count = np.diff(paths.begins)
+    passed = np.zeros((len(count), len(graph.positions)), dtype=np.float32)
+    path = np.arange(len(count)).repeat(count)
+    passed[path, graph.hops.end[paths.states]] = 1.0
+    passed[np.arange(len(count)), graph.hops.start[paths.states[paths.begins[:-1]]]] = 1.0
+    return passed
 
 
 def _states_before(graph: CourseGraph, control: int, states: IntArray) -> IntArray:
@@ -201,39 +235,39 @@ def _cells_beside(graph: CourseGraph) -> sparse.csr_array:
     return sparse.csr_array((np.ones(len(rows), np.float32), (rows, columns)), shape=(size, size))
 
 
-def _alike(beside: sparse.csr_array, paths: list[IntArray]) -> BoolArray:
-    """Pairs of paths of which each runs beside the other."""
-    passed = np.zeros((len(paths), beside.shape[0]), dtype=np.float32)
-    for number, path in enumerate(paths):
-        passed[number, path] = 1.0
+def _alike(beside: sparse.csr_array, passed: NDArray[np.float32]) -> BoolArray:
+    """Pairs of paths, by the cells they pass, of which each runs beside the other."""
     away = (beside @ passed.T == 0.0).astype(np.float32)
     inside = passed @ away == 0.0
     return inside & inside.T
 
 
 def _different(
-    paths: list[IntArray], alike: BoolArray, n_first: int, n_aligned: int, n_different: int
+    simple: BoolArray,
+    ends: IntArray,
+    alike: BoolArray,
+    n_first: int,
+    n_aligned: int,
+    n_different: int,
 ) -> list[int]:
-    """Indices of paths that differ: of the first ones in their directions at the ends too."""
-    chosen: list[int] = []
-    simple = [len(np.unique(path)) == len(path) for path in paths]
-    for number in np.flatnonzero(simple[:n_first]).tolist():
-        path = paths[number]
-        same = [
-            other for other in chosen
-            if alike[number, other]
-            and path[1] == paths[other][1]
-            and path[-2] == paths[other][-2]
-        ]  # fmt: skip
-        if not same:
-            chosen.append(number)
-        if len(chosen) == n_aligned:
+    """Indices of paths that differ: of the first ones in their cells next to the ends too.
+
+    These are `ends`, (p, 2).
+    """
+    same = alike & (ends[:, None] == ends).all(axis=2)
+    aligned = _apart(same, np.flatnonzero(simple[:n_first]), [], n_aligned)
+    others = n_first + np.flatnonzero(simple[n_first:])
+    return _apart(alike, others, aligned, len(aligned) + n_different)
+
+
+def _apart(alike: BoolArray, order: IntArray, chosen: list[int], most: int) -> list[int]:
+    """The chosen ones and the next in an order that are like none of them, up to a number."""
+    chosen = chosen.copy()
+    left = ~alike[chosen].any(axis=0)
+    for number in order.tolist():
+        if len(chosen) >= most:
             break
-    further = 0
-    for number in (n_first + np.flatnonzero(simple[n_first:])).tolist():
-        if further == n_different:
-            break
-        if not alike[number, chosen].any():
+        if left[number]:
             chosen.append(number)
-            further += 1
+            left &= ~alike[number]
     return chosen

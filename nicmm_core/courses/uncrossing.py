@@ -25,7 +25,7 @@ MOST_CROSSINGS = 200
 
 def uncrossed(
     surface: CurveSurface, nodes: Nodes, visit: IntArray, any_order: bool
-) -> tuple[Nodes, IntArray]:
+) -> tuple[Nodes, IntArray, BoolArray]:
     """Curves without the crossings that another order of their nodes removes.
 
     Parameters
@@ -43,14 +43,20 @@ def uncrossed(
     Nodes
     (n,) int array
         The control points at these.
+    (c,) bool array
+        Which curves do not cross themselves, where traces succeed.
     """
     size = len(nodes.positions) // nodes.curves
     order = np.arange(len(nodes.positions)).reshape(nodes.curves, size)
+    crossing = np.zeros(nodes.curves, dtype=bool)
     which, now = np.arange(nodes.curves), nodes
-    for _ in range(ROUNDS):
+    for rounds in range(1 + ROUNDS):
         pairs = crossing_steps(surface, now)
+        places = np.unique(pairs[:, 0] // size)
+        crossing[which] = False
+        crossing[which[places]] = True
         changed = []
-        for place in np.unique(pairs[:, 0] // size).tolist():
+        for place in places.tolist() if rounds < ROUNDS else []:
             number = which[place]
             crossings = pairs[pairs[:, 0] // size == place] - place * size
             if len(crossings) > MOST_CROSSINGS:
@@ -64,7 +70,9 @@ def uncrossed(
             break
         which = np.array(changed)
         now = _in_order(surface, nodes, order[which])
-    return _in_order(surface, nodes, order), visit[order.ravel()]
+    if now is nodes:
+        return nodes, visit, ~crossing
+    return _in_order(surface, nodes, order), visit[order.ravel()], ~crossing
 
 
 def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: bool) -> IntArray:

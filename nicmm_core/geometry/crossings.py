@@ -57,8 +57,11 @@ def overlapping_segments(
     start, end : (s, 2) float array
         Barycentric coordinates in this face.
     """
+    # Not `grouped`, which may cancel: a curve is tested after its relaxation was cancelled.
     order = np.argsort(group, kind="stable")
-    count = np.unique(group, return_counts=True)[1]
+    in_order = group[order]
+    begins = np.flatnonzero(np.append(True, in_order[1:] != in_order[:-1])[: len(group)])
+    count = np.append(begins[1:], len(group))[: len(begins)] - begins
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
     # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if
@@ -97,14 +100,12 @@ def _vertices_passed_twice(
 
 def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
     """All pairs of positions within consecutive groups of the given sizes."""
-    first, second = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    begin = np.concatenate([[0], np.cumsum(count)[:-1]])
-    for size in np.unique(count[count > 1]).tolist():
-        i, j = np.triu_indices(size, 1)
-        at = begin[count == size][:, None]
-        first.append((at + i).ravel())
-        second.append((at + j).ravel())
-    return np.concatenate(first), np.concatenate(second)
+    ends = np.cumsum(count).repeat(count)
+    position = np.arange(len(ends))
+    after = ends - position - 1  # positions in the same group
+    first = position.repeat(after)
+    begins = np.cumsum(after) - after
+    return first, first + 1 + np.arange(len(first)) - begins.repeat(after)
 
 
 def _reaches_across(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:

@@ -85,12 +85,21 @@ class Mesh:
         return normals
 
     @property
+    def opposite_sides(self) -> IntArray:
+        """The same edge as a side of the face beyond, for side 3 f + j opposite corner j of face f.
+
+        The side itself at a boundary edge, or at an edge of more than two faces; shape (3 F,).
+        """
+        return self._adjacency[0]
+
+    @cached_property
     def face_neighbours(self) -> IntArray:
         """The face across the side opposite each corner, shape (F, 3).
 
         -1 at a boundary edge, or at an edge of more than two faces.
         """
-        return self._adjacency[0]
+        beyond, face = self.opposite_sides.reshape(-1, 3) // 3, np.arange(len(self.faces))[:, None]
+        return np.where(beyond == face, -1, beyond)
 
     @property
     def unoriented_vertices(self) -> IntArray:
@@ -99,12 +108,12 @@ class Mesh:
 
     @cached_property
     def _adjacency(self) -> tuple[IntArray, IntArray]:
-        """`face_neighbours` and `unoriented_vertices`; both need the sides sorted by edges."""
-        order, first, count = grouped(side_keys(self.faces))  # side 3 f + j of face f, corner j
+        """`opposite_sides` and `unoriented_vertices`; both need the sides sorted by edges."""
+        order, first, count = grouped(side_keys(self.faces))
         one, other = order[first[count == 2]], order[first[count == 2] + 1]
         checkpoint()
-        neighbours = np.full(self.faces.size, -1)
-        neighbours[one], neighbours[other] = other // 3, one // 3
+        sides = np.arange(self.faces.size)
+        sides[one], sides[other] = other, one
         checkpoint()
         rises = (self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]).ravel()
         alike = one[rises[one] == rises[other]]
@@ -113,7 +122,7 @@ class Mesh:
         twice = np.concatenate([alike, _sides_in_one_direction(self.faces, several)])
         corners = self.faces[twice // 3]
         ends = [corners[np.arange(len(twice)), twice % 3 - k] for k in (1, 2)]
-        return neighbours.reshape(-1, 3), np.unique(ends)
+        return sides, np.unique(ends)
 
     @cached_property
     def edges(self) -> IntArray:

@@ -6,9 +6,9 @@ import igl
 import numpy as np
 
 from ..progress import checkpoint
-from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, blocks
+from .vectors import unit
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -46,7 +46,7 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
     area_vector = np.zeros((len(folded), 3))
     np.add.at(area_vector, owner, areas[:, None] * face_normals)
     there = area_vector.any(axis=1)
-    normals[folded[there]] = unit_vectors(area_vector[there])
+    normals[folded[there]] = unit(area_vector[there].T).T
     owner, face_normals, areas = _faces_around(mesh, mixed)
     weighted = areas[:, None] * face_normals
     spread = np.zeros((len(mixed), 3, 3))
@@ -73,9 +73,3 @@ def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray,
     incidence = mesh.vertex_faces[vertices]
     owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
     return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]
-
-
-def unit_vectors(vectors: FloatArray) -> FloatArray:
-    """Vectors, (n, 3), divided by their lengths."""
-    lengths = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
-    return vectors / np.maximum(lengths, tolerances.TINY)[:, None]

@@ -16,6 +16,7 @@ from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
+from .vectors import dot
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        return np.einsum("kc,kcd->kd", self.barycentric, mesh.vertices[mesh.faces[self.faces]])
+        return interpolated(corners_of(mesh, self.faces), self.barycentric.T).T
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -45,7 +46,28 @@ class SurfacePoints:
 
     def __getitem__(self, index: IntArray | BoolArray | slice) -> SurfacePoints:
         """Some of the points, by an array of indices, a mask or a slice."""
-        return SurfacePoints(self.faces[index], self.barycentric[index])
+        if isinstance(index, slice):
+            return SurfacePoints(self.faces[index], self.barycentric[index])
+        which = np.flatnonzero(index) if index.dtype == bool else index
+        return SurfacePoints(self.faces.take(which), self.barycentric.take(which, axis=0))
+
+
+def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
+    """Vectors at vertices, (V, 3), taken at the corners of faces, (3, 3, k).
+
+    The axes are corner, component and face.
+    """
+    return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
+
+
+def corners_of(mesh: Mesh, faces: IntArray) -> FloatArray:
+    """Positions of the corners of some faces, (3, 3, k): corner, component, face."""
+    return at_corners(mesh, faces, mesh.vertices)
+
+
+def interpolated(at_corners: FloatArray, barycentric: FloatArray) -> FloatArray:
+    """Vectors, (3, k), at coordinates, (3, k), between those at corners, (3, 3, k)."""
+    return dot(barycentric[:, None], at_corners)
 
 
 def locate_control_points(
@@ -402,5 +424,5 @@ def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> 
     (n, m) float array
         Zero at vertices that are not among the corners.
     """
-    same = corners[:, :, None] == others[:, None, :]
-    return (barycentric[:, :, None] * same).sum(axis=1)
+    same = corners.T[:, None] == others.T
+    return dot(barycentric.T[:, None], same).T

@@ -2,8 +2,9 @@
 
 A trace is a normal section: the intersection of the surface with a plane that contains its normal.
 It is followed from face to face by the sides of the plane on which the corners lie, so it cannot
-get lost between two faces. All traces of a call advance together. Two consecutive points of a
-trace lie in one face, which is the face of the first of them.
+get lost between two faces. All traces of a call advance together, a few faces at a time: first the
+sides that they cross, then the lengths between these, then where each trace ends. Two consecutive
+points of a trace lie in one face, which is the face of the first of them.
 
 The cost depends on the number of faces passed, not on the size of the mesh.
 """
@@ -18,10 +19,15 @@ from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
-from .surface_points import SurfacePoints
+from .surface_points import SurfacePoints, corners_of, interpolated
+from .vectors import cross, dot, lengths
 
 MOST_FACES = 4096
 """Most faces of a trace; a longer one runs round the surface and is not a short connection."""
+
+SIDES_AT_ONCE, FEWEST_AT_ONCE, MOST_AT_ONCE = 800, 3, 16
+"""Sides that all traces together cross before it is asked which of them have ended, and the least
+and the greatest number for each."""
 
 FOLDS = 4.0
 """Extra length allowed to a trace over folded faces, in mean edge lengths."""
@@ -77,49 +83,56 @@ def trace_between(
         Directions in which the traces leave; by default towards the ends. Round the edge of a thin
         part the trace may begin in another direction.
     """
-    origin, goal = start.positions(mesh), end.positions(mesh)
-    forward = goal - origin
+    origin, goal = start.positions(mesh).T, end.positions(mesh).T
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
-    reached = _holds(mesh, end, start.faces)
-    across = np.cross(normals, forward)
-    ahead = forward if ahead is None else ahead
-    fronts = _Fronts(mesh, start.faces, origin, across, ahead, np.flatnonzero(~reached))
-    travelled, covered = np.zeros(len(origin)), np.zeros(len(origin))
-    pairs, crossings = [], []
-    for _ in range(MOST_FACES):
-        if not len(fronts.index):
-            break
+    reached = _holds(mesh, end, start.faces[None])[0]
+    index = np.flatnonzero(~reached)
+    origin, forward = origin.take(index, axis=1), (goal - origin).take(index, axis=1)
+    ahead = forward if ahead is None else ahead.T.take(index, axis=1)
+    across = cross(normals.T.take(index, axis=1), forward)
+    first = start.faces.take(index)
+    offset = corners_of(mesh, first) - origin
+    fronts = _fronts(index, first, origin, across, offset, ahead)
+    travelled = covered = np.zeros(len(fronts.index))
+    parts, passed = [], 0
+    while passed < MOST_FACES and len(fronts.index):
         checkpoint()
-        step = fronts.step_lengths()
-        back = np.zeros(len(step), dtype=bool) if folded is None else folded[fronts.faces]
-        covered[fronts.index] += np.where(back, -step, step)
-        travelled[fronts.index] += step
-        fronts.enter_next_faces(travelled[fronts.index] <= longest[fronts.index] + margin)
-        pairs.append(fronts.index)
-        crossings.append(fronts.entry())
-        arrived = _holds(mesh, end[fronts.index], fronts.faces)
-        here = fronts.index[arrived]
-        reached[here] = covered[here] <= longest[here]
-        fronts.leave_edges(~arrived)
-    if not pairs:
+        strip, onward = _advanced(mesh, fronts)
+        step, index = strip.lengths, fronts.index
+        signed = step if folded is None else np.where(folded[strip.sides // 3], -step, step)
+        travelled, covered = travelled + step.cumsum(0), covered + signed.cumsum(0)
+        lost = strip.blocked | strip.closed | (travelled > longest[index] + margin)
+        last, going = _first(lost | _holds(mesh, end[index], strip.entered))
+        arrived = np.flatnonzero(~going & ~lost[last, np.arange(len(index))])
+        reached[index[arrived]] = covered[last[arrived], arrived] <= longest[index[arrived]]
+        row, column = np.nonzero(np.arange(len(step))[:, None] <= last)
+        parts.append(
+            (index[column], *(of[row, column] for of in (strip.entered, strip.sides, strip.shares)))
+        )
+        passed += len(step)
+        left = np.flatnonzero(going)
+        fronts = onward.taken(left)
+        travelled, covered = travelled[-1, left], covered[-1, left]
+    if not parts:
         return Traces(reached, np.zeros(0, np.int64), start[np.zeros(0, np.int64)])
-    pair = np.concatenate(pairs)
+    pair, faces, sides, shares = (np.concatenate(part) for part in zip(*parts, strict=True))
     kept = np.flatnonzero(reached[pair])
     kept = kept[np.argsort(pair[kept], kind="stable")]
-    parts = zip(*crossings, strict=True)
-    faces, low, high, fraction = (np.concatenate(part)[kept] for part in parts)
-    points = SurfacePoints(faces, _on_edges(mesh, faces, low, high, fraction))
-    once = _last_of_each_vertex(mesh, pair[kept], points)
-    return Traces(reached, pair[kept][once], points[once])
+    pair, faces = pair[kept], faces[kept]
+    points = SurfacePoints(faces, _on_sides(mesh, faces, sides[kept], shares[kept]))
+    once = _last_of_each_vertex(mesh, pair, points)
+    return Traces(reached, pair[once], points[once])
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
     """Crossings with only the last of consecutive ones of a trace at the same vertex."""
-    here = crossings.barycentric > 0.0
-    vertex = np.where(here, mesh.faces[crossings.faces], -1).max(axis=1)
-    vertex[here.sum(axis=1) > 1] = -1
+    inside = crossings.barycentric.T > 0.0
+    place = np.flatnonzero(inside.sum(axis=0) == 1)
+    vertex = mesh.faces[crossings.faces[place], inside[:, place].argmax(axis=0)]
+    again = (place[1:] - place[:-1] == 1) & (vertex[1:] == vertex[:-1])
+    again &= pair[place[1:]] == pair[place[:-1]]
     last = np.ones(len(pair), dtype=bool)
-    last[:-1] = (vertex[:-1] < 0) | (vertex[:-1] != vertex[1:]) | (pair[:-1] != pair[1:])
+    last[place[:-1][again]] = False
     return np.flatnonzero(last)
 
 
@@ -156,187 +169,230 @@ def trace_from(
     int
         Greatest number of faces passed by a point, which is the cost of the call.
     """
-    origin = start.positions(mesh)
-    normals = mesh.face_normals[start.faces]
-    blocked = length > 0.0
-    across = np.cross(normals, direction)
-    fronts = _Fronts(mesh, start.faces, origin, across, direction, np.flatnonzero(blocked))
+    corners, weights = corners_of(mesh, start.faces), start.barycentric.T
+    origin = interpolated(corners, weights)
+    across = cross(mesh.face_normals.take(start.faces, axis=0).T, direction.T)
+    offset = corners - origin
+    height = dot(offset.swapaxes(0, 1), across[:, None])
+    # Most points stay in their faces: there the coordinates change by the differences of heights.
+    change = height.take(FIRST_END, axis=0) - height.take(SECOND_END, axis=0)
+    speed = lengths(interpolated(offset, change))
+    inside = weights + length / np.where(speed > 0.0, speed, 1.0) * change
+    index = np.flatnonzero(~(inside >= tolerances.INSIDE).all(axis=0) & (length > 0.0))
+    faces, barycentric = start.faces.copy(), inside.T.copy()
+    barycentric[index] = start.barycentric[index]
+    blocked = np.zeros(len(length), dtype=bool)
+    blocked[index] = True
+    fronts = _fronts(
+        index, faces.take(index), origin.take(index, axis=1), across.take(index, axis=1),
+        offset.take(index, axis=2), direction.T.take(index, axis=1),
+    )  # fmt: skip
     blocked[fronts.index] = False
-    outside = np.ones(len(length), dtype=bool) if folded is None else ~folded[start.faces]
-    left = length.copy()
-    faces, barycentric = start.faces.copy(), start.barycentric.copy()
-    passed = 0
+    left, passed, most_passed = length[fronts.index], 0, 0
+    ends = []
     while passed < MOST_FACES and len(fronts.index):
-        passed += 1
         checkpoint()
-        step = fronts.step_lengths()
-        index = fronts.index
-        beyond = fronts.beyond()
-        back = np.zeros(len(index), dtype=bool)
+        strip, onward = _advanced(mesh, fronts)
+        step = signed = strip.lengths
+        back = np.zeros(1, dtype=bool)
         if folded is not None:
-            back = folded[fronts.faces] & outside[index]
-        stops = (~back & (left[index] <= step)) | (beyond < 0)
-        here = np.flatnonzero(stops)
-        ends = index[here]
-        to_go = np.minimum(left[ends], step[here])
-        share = (to_go / np.maximum(step[here], tolerances.TINY))[:, None]
-        faces[ends] = fronts.faces[here]
-        if passed > 1:
-            barycentric[ends] = fronts.entry_barycentric(here)
-        barycentric[ends] += share * (fronts.exit_barycentric(here) - barycentric[ends])
-        blocked[ends] = left[ends] > step[here]
-        left[index] -= np.where(back, -step, step)
-        fronts.enter_next_faces(~stops)
-        fronts.leave_edges(np.ones(len(fronts.index), dtype=bool))
-    return SurfacePoints(faces, strictly_inside(barycentric)), blocked, passed
+            back = folded[strip.sides // 3] & ~folded[fronts.start]
+            signed = np.where(back, -step, step)
+        covered = signed.cumsum(0)
+        stops = (~back & (covered >= left)) | strip.blocked
+        last, going = _first(stops | strip.closed)
+        most_passed = passed + int(last.max()) + 1
+        column = np.flatnonzero(stops[last, np.arange(len(last))])
+        row = last[column]
+        here = row, column
+        to_go = left[column] - covered[here] + signed[here]
+        # The side over which the trace has entered its last face; in the first one, any.
+        crossed = np.where(row > 0, strip.sides[row - 1, column], fronts.crossed[column])
+        share = np.where(row > 0, strip.shares[row - 1, column], fronts.share[column])
+        ends.append(
+            (fronts.index[column], row + passed, crossed, share, strip.sides[here],
+             strip.shares[here], to_go, step[here])
+        )  # fmt: skip
+        passed += len(step)
+        further = np.flatnonzero(going)
+        left, fronts = left[further] - covered[-1, further], onward.taken(further)
+    if ends:
+        index, row, crossed, entry, side, share, to_go, step = (
+            np.concatenate(part) for part in zip(*ends, strict=True)
+        )
+        faces[index] = side // 3
+        blocked[index] = to_go > step
+        begin = np.where(
+            row == 0, start.barycentric[index].T, _on_sides(mesh, faces[index], crossed, entry).T
+        )
+        end = _on_sides(mesh, faces[index], side, share).T
+        share = np.minimum(to_go, step) / np.maximum(step, tolerances.TINY)
+        barycentric[index] = (begin + share * (end - begin)).T
+    return SurfacePoints(faces, strictly_inside(barycentric)), blocked, most_passed
 
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:
     """Coordinates moved away from the sides and corners of their faces by `tolerances.INSIDE`."""
-    moved = np.maximum(barycentric, tolerances.INSIDE)
-    return moved / moved.sum(axis=1, keepdims=True)
+    moved = np.maximum(barycentric, tolerances.INSIDE).T
+    return (moved / (moved[0] + moved[1] + moved[2])).T
 
 
-_OF_EACH_FRONT = (
-    *("index", "faces", "_start", "_origin", "_across", "_position", "_side"),
-    *("_high", "_low", "_high_height", "_low_height", "_high_position", "_low_position"),
-    *("_fraction", "_crossing", "_entry_low", "_entry_high", "_entry_fraction"),
-)
-"""Arrays of `_Fronts` with one row for each trace."""
-
-
+@dataclass(frozen=True)
 class _Fronts:
-    """Traces in progress, each in its plane, about to cross an edge of its present face.
+    """Traces in progress, each in its plane, about to cross a side of its present face.
 
-    One end of this edge lies above the plane or in it, the other below. In the next face only the
-    third corner is new; the sign of its height determines the next edge.
+    Side 3 f + j of the mesh lies opposite corner j of face f, from corner j + 1 to j + 2. One of
+    its ends lies above the plane or in it, the other below.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        faces: IntArray,
-        origin: FloatArray,
-        across: FloatArray,
-        forward: FloatArray,
-        index: IntArray,
-    ) -> None:
-        self.mesh = mesh
-        self.index = index  # (w,) indices of the caller's traces
-        self.faces = self._start = faces[index]
-        self._origin = origin[index]
-        self._across = across[index]
-        self._position = self._crossing = self._origin
-        self._fraction = self._entry_fraction = np.zeros(len(index))
-        corners = mesh.faces[self.faces]  # (w, 3)
-        positions = mesh.vertices[corners]
-        offset = positions - self._origin[:, None]
-        height = np.einsum("wcd,wd->wc", offset, self._across)
-        # Side j lies opposite corner j. Two of them are crossed, one of them ahead.
-        above = height >= 0.0
-        first, second = [1, 2, 0], [2, 0, 1]
-        crossed = above[:, first] != above[:, second]
-        rise = height[:, second] - height[:, first]
-        share = -height[:, first] / np.where(crossed, rise, 1.0)
-        along = np.einsum("wcd,wd->wc", offset, forward[index])
-        ahead = along[:, first] + share * (along[:, second] - along[:, first])
-        side = np.where(crossed, ahead, -np.inf).argmax(axis=1)
-        rows = np.arange(len(index))
-        one, other = (side + 1) % 3, (side + 2) % 3
-        up = above[rows, one]
-        high, low = np.where(up, one, other), np.where(up, other, one)
-        self._side = side
-        self._high, self._low = corners[rows, high], corners[rows, low]
-        self._entry_high, self._entry_low = self._high, self._low
-        self._high_height, self._low_height = height[rows, high], height[rows, low]
-        self._high_position, self._low_position = positions[rows, high], positions[rows, low]
-        # Drop traces whose plane does not cross the sides of the face.
-        self._keep(crossed[rows, side])
-        self._find_crossing()
+    index: IntArray  # (w,) of the caller's traces
+    start: IntArray  # (w,) first faces
+    origin: FloatArray  # (3, w)
+    across: FloatArray  # (3, w) normals of the planes
+    side: IntArray  # (w,) sides ahead
+    first: FloatArray  # (w,) heights of their two ends above the planes
+    second: FloatArray
+    crossed: IntArray  # (w,) sides crossed last, and where
+    share: FloatArray
+    position: FloatArray  # (3, w) there
 
-    def step_lengths(self) -> FloatArray:
-        """Distance to the edge ahead, shape (w,)."""
-        step = self._crossing - self._position
-        return np.sqrt(np.einsum("wd,wd->w", step, step))
-
-    def beyond(self) -> IntArray:
-        """The face beyond this edge, -1 if no or several faces are there, shape (w,)."""
-        return self.mesh.face_neighbours[self.faces, self._side]
-
-    def exit_barycentric(self, which: IntArray) -> FloatArray:
-        """Barycentric coordinates at which some traces leave their faces, (q, 3)."""
-        low, high, fraction = self._low[which], self._high[which], self._fraction[which]
-        return _on_edges(self.mesh, self.faces[which], low, high, fraction)
-
-    def entry_barycentric(self, which: IntArray) -> FloatArray:
-        """Barycentric coordinates at which some traces entered their faces, (q, 3)."""
-        low, high = self._entry_low[which], self._entry_high[which]
-        return _on_edges(self.mesh, self.faces[which], low, high, self._entry_fraction[which])
-
-    def entry(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Entry points: face, low and high end of the edge, and fraction from high to low."""
-        return self.faces, self._low, self._high, self._fraction
-
-    def enter_next_faces(self, continues: BoolArray) -> None:
-        """Move traces across their edges; drop those that must not or cannot continue.
-
-        Traces that return to their first face are dropped too, as their section is closed.
-        """
-        beyond = self.beyond()
-        continues = continues & (beyond >= 0) & (beyond != self._start)
-        if not continues.all():
-            self._keep(continues)
-            beyond = beyond[continues]
-        self.faces = beyond
-        self._position = self._crossing
-        self._entry_low, self._entry_high = self._low, self._high
-        self._entry_fraction = self._fraction
-
-    def leave_edges(self, continues: BoolArray) -> None:
-        """Find the next edge of traces that have just entered a face; drop the others."""
-        if not continues.all():
-            self._keep(continues)
-        corners = self.mesh.faces[self.faces]
-        third = corners[:, 0] + corners[:, 1] + corners[:, 2] - self._low - self._high
-        position = self.mesh.vertices[third]
-        height = np.einsum("wd,wd->w", position - self._origin, self._across)
-        up = height >= 0.0
-        left = np.where(up, self._high, self._low)
-        self._side = (corners == left[:, None]).argmax(axis=1)
-        self._high = np.where(up, third, self._high)
-        self._low = np.where(up, self._low, third)
-        self._high_height = np.where(up, height, self._high_height)
-        self._low_height = np.where(up, self._low_height, height)
-        self._high_position = np.where(up[:, None], position, self._high_position)
-        self._low_position = np.where(up[:, None], self._low_position, position)
-        self._find_crossing()
-
-    def _find_crossing(self) -> None:
-        self._fraction = self._high_height / (self._high_height - self._low_height)
-        step = self._low_position - self._high_position
-        self._crossing = self._high_position + self._fraction[:, None] * step
-
-    def _keep(self, mask: BoolArray) -> None:
-        kept = np.flatnonzero(mask)
-        for name in _OF_EACH_FRONT:
-            setattr(self, name, getattr(self, name)[kept])
+    def taken(self, which: IntArray) -> _Fronts:
+        """Some of the traces."""
+        if len(which) == len(self.index):
+            return self
+        return _Fronts(
+            self.index.take(which), self.start.take(which), self.origin.take(which, axis=1),
+            self.across.take(which, axis=1), self.side.take(which), self.first.take(which),
+            self.second.take(which), self.crossed.take(which), self.share.take(which),
+            self.position.take(which, axis=1),
+        )  # fmt: skip
 
 
-def _on_edges(
-    mesh: Mesh, faces: IntArray, low: IntArray, high: IntArray, fraction: FloatArray
-) -> FloatArray:
-    """Barycentric coordinates, (p, 3), of points at a fraction of the edges from high to low."""
-    corners = mesh.faces[faces]
-    share = fraction[:, None]
-    return (corners == high[:, None]) * (1.0 - share) + (corners == low[:, None]) * share
+@dataclass(frozen=True)
+class _Strip:
+    """The next s sides that w traces cross, (s, w) each."""
+
+    sides: IntArray  # of the face before
+    entered: IntArray  # the face beyond; the face before if `blocked`
+    shares: FloatArray  # of the way from the first end of the side to the second
+    lengths: FloatArray  # in the face before
+    blocked: BoolArray  # no face, or several, are beyond
+    closed: BoolArray  # the face beyond is the first one
+
+
+def _fronts(
+    index: IntArray,
+    start: IntArray,
+    origin: FloatArray,
+    across: FloatArray,
+    offset: FloatArray,
+    forward: FloatArray,
+) -> _Fronts:
+    """Traces at their starts, except where a plane does not cross the face.
+
+    Parameters
+    ----------
+    index, start : (w,) int arrays
+    origin, across, forward : (3, w) float array
+    offset : (3, 3, w) float array
+        From the origins to the corners of the faces.
+    """
+    corners = offset.swapaxes(0, 1)
+    height, along = dot(corners, across[:, None]), dot(corners, forward[:, None])
+    first, second = height.take(FIRST_END, axis=0), height.take(SECOND_END, axis=0)
+    # Two sides are crossed, one of them ahead.
+    crossed = (first >= 0.0) != (second >= 0.0)
+    shares = first / np.where(crossed, first - second, 1.0)
+    along, ends = along.take(FIRST_END, axis=0), along.take(SECOND_END, axis=0)
+    along = along + shares * (ends - along)
+    corner = np.where(crossed, along, -np.inf).argmax(axis=0)
+    ahead = corner, np.arange(len(index))
+    side = 3 * start + corner
+    fronts = _Fronts(
+        index, start, origin, across, side, first[ahead], second[ahead], side, shares[ahead],
+        origin,
+    )  # fmt: skip
+    return fronts.taken(np.flatnonzero(crossed[ahead]))
+
+
+def _advanced(mesh: Mesh, fronts: _Fronts) -> tuple[_Strip, _Fronts]:
+    """Traces followed over the next faces, and their fronts there.
+
+    Beyond a blocked side a trace goes on in the face before, which means nothing.
+    """
+    at_once = SIDES_AT_ONCE // max(1, len(fronts.index))
+    count = min(max(at_once, FEWEST_AT_ONCE), MOST_AT_ONCE)
+    vertex = mesh.faces.ravel()
+    size = count, len(fronts.index)
+    sides, entered, shares = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
+    side, first, second = fronts.side, fronts.first, fronts.second
+    for row in range(count):
+        beyond = mesh.opposite_sides.take(side)
+        sides[row], entered[row], shares[row] = side, beyond, first / (first - second)
+        # Faces of one orientation have a common side in opposite directions.
+        before, after = second, first
+        if not mesh.is_oriented:
+            same = vertex.take(_ends(side)[0]) == vertex.take(_ends(beyond)[0])
+            before, after = np.where(same, first, second), np.where(same, second, first)
+        # The trace leaves between the third corner and the end on the other side of the plane.
+        position = mesh.vertices.take(vertex.take(beyond), axis=0).T
+        height = dot(position - fronts.origin, fronts.across)
+        like_before = (height >= 0.0) == (before >= 0.0)
+        side = beyond + TURNS.take(2 * (beyond % 3) + like_before)
+        first, second = np.where(like_before, after, height), np.where(like_before, height, before)
+    begin, end = _ends(sides)
+    low = mesh.vertices.take(vertex.take(begin), axis=0).transpose(2, 0, 1)
+    high = mesh.vertices.take(vertex.take(end), axis=0).transpose(2, 0, 1)
+    points = np.empty((3, count + 1, size[1]))
+    points[:, 0], points[:, 1:] = fronts.position, low + shares * (high - low)
+    face = entered // 3
+    strip = _Strip(
+        sides, face, shares, lengths(points[:, 1:] - points[:, :-1]), entered == sides,
+        face == fronts.start,
+    )  # fmt: skip
+    onward = _Fronts(
+        fronts.index, fronts.start, fronts.origin, fronts.across, side, first, second,
+        sides[-1], shares[-1], points[:, -1],
+    )  # fmt: skip
+    return strip, onward
+
+
+FIRST_END, SECOND_END = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Corners at the ends of the side opposite each corner."""
+
+TURNS = np.stack([SECOND_END, FIRST_END], axis=1) - np.arange(3)[:, None]
+"""From each side to the sides opposite its second and its first end."""
+
+
+def _ends(side: IntArray) -> tuple[IntArray, IntArray]:
+    """Corners at which sides begin and end, as indices of all corners; also the sides opposite."""
+    corner = side % 3
+    face = side - corner
+    return face + FIRST_END.take(corner), face + SECOND_END.take(corner)
+
+
+def _first(events: BoolArray) -> tuple[IntArray, BoolArray]:
+    """The row of the first event of each column, the last row without one; and which have none."""
+    row = events.argmax(axis=0)
+    none = ~events[row, np.arange(events.shape[1])]
+    row[none] = len(events) - 1
+    return row, none
+
+
+def _on_sides(mesh: Mesh, faces: IntArray, sides: IntArray, shares: FloatArray) -> FloatArray:
+    """Coordinates in faces, (p, 3), of points at a share of some of their sides."""
+    vertex, corners = mesh.faces.ravel(), mesh.faces.take(faces, axis=0).T
+    first, second = (vertex.take(end) for end in _ends(sides))
+    return ((corners == first) * (1.0 - shares) + (corners == second) * shares).T
 
 
 def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
-    """Whether each point lies in the given face; a vertex lies in every face round it."""
-    holds = points.faces == faces
-    on_side = np.flatnonzero(~holds & (points.barycentric == 0.0).any(axis=1))
+    """Whether each point lies in the faces of its column, (s, m); a vertex lies in all round it."""
+    holds = faces == points.faces
+    on_side = np.flatnonzero((points.barycentric.T == 0.0).any(axis=0))
     if len(on_side):
         support = mesh.faces[points.faces[on_side]]
-        found = (support[:, :, None] == mesh.faces[faces[on_side]][:, None, :]).any(axis=2)
-        holds[on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=1)
+        corners = mesh.faces[faces[:, on_side]]
+        found = (support[:, :, None] == corners[:, :, None, :]).any(axis=3)
+        holds[:, on_side] = (found | (points.barycentric[on_side] == 0.0)).all(axis=2)
     return holds

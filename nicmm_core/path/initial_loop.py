@@ -145,11 +145,6 @@ def build_initial_loop(
     return working, InitialLoop(vertices, controls, visit, edge_length, zigzag, closed)
 
 
-def visiting_order(mesh: Mesh, points: SurfacePoints, order: str, closed: bool) -> IntArray:
-    """The order in which a curve visits points, (k,), if the surface allows it."""
-    return next(_Tours(mesh, points, closed).of(order))
-
-
 class _Tours:
     """Orders in which a curve may visit control points, each computed on first use."""
 

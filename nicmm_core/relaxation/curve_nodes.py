@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from scipy import sparse
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
-from ..geometry.normals import normals_and_folds, unit_vectors
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.normals import normals_and_folds
+from ..geometry.surface_points import SurfacePoints, at_corners, corners_of, interpolated
+from ..geometry.vectors import cross, dot, lengths, unit
 from ..maps.guidance import feature_map
 
 FEATURE_TENSION = 600.0
@@ -106,21 +107,26 @@ class Nodes:
     @cached_property
     def steps(self) -> FloatArray:
         """Vectors from each node to the next, zero at the last of an open curve, (n, 3)."""
-        steps = self.after_each(self.positions.T).T - self.positions
+        steps = self.after_each(self.positions.T) - self.positions.T
         if not self.closed:
-            steps[self.last] = 0.0
-        return steps
+            steps[:, self.last] = 0.0
+        return steps.T
 
     @cached_property
     def step_lengths(self) -> FloatArray:
         """Distance from each node to the next, zero at the last of an open curve, (n,)."""
-        steps = self.steps.T
-        return np.sqrt(dot(steps, steps))
+        return lengths(self.steps.T)
 
     @cached_property
     def lengths(self) -> FloatArray:
         """Lengths of the steps of one curve; (n,), or (n - 1,) of an open curve."""
         return self.step_lengths if self.closed else self.step_lengths[:-1]
+
+    @cached_property
+    def ds(self) -> FloatArray:
+        """Half the length of both steps at each node, (n,)."""
+        lengths = self.step_lengths
+        return np.maximum(0.5 * (lengths + self.before_each(lengths)), tolerances.TINY)
 
     def by_curve(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values at nodes, (n,), by curve, (c, n / c)."""
@@ -128,14 +134,14 @@ class Nodes:
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of the curves, (c,), at their nodes, (n,)."""
-        return np.repeat(values, len(self.positions) // self.curves)
+        return values.repeat(len(self.positions) // self.curves)
 
-    @property
+    @cached_property
     def first(self) -> IntArray:
         """The first node of each curve, (c,)."""
         return np.arange(0, len(self.positions), len(self.positions) // self.curves)
 
-    @property
+    @cached_property
     def last(self) -> IntArray:
         """The last node of each curve, (c,)."""
         return self.first + len(self.positions) // self.curves - 1
@@ -143,9 +149,7 @@ class Nodes:
     @property
     def following(self) -> IntArray:
         """The index of the next node of each, (n,); the first of the curve after its last."""
-        following = np.arange(1, len(self.positions) + 1)
-        following[self.last] = self.first
-        return following
+        return self.after_each(np.arange(len(self.positions)))
 
     @property
     def with_step(self) -> IntArray:
@@ -153,16 +157,16 @@ class Nodes:
         every = np.arange(len(self.positions))
         return every if self.closed else np.delete(every, self.last)
 
-    def after_each(self, values: FloatArray) -> FloatArray:
+    def after_each(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values at the next node of the curve, (…, n)."""
-        result = np.empty_like(values)
+        result = np.empty(values.shape, values.dtype)
         result[..., :-1] = values[..., 1:]
         result[..., self.last] = values[..., self.first]
         return result
 
-    def before_each(self, values: FloatArray) -> FloatArray:
+    def before_each(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values at the previous node of the curve, (…, n)."""
-        result = np.empty_like(values)
+        result = np.empty(values.shape, values.dtype)
         result[..., 1:] = values[..., :-1]
         result[..., self.first] = values[..., self.last]
         return result
@@ -170,62 +174,84 @@ class Nodes:
     @cached_property
     def conormals(self) -> FloatArray:
         """Unit vectors normal to the curve in the tangent planes, shape (n, 3)."""
-        unit = unit_vectors(self.steps)
-        return unit_vectors(cross(self.normals.T, unit.T + self.before_each(unit.T)).T)
+        along = self.steps.T / np.maximum(self.step_lengths, tolerances.TINY)
+        return unit(cross(self.normals.T, along + self.before_each(along))).T
+
+    @cached_property
+    def turns(self) -> Turns:
+        """How the curves turn at the nodes."""
+        after, normal = self.steps.T, self.normals.T
+        before = self.before_each(after)
+        out_before, out_after = dot(before, normal), dot(after, normal)
+        product = cross(before, after)
+        sine, cosine = dot(product, normal), dot(before, after) - out_before * out_after
+        angle = np.arctan2(sine, cosine)
+        if not self.closed:
+            angle[self.first] = angle[self.last] = 0.0
+        return Turns(before, out_before, out_after, product, sine, cosine, angle)
 
     def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
         """Derivatives of normals, (n, 3), and φ_fea, (n,), by moves along conormals."""
-        mesh, faces = surface.mesh, self.places.faces
-        a, b, c = mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2)
+        mesh, faces, conormals = surface.mesh, self.places.faces, self.conormals.T
+        a, b, c = corners_of(mesh, faces)
         one, other = b - a, c - a
         # Barycentric coordinates of the move: least squares in the plane of the face.
-        p, q, r = (one * one).sum(axis=1), (one * other).sum(axis=1), (other * other).sum(axis=1)
-        f, g = (one * self.conormals).sum(axis=1), (other * self.conormals).sum(axis=1)
+        p, q, r = dot(one, one), dot(one, other), dot(other, other)
+        f, g = dot(one, conormals), dot(other, conormals)
         # At least its rounding error, where two long sides are almost parallel.
         determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
         determinant = np.maximum(determinant, tolerances.TINY)
         u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
-        change = np.stack([-u - v, u, v], axis=1)
-        corner_normals = _corner_normals(surface, faces)
-        length = np.einsum("nc,ncd,nd->n", self.places.barycentric, corner_normals, self.normals)
-        turn = np.einsum("nc,ncd->nd", change, corner_normals)
-        turn /= np.maximum(length, tolerances.TINY)[:, None]
-        turn -= (turn * self.normals).sum(axis=1, keepdims=True) * self.normals
+        change = np.array([-u - v, u, v])
+        normals, corner_normals = self.normals.T, _corner_normals(surface, faces)
+        length = dot(interpolated(corner_normals, self.places.barycentric.T), normals)
+        turn = interpolated(corner_normals, change) / np.maximum(length, tolerances.TINY)
+        turn -= dot(turn, normals) * normals
         drift = np.zeros(len(faces))
         if surface.feature_map is not None:
-            drift = (change * surface.feature_map[mesh.faces[faces]]).sum(axis=1)
-        return turn, drift
+            drift = dot(change, surface.feature_map[mesh.faces[faces]].T)
+        return turn.T, drift
+
+
+class Turns(NamedTuple):
+    """How curves turn at their n nodes.
+
+    Attributes
+    ----------
+    before : (3, n) float array
+        The steps to the nodes.
+    out_before, out_after : (n,) float array
+        Components of the steps before and after along the normals.
+    product : (3, n) float array
+        Cross product of both steps.
+    sine, cosine : (n,) float array
+        Of the angle, times the lengths of both steps in the tangent plane.
+    angle : (n,) float array
+        In the tangent plane; zero at the ends of open curves.
+    """
+
+    before: FloatArray
+    out_before: FloatArray
+    out_after: FloatArray
+    product: FloatArray
+    sine: FloatArray
+    cosine: FloatArray
+    angle: FloatArray
 
 
 def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
     """Nodes with the normals and φ_fea that the energy needs."""
-    weight = places.barycentric
-    normals = unit_vectors(np.einsum("nc,ncd->nd", weight, _corner_normals(surface, places.faces)))
+    weight = places.barycentric.T
+    normals = unit(interpolated(_corner_normals(surface, places.faces), weight)).T
     phi_fea = np.ones(len(places))
     if surface.feature_map is not None:
-        corners = surface.mesh.faces[places.faces]
-        phi_fea = (weight * surface.feature_map[corners]).sum(axis=1)
+        phi_fea = dot(weight, surface.feature_map[surface.mesh.faces[places.faces]].T)
     return Nodes(places, closed, places.positions(surface.mesh), normals, phi_fea, curves)
 
 
 def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
-    """Vertex normals at the corners, turned to the side of each face, shape (n, 3, 3)."""
-    normals = surface.vertex_normals[surface.mesh.faces[faces]]
-    against = (normals * surface.mesh.face_normals[faces][:, None]).sum(axis=2) < 0.0
-    return normals * np.where(against, -1.0, 1.0)[..., None]
-
-
-def dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Dot products; components are the first axis, which is several times as fast."""
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-def cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Cross products; components are the first axis."""
-    return np.stack(
-        [
-            one[1] * other[2] - one[2] * other[1],
-            one[2] * other[0] - one[0] * other[2],
-            one[0] * other[1] - one[1] * other[0],
-        ]
-    )
+    """Vertex normals at the corners, turned to the side of each face, shape (3, 3, n)."""
+    normals = at_corners(surface.mesh, faces, surface.vertex_normals)
+    of_faces = surface.mesh.face_normals.take(faces, axis=0).T.copy()
+    against = dot(normals.swapaxes(0, 1), of_faces[:, None]) < 0.0
+    return np.where(against[:, None], -normals, normals) if against.any() else normals

@@ -19,14 +19,17 @@ neighbours only, so the Gauss–Newton matrix has two bands on each side and a s
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import linalg, sparse
+from scipy.linalg.lapack import dpbsv
 from scipy.sparse.linalg import splu
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from .curve_nodes import CurveSurface, Nodes, cross, dot
+from ..geometry.vectors import cross, dot
+from .curve_nodes import CurveSurface, Nodes
 from .strand_contact import Contacts, contacts_between
 
 OVER_TENSION = 4.0
@@ -86,7 +89,7 @@ def balance(
     weights = Balance(taut * tension, 0.0)
     if surface.feature_map is not None:
         feature = surface.feature_weight / smoothness + OVER_TENSION * tension
-        weights = replace(weights, feature=feature, held=_ds(nodes))
+        weights = replace(weights, feature=feature, held=nodes.ds)
     if not apart:
         return weights
     size = len(nodes.positions) // nodes.curves
@@ -111,12 +114,12 @@ def curve_bending(nodes: Nodes) -> FloatArray:
 
 def feature_energy(nodes: Nodes) -> float:
     """∮ φ_fea² ds of one curve, in units of length."""
-    return float((nodes.phi_fea**2 * _ds(nodes)).sum())
+    return float((nodes.phi_fea**2 * nodes.ds).sum())
 
 
-def elastic_energy(nodes: Nodes, weights: Balance) -> float:
+def elastic_energy(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> float:
     """E of one curve, with the contact term if it has a weight."""
-    return float(curve_energies(nodes, weights)[0])
+    return float(curve_energies(nodes, weights, contacts)[0])
 
 
 def comparable_energies(
@@ -136,7 +139,7 @@ def comparable_energies(
     energy = scale * (curve_bending(nodes) + tension * length)
     if surface.feature_map is not None:
         weight = surface.feature_weight / smoothness + OVER_TENSION * tension
-        excess, ds = nodes.phi_fea**2 - 1.0, _ds(nodes)
+        excess, ds = nodes.phi_fea**2 - 1.0, nodes.ds
         outside = nodes.by_curve(np.maximum(excess, 0.0) * ds).sum(axis=1)
         inside = nodes.by_curve(np.minimum(excess, 0.0) * ds).sum(axis=1) / length
         energy += scale * weight * (outside + scale * inside)
@@ -148,7 +151,7 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
 
     Contacts may be given where they are known.
     """
-    at_nodes = _bending(nodes) + _tension(nodes, weights) * _ds(nodes)
+    at_nodes = _bending(nodes) + _tension(nodes, weights) * nodes.ds
     if weights.held is not None:
         at_nodes += weights.feature * np.minimum(nodes.phi_fea, 1.0) ** 2 * weights.held
     if np.any(weights.contact):
@@ -158,29 +161,15 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
     return nodes.by_curve(at_nodes).sum(axis=1)
 
 
-def _ds(nodes: Nodes) -> FloatArray:
-    """ds: half the length of both steps at each node, (n,)."""
-    lengths = nodes.step_lengths
-    return np.maximum(0.5 * (lengths + nodes.before_each(lengths)), tolerances.TINY)
-
-
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
     """Tension at each node, (n,): τ, and more in an obstacle."""
-    return weights.tension + weights.feature * np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
+    excess = np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
+    return weights.tension + weights.feature * excess
 
 
 def _bending(nodes: Nodes) -> FloatArray:
     """κ_g² ds at each node, (n,); an open curve does not bend at its ends."""
-    after = nodes.steps.T
-    before = nodes.before_each(after)
-    normals = nodes.normals.T
-    out_before, out_after = dot(before, normals), dot(after, normals)
-    turning = np.arctan2(
-        dot(cross(before, after), normals), dot(before, after) - out_before * out_after
-    )
-    if not nodes.closed:
-        turning[nodes.first] = turning[nodes.last] = 0.0
-    return turning**2 / _ds(nodes)
+    return nodes.turns.angle**2 / nodes.ds
 
 
 def _no_pairs() -> IntArray:
@@ -221,6 +210,8 @@ class ElasticSystem:
     @property
     def diagonal(self) -> FloatArray:
         """Of the whole matrix, shape (n,)."""
+        if not len(self.pairs):
+            return self.bands[0]
         added = self.pair_entries[[0, 2]].ravel()
         return self.bands[0] + np.bincount(self.pairs.T.ravel(), added, len(self.slope))
 
@@ -234,9 +225,8 @@ def elastic_system(
     """
     n = len(nodes.positions)
     tension = _tension(nodes, weights)
-    bending, stretch, bending_by, stretch_by, drift = _linearised(surface, nodes, weights, tension)
-    bands = _squared(nodes, bending_by) + _squared(nodes, stretch_by)
-    slope = _transposed(nodes, bending_by, bending) + _transposed(nodes, stretch_by, stretch)
+    residuals, jacobian, drift = _linearised(surface, nodes, weights, tension)
+    bands, slope = _normal_equations(nodes, jacobian, residuals)
     if weights.held is not None:
         pull = np.where(nodes.phi_fea < 1.0, weights.feature * weights.held * drift, 0.0)
         bands[0] += pull * drift
@@ -281,21 +271,24 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
     A curve whose linearisation is not finite or zero, as where nodes coincide, does not move.
     """
     may = free.reshape(system.curves, -1)
-    both = [may & np.roll(may, -offset, axis=1) for offset in range(3)]
-    bands = np.where(np.reshape(both, system.bands.shape), system.bands, 0.0)
+    after, after_next = (np.concatenate([may[:, i:], may[:, :i]], axis=1) for i in (1, 2))
+    both = np.array([may, may & after, may & after_next]).reshape(system.bands.shape)
+    bands = np.where(both, system.bands, 0.0)
     greatest = np.where(free, system.diagonal, 0.0).reshape(may.shape).max(axis=1)
     bands[0] += np.where(may, (damping * greatest)[:, None], 1.0).ravel()
     right = np.where(free, -system.slope, 0.0)
-    one, other = system.pairs.T
-    ends = np.stack([free[one], free[one] & free[other], free[other]])
-    entries = np.where(ends, system.pair_entries, 0.0)
-    sums = bands.sum(axis=0) + right
-    np.add.at(sums, one, entries.sum(axis=0))
+    sums = bands[0] + bands[1] + bands[2] + right
+    entries = system.pair_entries
+    if len(system.pairs):
+        one, other = system.pairs.T
+        ends = np.array([free[one], free[one] & free[other], free[other]])
+        entries = np.where(ends, entries, 0.0)
+        sums += np.bincount(one, entries.sum(axis=0), len(right))
     sound = np.isfinite(sums).reshape(may.shape).all(axis=1) & (greatest > tolerances.TINY)
     if not sound.all():
-        still = np.repeat(~sound, may.shape[1])
+        still = sound.repeat(may.shape[1]) ^ True
         bands[:, still], bands[0, still], right[still] = 0.0, 1.0, 0.0
-        entries[:, still[one]] = 0.0
+        entries = np.where(still[system.pairs[:, 0]], 0.0, entries)
     if not len(system.pairs):
         return _solved(bands, right, system.curves)
     return _solved_with_pairs(bands, system.pairs, entries, right)
@@ -308,89 +301,94 @@ def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
 
 def _linearised(
     surface: CurveSurface, nodes: Nodes, weights: Balance, tension: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Residuals κ_g √ds and √(tension ds) of every node, and their derivatives by moves.
 
     Returns
     -------
-    (n,) float array
-    (n,) float array
-    (3, n) float array
-        Derivatives of the first by the moves of nodes i - 1, i and i + 1.
-    (3, n) float array
-        Of the second.
+    (2, n) float array
+    (3, 2, n) float array
+        Derivatives by the moves of nodes i - 1, i and i + 1.
     (n,) float array
         Derivative of φ_fea by the node's own move.
     """
     here = nodes.conormals.T
+    here_before, here_after = nodes.before_each(here), nodes.after_each(here)
     normal_turn, drift = nodes.conormal_derivatives(surface)
     turn, normal = normal_turn.T, nodes.normals.T
+    before, out_before, out_after, product, sine, cosine, angle = nodes.turns
     after = nodes.steps.T
-    before = nodes.before_each(after)
-    # Derivatives of the steps before and after by the moves of their two ends.
-    before_by = np.stack([-nodes.before_each(here), here])
-    after_by = np.stack([-here, nodes.after_each(here)])
-    if not nodes.closed:
-        before_by[:, :, nodes.first] = 0.0
-        after_by[:, :, nodes.last] = 0.0
-    out_before, out_after = dot(before, normal), dot(after, normal)
+    length_before, length_after = nodes.before_each(nodes.step_lengths), nodes.step_lengths
     flat_before, flat_after = before - out_before * normal, after - out_after * normal
     squared_before = np.maximum(dot(flat_before, flat_before), tolerances.TINY)
     squared_after = np.maximum(dot(flat_after, flat_after), tolerances.TINY)
-    product = cross(before, after)
-    sine, cosine = dot(product, normal), dot(flat_before, flat_after)
-    turning = np.arctan2(sine, cosine)
     by_before = cross(flat_before, normal) / squared_before
     by_after = cross(normal, flat_after) / squared_after
     by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
     # Divided one after the other: the product of two tiny squares may underflow.
     by_normal = (by_normal + cosine * dot(product, turn)) / squared_before / squared_after
-    turning_by = np.stack(
+    angle_by = np.array(
         [
-            dot(by_before, before_by[0]),
-            dot(by_before, before_by[1]) + dot(by_after, after_by[0]) + by_normal,
-            dot(by_after, after_by[1]),
+            -dot(by_before, here_before),
+            dot(by_before - by_after, here) + by_normal,
+            dot(by_after, here_after),
         ]
     )
-    if not nodes.closed:
-        turning[nodes.first] = turning[nodes.last] = 0.0
-        turning_by[:, nodes.first] = turning_by[:, nodes.last] = 0.0
-    length_before, length_after = np.sqrt(dot(before, before)), np.sqrt(dot(after, after))
     along_before = before / np.maximum(length_before, tolerances.TINY)
     along_after = after / np.maximum(length_after, tolerances.TINY)
     root = np.sqrt(np.maximum(0.5 * (length_before + length_after), tolerances.TINY))
-    root_by = np.stack(
+    root_by = np.array(
         [
-            dot(along_before, before_by[0]),
-            dot(along_before, before_by[1]) + dot(along_after, after_by[0]),
-            dot(along_after, after_by[1]),
+            -dot(along_before, here_before),
+            dot(along_before - along_after, here),
+            dot(along_after, here_after),
         ]
     ) / (4.0 * root)
-    bending = turning / root
+    if not nodes.closed:  # no step before the first node and after the last
+        ends = np.concatenate([nodes.first, nodes.last])
+        angle_by[:, ends] = 0.0
+        root_by[0, nodes.first] = root_by[2, nodes.last] = 0.0
+    bending = angle / root
     pulled = np.sqrt(np.maximum(tension, tolerances.TINY))
     stretch_by = pulled * root_by
     rising = np.where(nodes.phi_fea > 1.0, weights.feature * nodes.phi_fea * drift, 0.0)
     stretch_by[1] += rising / pulled * root
-    bending_by = (turning_by - bending * root_by) / root
-    return bending, pulled * root, bending_by, stretch_by, drift
+    bending_by = (angle_by - bending * root_by) / root
+    jacobian = np.stack([bending_by, stretch_by], axis=1)
+    return np.array([bending, pulled * root]), jacobian, drift
+
+
+@lru_cache(maxsize=64)
+def _folding(n: int, curves: int) -> tuple[IntArray, IntArray]:
+    """Where cyclic bands, (3, c, n), go in a banded matrix of all curves, (5, c n).
+
+    In the order 0, n-1, 1, n-2, …, entries coupled by the bands are at most four places apart.
+
+    Returns
+    -------
+    (n,) int array
+        The place of each node in this order.
+    (3 c n,) int array
+        The index of each entry in the matrix.
+    """
+    place = np.empty(n, dtype=np.int64)
+    place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
+    place[(n + 1) // 2 :] = 2 * np.arange(n // 2)[::-1] + 1
+    there = np.stack([np.roll(place, -offset) for offset in range(3)])
+    entry = np.abs(place - there) * (curves * n) + np.minimum(place, there)
+    return place, (entry[:, None] + n * np.arange(curves)[:, None]).ravel()
 
 
 def _solved(bands: FloatArray, right: FloatArray, curves: int) -> FloatArray:
     """Solve a positive definite cyclic banded system of each of some curves."""
     n = len(right) // curves
-    # In the order 0, n-1, 1, n-2, …, entries coupled by the bands are at most four places apart.
-    place = np.empty(n, dtype=np.int64)
-    place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
-    place[(n + 1) // 2 :] = 2 * np.arange(n // 2)[::-1] + 1
-    folded = np.zeros((5, n, curves))
-    for offset in range(3):
-        here, there = place, np.roll(place, -offset)
-        entries = bands[offset].reshape(curves, n).T
-        np.add.at(folded, (np.abs(here - there), np.minimum(here, there)), entries)
+    place, entry = _folding(n, curves)
+    matrix = np.bincount(entry, bands.ravel(), 5 * len(right)).reshape(5, -1)
     in_order = np.empty((curves, n))
     in_order[:, place] = right.reshape(curves, n)
-    matrix = folded.transpose(0, 2, 1).reshape(5, -1)
-    solved = linalg.solveh_banded(matrix, in_order.ravel(), lower=True, check_finite=False)
+    _, solved, fault = dpbsv(matrix, in_order.ravel(), lower=1, overwrite_ab=1, overwrite_b=1)
+    if fault:
+        raise linalg.LinAlgError(f"leading minor {fault} of a damped system is not positive")
     return solved.reshape(curves, n)[:, place].ravel()
 
 
@@ -411,29 +409,41 @@ def _solved_with_pairs(
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", options=symmetric).solve(right)
 
 
-def _squared(nodes: Nodes, jacobian: FloatArray) -> FloatArray:
-    """Bands of JᵀJ, shape (3, n)."""
+def _normal_equations(
+    nodes: Nodes, jacobian: FloatArray, residuals: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Bands of JᵀJ, (3, n), and Jᵀ r, (n,), for r residuals of each node, (r, n)."""
     left, middle, right = jacobian
-    return np.stack(
+
+    def product(one: FloatArray, other: FloatArray) -> FloatArray:
+        return (one * other).sum(axis=0)
+
+    shifted_left = nodes.after_each(
+        np.array([product(left, each) for each in (left, middle, right, residuals)])
+    )
+    shifted_right = nodes.before_each(
+        np.array([product(right, each) for each in (right, residuals)])
+    )
+    bands = np.array(
         [
-            nodes.before_each(right**2) + middle**2 + nodes.after_each(left**2),
-            middle * right + nodes.after_each(left * middle),
-            nodes.after_each(left * right),
+            shifted_right[0] + product(middle, middle) + shifted_left[0],
+            product(middle, right) + shifted_left[1],
+            shifted_left[2],
         ]
     )
-
-
-def _transposed(nodes: Nodes, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
-    """Jᵀ r, shape (n,)."""
-    left, middle, right = jacobian * residual
-    return nodes.after_each(left) + middle + nodes.before_each(right)
+    return bands, shifted_left[3] + product(middle, residuals) + shifted_right[1]
 
 
 def _product(system: ElasticSystem, move: FloatArray) -> FloatArray:
     """The matrix times moves, shape (n,)."""
     result = system.bands[0] * move
-    for offset, band in ((1, system.bands[1]), (2, system.bands[2])):
-        result += band * np.roll(move, -offset) + np.roll(band * move, offset)
+    for offset in (1, 2):
+        band = system.bands[offset]
+        onward = band * move
+        result += band * np.concatenate([move[offset:], move[:offset]])
+        result += np.concatenate([onward[-offset:], onward[:-offset]])
+    if not len(system.pairs):
+        return result
     one, other = system.pairs.T
     own, mixed, others = system.pair_entries
     result += np.bincount(one, own * move[one] + mixed * move[other], len(move))

@@ -16,14 +16,13 @@ from .curve_nodes import CurveSurface, Nodes
 from .elastic_energy import (
     Balance,
     ElasticSystem,
-    curve_energies,
     damped_step,
     elastic_energy,
     elastic_system,
     predicted_fall,
 )
 from .noded_curve import moved_along_conormals
-from .strand_contact import contacts_between
+from .strand_contact import Contacts, NearStrands
 
 DAMPING_NODES = 128
 """Number of nodes for which the damping is given."""
@@ -88,12 +87,31 @@ class Work:
 
 @dataclass(frozen=True)
 class Stepping:
-    """What the steps of one iteration share: the surface, the weights and the limits."""
+    """What the steps of one iteration share.
+
+    Attributes
+    ----------
+    surface : CurveSurface
+    weights : Balance
+    config : StepConfig
+    work : Work
+    strands : NearStrands or None
+        None if strands may cross.
+    """
 
     surface: CurveSurface
     weights: Balance
     config: StepConfig
     work: Work
+    strands: NearStrands | None = None
+
+    def contacts(self, nodes: Nodes) -> Contacts | None:
+        """Contacts of the nodes."""
+        return None if self.strands is None else self.strands.contacts(nodes)
+
+    def energy(self, nodes: Nodes) -> float:
+        """Energy of the nodes."""
+        return elastic_energy(nodes, self.weights, self.contacts(nodes))
 
 
 @dataclass(frozen=True)
@@ -123,10 +141,10 @@ class Moved:
     farthest: float  # move, in mean distances between nodes
 
 
-def linearised(surface: CurveSurface, nodes: Nodes, weights: Balance) -> Linearised:
+def linearised(stepping: Stepping, nodes: Nodes) -> Linearised:
     """The energy of nodes, and its linearisation about them."""
-    contacts = contacts_between(nodes) if weights.contact else None
-    energy = float(curve_energies(nodes, weights, contacts)[0])
+    surface, weights, contacts = stepping.surface, stepping.weights, stepping.contacts(nodes)
+    energy = elastic_energy(nodes, weights, contacts)
     return Linearised(nodes, energy, elastic_system(surface, nodes, weights, contacts))
 
 
@@ -171,20 +189,20 @@ def _first_step(
     stepping: Stepping, start: Linearised, free: BoolArray, damping: float
 ) -> Moved | None:
     """The least damped step that lowers the energy, or None."""
-    nodes, weights = start.nodes, stepping.weights
+    nodes = start.nodes
     while damping <= stepping.config.most_damping and free.any() and not stepping.work.exhausted():
         move = damped_step(start.system, free, damping)
         if not np.isfinite(move).all():
             return None
         move, farthest = _trusted(nodes, move, stepping.config)
         moved, stayed = _moved(stepping, nodes, move)
-        reached = elastic_energy(moved, weights)
+        reached = stepping.energy(moved)
         # The Gauss–Newton matrix is too stiff where the curve bends strongly. After such a
         # decrease, the parabola through both energies with this slope is lower at twice the step.
         fallen = start.energy - reached
         if fallen > 0.0 and fallen > -TWICE * float(start.system.slope @ move):
             farther, also_stayed = _moved(stepping, nodes, 2.0 * move)
-            reached_there = elastic_energy(farther, weights)
+            reached_there = stepping.energy(farther)
             if reached_there < reached:
                 return Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
         if fallen > 0.0:
@@ -200,14 +218,15 @@ def _further_step(
     nodes, free = moved.nodes, free & ~moved.stayed
     if not free.any() or stepping.work.exhausted():
         return None
-    system = elastic_system(stepping.surface, nodes, stepping.weights)
+    contacts = stepping.contacts(nodes)
+    system = elastic_system(stepping.surface, nodes, stepping.weights, contacts)
     move = damped_step(system, free, damping)
     if not np.isfinite(move).all() or predicted_fall(system, move) <= least:
         return None
     move, farthest = _trusted(nodes, move, stepping.config)
     for share in (1.0, 0.5):
         reached, stayed = _moved(stepping, nodes, share * move)
-        energy = elastic_energy(reached, stepping.weights)
+        energy = stepping.energy(reached)
         if energy < moved.energy:
             stayed = moved.stayed | stayed
             farthest = moved.farthest + share * farthest

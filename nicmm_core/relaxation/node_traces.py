@@ -7,6 +7,7 @@ on the mesh on which it is returned (`noded_curve`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csgraph
@@ -14,9 +15,10 @@ from scipy.sparse import csgraph
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import overlapping_segments, segments_meet
-from ..geometry.normals import unit_vectors
+from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
 from ..geometry.tracing import Traces, strictly_inside, trace_between
+from ..geometry.vectors import lengths, unit
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 
 DETOUR = 3.0
@@ -27,8 +29,29 @@ AROUND = 6.0
 
 
 @dataclass(frozen=True)
+class NodeTraces:
+    """Straight traces between the nodes of some curves, where they succeed.
+
+    Attributes
+    ----------
+    node : (p,) int array
+        The node before each point, ascending.
+    points : SurfacePoints
+        Points of the traces with both ends, each in the face of the segment after it.
+    """
+
+    node: IntArray
+    points: SurfacePoints
+
+    @cached_property
+    def is_last(self) -> BoolArray:
+        """Whether each point is the last one of its trace, (p,)."""
+        return np.append(np.diff(self.node) > 0, True)
+
+
+@dataclass(frozen=True)
 class TracedSegments:
-    """Straight traces between the nodes of some curves, as s segments in faces.
+    """Traces as s segments in faces.
 
     Attributes
     ----------
@@ -45,33 +68,18 @@ class TracedSegments:
     end: FloatArray
 
 
-def traced_segments(surface: CurveSurface, nodes: Nodes) -> TracedSegments:
-    """The segments of all traces that succeed."""
-    corners = surface.mesh.faces
-    node, points = _traces(surface, nodes)
-    last = np.append(np.diff(node) > 0, True)
-    begins = np.flatnonzero(~last)
-    face = points.faces[begins]
-    return TracedSegments(
-        node[begins],
-        face,
-        points.barycentric[begins, :2],
-        weights_at(
-            corners[points.faces[begins + 1]], points.barycentric[begins + 1], corners[face][:, :2]
-        ),
-    )
-
-
-def simple_curves(surface: CurveSurface, nodes: Nodes) -> BoolArray:
-    """Which curves do not cross themselves, (c,), where traces succeed."""
-    simple = np.ones(nodes.curves, dtype=bool)
-    simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
-    return simple
+def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
+    """The segments of traces."""
+    corners, points = mesh.faces, traces.points
+    begins = np.flatnonzero(~traces.is_last)
+    face, following = points.faces[begins], points[begins + 1]
+    end = weights_at(corners[following.faces], following.barycentric, corners[face][:, :2])
+    return TracedSegments(traces.node[begins], face, points.barycentric[begins, :2], end)
 
 
 def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next ones cross."""
-    segments = traced_segments(surface, nodes)
+    segments = traced_segments(surface.mesh, traces_between_nodes(surface, nodes))
     size = len(nodes.positions) // nodes.curves
     curve = segments.node // size
     group = curve * len(surface.mesh.faces) + segments.face
@@ -108,7 +116,8 @@ def with_midpoints(
         The fixed ones of these.
     """
     begins = nodes.with_step
-    middle = places_along(surface, nodes, begins, np.full(len(begins), 0.5))
+    traces = traces_between_nodes(surface, nodes)
+    middle = places_along(surface, nodes, traces, begins, np.full(len(begins), 0.5))
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
     faces[begins], barycentric[begins] = middle.faces, middle.barycentric
     both = np.stack([nodes.places.faces, faces], axis=1).ravel()
@@ -122,17 +131,17 @@ def with_midpoints(
 
 
 def places_along(
-    surface: CurveSurface, nodes: Nodes, node: IntArray, share: FloatArray
+    surface: CurveSurface, nodes: Nodes, traces: NodeTraces, node: IntArray, share: FloatArray
 ) -> SurfacePoints:
     """Points at a share of the traces from some nodes, (q,), to the next ones, inside faces.
 
     Where a trace fails, as around a thin part, the point lies on the shortest path along edges.
     """
     faces, barycentric = np.zeros(len(node), dtype=np.int64), np.zeros((len(node), 3))
-    owner, points = _traces(surface, nodes)
-    positions = points.positions(surface.mesh)
-    step = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
-    step[np.append(np.diff(owner) > 0, True)] = 0.0
+    owner, points = traces.node, traces.points
+    positions = points.positions(surface.mesh).T
+    step = np.append(lengths(np.diff(positions)), 0.0)
+    step[traces.is_last] = 0.0
     arc = np.append(0.0, np.cumsum(step))
     first = np.searchsorted(owner, node)
     last = np.searchsorted(owner, node, side="right") - 1
@@ -151,8 +160,8 @@ def places_along(
     return SurfacePoints(faces, strictly_inside(barycentric))
 
 
-def _traces(surface: CurveSurface, nodes: Nodes) -> tuple[IntArray, SurfacePoints]:
-    """Points of the traces that succeed, with both ends, and the node before each, ascending."""
+def traces_between_nodes(surface: CurveSurface, nodes: Nodes) -> NodeTraces:
+    """The traces from all nodes to the next ones."""
     node, following = nodes.with_step, nodes.following
     places = SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric))
     start, end = places[node], places[following[node]]
@@ -162,7 +171,7 @@ def _traces(surface: CurveSurface, nodes: Nodes) -> tuple[IntArray, SurfacePoint
     rank = np.repeat([0, 1, 2], [len(reached), len(traces.pair), len(reached)])
     order = np.lexsort((rank, owner))  # stable, so crossings stay in order
     points = joined([start[reached], traces.crossings, end[reached]])[order]
-    return node[owner[order]], points
+    return NodeTraces(node[owner[order]], points)
 
 
 def traces_of_steps(
@@ -202,7 +211,7 @@ def traces_of_steps(
     before = np.where(goes_on, -backward[start], -onward[start])
     after = np.where(goes_on, -onward[end], -backward[end])
     length = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
-    ahead = unit_vectors(before) + unit_vectors(after)
+    ahead = unit(before.T).T + unit(after.T).T
     longest = DETOUR * np.maximum(distance[lost], length)
     found = trace_between(mesh, places[start], places[end], ahead, longest, surface.folded, ahead)
     reached = traces.reached.copy()

@@ -200,7 +200,11 @@ def shifted(
     """
     going = np.flatnonzero(length)
     targets, stuck, passed = trace_from(
-        surface.mesh, nodes.places[going], direction[going], length[going], surface.folded
+        surface.mesh,
+        nodes.places[going],
+        direction.T.take(going, axis=1).T,
+        length.take(going),
+        surface.folded,
     )
     faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
     faces[going], barycentric[going] = targets.faces, targets.barycentric

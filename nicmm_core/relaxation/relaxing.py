@@ -27,7 +27,7 @@ from ..geometry.curve import SurfaceCurve
 from ..progress import CancelledError
 from ..status import Status
 from .curve_nodes import CurveSurface, Nodes
-from .elastic_energy import balance, bending_energy, elastic_energy, feature_energy
+from .elastic_energy import balance, bending_energy, feature_energy
 from .levenberg_marquardt import (
     DAMPING_FACTOR,
     Linearised,
@@ -48,6 +48,7 @@ from .noded_curve import (
     traced_through,
     without_short_segments,
 )
+from .strand_contact import NearStrands
 
 
 @dataclass(frozen=True)
@@ -343,8 +344,9 @@ class _Attempt:
 
     def _state(self, curve: NodedCurve, nodes: Nodes, held: BoolArray, taut: float) -> _State:
         weights = balance(self.surface, nodes, self.smoothness, self.simple, taut)
-        stepping = Stepping(self.surface, weights, self.config.stepping, self.work)
-        return _State(curve, linearised(self.surface, nodes, weights), held, stepping)
+        strands = NearStrands(nodes) if self.simple else None
+        stepping = Stepping(self.surface, weights, self.config.stepping, self.work, strands)
+        return _State(curve, linearised(stepping, nodes), held, stepping)
 
     def _iteration(self, state: _State, damping: float) -> _Iteration | None:
         """Steps from a curve, retraced unless deferred; None if no step lowers the energy."""
@@ -363,7 +365,7 @@ class _Attempt:
                     continue
                 nodes, stayed = curve.nodes, stayed | kept
                 if kept.any():
-                    energy = elastic_energy(nodes, stepping.weights)
+                    energy = stepping.energy(nodes)
             if energy < state.here.energy:
                 damping = less_damping(moved, stepping.config)
                 return _Iteration(curve, nodes, energy, stayed, damping, moved.farthest)

@@ -3,7 +3,7 @@
 The steps are those of `levenberg_marquardt`, with all nodes of all curves in one set of arrays,
 since the number of calls and not of nodes decides the time. Each curve has its own damping and
 takes or rejects its own steps. A curve may cross itself, although the contact term resists it;
-`node_traces.simple_curves` tells whether it has.
+`node_traces.crossing_steps` tells where it does.
 """
 
 from __future__ import annotations
@@ -134,8 +134,8 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     size = len(nodes.positions) // nodes.curves
     place = (which[:, None] * size + np.arange(size)).ravel()
     return Nodes(
-        nodes.places[place], nodes.closed, nodes.positions[place], nodes.normals[place],
-        nodes.phi_fea[place], len(which),
+        nodes.places[place], nodes.closed, nodes.positions.T.take(place, axis=1).T,
+        nodes.normals.T.take(place, axis=1).T, nodes.phi_fea.take(place), len(which),
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.vectors import dot, lengths
 from .curve_nodes import Nodes
 
 CLEARANCE = 2.0
@@ -19,6 +20,10 @@ ALONG = 4.0
 
 SAME_SIDE = 0.3
 """Least cosine between two normals; excludes strands on opposite sides of a thin part."""
+
+
+NEARBY = 2.0
+"""Distance, in clearances, of nodes that are tested for contact again after short moves."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +50,21 @@ def contacts_between(nodes: Nodes) -> Contacts:
     return contacts_of_pairs(nodes, close_pairs(nodes))
 
 
-def close_pairs(nodes: Nodes) -> IntArray:
-    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve."""
+def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
+    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve.
+
+    Close are those within a reach, in clearances.
+    """
     lengths = nodes.by_curve(nodes.step_lengths)
     total = lengths.sum(axis=1)
-    clearance = _clearance(nodes)
+    clearance = nodes.spread(_clearances(nodes))
     places = nodes.positions / clearance[:, None]
     if nodes.curves > 1:
         # Another dimension keeps curves apart.
-        curve = nodes.spread(2.0 * np.arange(nodes.curves))
+        curve = nodes.spread(2.0 * reach * np.arange(nodes.curves))
         places = np.concatenate([places, curve[:, None]], axis=1)
-    pairs = cKDTree(places).query_pairs(1.0, output_type="ndarray")
+    tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
+    pairs = tree.query_pairs(reach, output_type="ndarray")
     arc = (np.cumsum(lengths, axis=1) - lengths).ravel()
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
@@ -63,25 +72,53 @@ def close_pairs(nodes: Nodes) -> IntArray:
     return pairs[along > ALONG * clearance[pairs[:, 0]]]
 
 
+class NearStrands:
+    """Pairs of nodes of one curve that may be in contact, sought again only after long moves.
+
+    Where they are sought it is also decided which nodes are far enough apart along the curve.
+
+    Parameters
+    ----------
+    nodes : Nodes
+    """
+
+    def __init__(self, nodes: Nodes) -> None:
+        self._seek(nodes)
+
+    def contacts(self, nodes: Nodes) -> Contacts:
+        """Contacts of the same nodes at other places."""
+        moved = float(lengths(nodes.positions.T - self._positions.T).max())
+        if 2.0 * moved + _clearances(nodes)[0] > self._reach:
+            self._seek(nodes)
+        return contacts_of_pairs(nodes, self._pairs)
+
+    def _seek(self, nodes: Nodes) -> None:
+        self._positions, self._reach = nodes.positions, NEARBY * _clearances(nodes)[0]
+        self._pairs = close_pairs(nodes, NEARBY)
+
+
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
     """Those of some pairs that are closer than the clearance, on the same side of the surface."""
-    clearance = _clearance(nodes)[pairs[:, 0]]
-    normals, positions = nodes.normals[pairs], nodes.positions[pairs]
-    offset = positions[:, 0] - positions[:, 1]
-    distance = np.maximum(np.linalg.norm(offset, axis=1), tolerances.TINY)
-    kept = (normals[:, 0] * normals[:, 1]).sum(axis=1) > SAME_SIDE
-    kept &= distance < clearance
-    pairs, distance, clearance = pairs[kept], distance[kept], clearance[kept]
-    direction = offset[kept] / distance[:, None]
-    approach = np.einsum("pd,pkd->pk", direction, nodes.conormals[pairs]) * [-1.0, 1.0]
-    return Contacts(pairs, 1.0 - distance / clearance, approach / clearance[:, None])
+    ends, size = pairs.T, len(nodes.positions) // nodes.curves
+    clearance = _clearances(nodes).take(ends[0] // size)
+    one, other = (nodes.positions.take(end, axis=0).T for end in ends)
+    distance = np.maximum(lengths(one - other), tolerances.TINY)
+    close = np.flatnonzero(distance < clearance)
+    pairs, ends, offset = pairs[close], ends[:, close], (one - other)[:, close]
+    distance, clearance = distance[close], clearance[close]
+    facing = dot(*(nodes.normals.take(end, axis=0).T for end in ends)) > SAME_SIDE
+    pairs, distance, clearance = pairs[facing], distance[facing], clearance[facing]
+    away, towards = (
+        dot(offset[:, facing], nodes.conormals.take(end[facing], axis=0).T) for end in ends
+    )
+    approach = np.array([-away, towards]) / (distance * clearance)
+    return Contacts(pairs, 1.0 - distance / clearance, approach.T)
 
 
-def _clearance(nodes: Nodes) -> FloatArray:
-    """The clearance of the curve of each node, (n,)."""
+def _clearances(nodes: Nodes) -> FloatArray:
+    """The clearance of each curve, (c,)."""
     lengths = nodes.by_curve(nodes.step_lengths)
     steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
     # A curve without length has a clearance too.
     least = max(tolerances.TINY, tolerances.ROUNDED * float(np.abs(nodes.positions).max()))
-    mean = np.maximum(lengths.sum(axis=1) / steps, least)
-    return nodes.spread(CLEARANCE * mean)
+    return CLEARANCE * np.maximum(lengths.sum(axis=1) / steps, least)

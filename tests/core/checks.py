@@ -9,6 +9,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import strictly_inside, trace_between
+from nicmm_core.relaxation.node_traces import crossing_steps
 from tests.oracles.checker import judge_curve
 
 
@@ -166,3 +167,10 @@ def grid(count):
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
     return nicmm.Mesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def simple_curves(surface, nodes):
+    """Which curves do not cross themselves, (c,), where traces succeed."""
+    simple = np.ones(nodes.curves, dtype=bool)
+    simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
+    return simple

@@ -1,5 +1,7 @@
 """Work is bounded by counts, so that the same request always ends the same way."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,36 @@ def fan(count):
             ]
         ),
     )
+
+
+MOST_CALLS = 60_000
+"""Calls in Python and C of one design on a mesh of 4,002 vertices."""
+
+
+def calls_of(task):
+    """Number of calls of functions in Python and C that a task makes."""
+    count = 0
+
+    def seen(frame, event, argument):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(seen)
+    try:
+        task()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_a_design_makes_few_calls():
+    """On a small mesh calls are the cost, and hardly anything is done one by one."""
+    body = shapes.creature(0, faces=500, subdivisions=2)
+    nicmm.design_curve(body, [12, 800, 1641, 2500], order="shortest")  # what is loaded once
+    designer = nicmm.Designer(nicmm.Mesh(body.vertices, body.faces))
+    for points in ([12, 800, 1641, 2500], [40, 1000, 1900, 3000]):
+        calls = calls_of(lambda points=points: designer.design(points, order="shortest"))
+        assert 0 < calls <= MOST_CALLS
 
 
 def test_a_fan_of_thousands_of_needles(monkeypatch):

@@ -7,12 +7,13 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
 from nicmm_core.courses.course_search import farthest_between, find_courses
-from nicmm_core.courses.hop_graph import build_hop_graph
+from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
 from nicmm_core.courses.leg_combinations import CROSSING, combined, crossing_routes, laid_routes
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from nicmm_core.relaxation.elastic_energy import bending_energy, comparable_energies
+from nicmm_core.relaxation.node_traces import traces_between_nodes
 from tests.core.checks import assert_valid_design, points_near, random_surface_points
 from tests.core.courses.test_hop_graph import LEGS, graph_through
 
@@ -26,7 +27,8 @@ def test_combinations_that_cross_cost_more(body):
     graph = graph_through(body, body.vertices[[5, 100, 700]])
     routes = routes_of_legs(graph, LEGS, closed=True)
     nodes = laid_routes(graph, routes, 1.0)
-    crosses = crossing_routes(graph, routes, nodes)
+    traces = traces_between_nodes(graph.graph.surface, nodes)
+    crosses = crossing_routes(graph, routes, nodes, traces)
     assert crosses.any() and not crosses.all()
     offset = np.cumsum([0, *(len(leg.cells) for leg in routes)])[:-1]
 
@@ -57,7 +59,8 @@ def test_courses_pass_their_points(body, closed):
     points = random_surface_points(body, 4, seed=3)
     graph, fixed = build_hop_graph(surface, 0), np.ones(4, dtype=bool)
     for any_order in (False, True):
-        found = list(find_courses(graph, surface, points, fixed, closed, 1.0, any_order))
+        along = distances_along_edges(surface, points)
+        found = list(find_courses(graph, surface, points, along, fixed, closed, 1.0, any_order))
         assert found
         for nodes, visit in found:
             order = visit[visit >= 0]
@@ -76,7 +79,8 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
     points = points_near(ball, on_circle)
     graph = build_hop_graph(surface, 0)
-    nodes, _ = next(find_courses(graph, surface, points, np.ones(3, bool), True, 1.0, False))
+    along, fixed = distances_along_edges(surface, points), np.ones(3, bool)
+    nodes, _ = next(find_courses(graph, surface, points, along, fixed, True, 1.0, False))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
     energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
     assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from nicmm_core import shapes
-from nicmm_core.courses.hop_graph import build_hop_graph, with_control_points
+from nicmm_core.courses.hop_graph import (
+    SHARPEST,
+    build_hop_graph,
+    distances_along_edges,
+    with_control_points,
+)
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.core.checks import grid, points_near
@@ -15,7 +20,8 @@ LEGS = np.array([[0, 1], [1, 2], [2, 0]])
 def graph_through(mesh, positions, legs=LEGS, tension=160.0):
     surface = curve_surface(mesh)
     points = points_near(mesh, np.asarray(positions, dtype=float))
-    return with_control_points(build_hop_graph(surface, 0), points, legs, None, tension)
+    along = distances_along_edges(surface, points)
+    return with_control_points(build_hop_graph(surface, 0), points, along, legs, None, tension)
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +97,16 @@ def test_hops_between_neighbouring_control_points_need_no_cell():
     for start, end in LEGS:
         assert np.isfinite(graph.by_state(start, end)).any()
     assert all(len(leg.cells) for leg in routes_of_legs(graph, LEGS, closed=True))
+
+
+def test_no_hop_goes_on_with_a_turn_sharper_than_allowed_and_others_do(body):
+    graph = build_hop_graph(curve_surface(body), 0)
+    indptr, after, _ = graph.arcs
+    before = np.repeat(np.arange(len(graph.reverse)), np.diff(indptr))
+    cosine = (graph.hops.arriving[before] * graph.hops.leaving[after]).sum(axis=1)
+    assert (cosine >= np.cos(SHARPEST) - 1e-12).all()
+    assert (cosine < 0.0).any()
+    # Every hop that turns less follows: as many pairs as among all hops from the same cell.
+    pairs = graph.hops.end[:, None] == graph.hops.start
+    turns = np.einsum("ad,bd->ab", graph.hops.arriving, graph.hops.leaving)
+    assert np.count_nonzero(pairs & (turns >= np.cos(SHARPEST))) == len(after)

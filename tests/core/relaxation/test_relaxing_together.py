@@ -13,9 +13,9 @@ from nicmm_core.relaxation.elastic_energy import (
     elastic_energy,
     elastic_system,
 )
-from nicmm_core.relaxation.node_traces import simple_curves, with_midpoints
+from nicmm_core.relaxation.node_traces import with_midpoints
 from nicmm_core.relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
-from tests.core.checks import circle, points_near
+from tests.core.checks import circle, points_near, simple_curves
 
 SIZE = 40
 

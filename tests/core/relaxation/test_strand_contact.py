@@ -8,7 +8,7 @@ import pytest
 from nicmm_core import shapes
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
-from nicmm_core.relaxation.strand_contact import CLEARANCE, contacts_between
+from nicmm_core.relaxation.strand_contact import CLEARANCE, NearStrands, contacts_between
 from tests.core.checks import circle, points_near, scaled
 
 STEP = 0.02
@@ -134,3 +134,23 @@ def test_faces_turned_over_in_one_piece_do_not_matter(flat_disc):
     turned = type(flat_disc)(flat_disc.vertices, flat_disc.faces[:, ::-1])
     here, there = (seen_by_nodes(lanes(mesh, STEP)) for mesh in (flat_disc, turned))
     np.testing.assert_array_equal(np.bincount(here.node), np.bincount(there.node))
+
+
+@pytest.mark.parametrize("gap", [0.5, 0.9, 1.1, 1.9, 2.5, 4.0])
+def test_strands_sought_at_other_places_have_the_contacts_of_the_present_ones(flat_disc, gap):
+    """Short moves and long ones, of lanes that were out of reach of each other, or within it.
+
+    Near the turn, where nodes are hardly far enough apart along the curve, the old places decide.
+    """
+    present = lanes(flat_disc, gap * STEP)
+
+    def of_straight_parts(contacts):
+        pairs = np.sort(contacts.pairs, axis=1)
+        kept = (pairs < 25).any(axis=1)
+        return dict(zip(map(tuple, pairs[kept].tolist()), contacts.overlap[kept], strict=True))
+
+    expected = of_straight_parts(contacts_between(present))
+    assert (len(expected) > 0) == (gap < 2.0)
+    for before in (1.0, 1.8, 3.0):
+        found = NearStrands(lanes(flat_disc, before * STEP)).contacts(present)
+        assert of_straight_parts(found) == pytest.approx(expected)
