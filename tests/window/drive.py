@@ -3,7 +3,7 @@
 """Drives the editing tool in a Blender window by mouse and keys; takes a picture of each step.
 
     python3 build.py package
-    python3 tests/window/drive.py dist/ZIP --shots FOLDER [--blender COMMAND] [--size 1280x800]
+    python3 tests/window/drive.py dist/ZIP --shots FOLDER [--blender COMMAND] [--size 1422x800]
 
 Needs Blender, Xvfb, xdotool and ImageMagick's `import` and `convert`. Of this project it needs only
 the zip, so it runs with any Python 3. Each step checks the state of Blender; a failed step ends the
@@ -32,8 +32,8 @@ PATIENCE = 60.0
 HOLD = 1.5
 """Seconds that a key is held about a click."""
 
-CROP = "1048x800+0+0"
-"""The part of the screen in pictures: the 3D viewport."""
+CROP = "1422x800+0+0"
+"""The part of the screen in pictures, 16:9."""
 
 FRAME = 30.0
 """Milliseconds of CPU that a move of a drag may take by the median."""
@@ -645,6 +645,7 @@ def convert(blender: Blender) -> None:
     path = str(blender.folder / "again.blend")
     blender.do(f"bpy.ops.wm.save_as_mainfile(filepath={path!r})")
     open_again(blender, path)
+    blender.do("helper.activate_mesh()")
     choose_tool(blender)
     (on_curve,) = blender.do(
         "line = bpy.data.objects['Suzanne Curve'].data.splines[0].points\n"
@@ -726,7 +727,7 @@ def main() -> None:
     parser.add_argument("archive", type=Path, help="zip of the extension for this Blender")
     parser.add_argument("--shots", type=Path, required=True, help="folder for the pictures")
     parser.add_argument("--blender", default="blender", help="how to call Blender")
-    parser.add_argument("--size", default="1280x800", help="of the screen")
+    parser.add_argument("--size", default="1422x800", help="of the screen")
     parser.add_argument("--parts", default=",".join(PARTS), help="parts of the drive")
     arguments = parser.parse_args()
     missing = [tool for tool in ("Xvfb", "xdotool", "import", "convert") if not shutil.which(tool)]

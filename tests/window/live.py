@@ -156,7 +156,7 @@ def main() -> None:
     parser.add_argument("archive", type=Path, help="zip of the extension for this Blender")
     parser.add_argument("--shots", type=Path, required=True, help="folder for the pictures")
     parser.add_argument("--blender", default="blender", help="how to call Blender")
-    parser.add_argument("--size", default="1280x800", help="of the screen")
+    parser.add_argument("--size", default="1422x800", help="of the screen")
     parser.add_argument("--idle", type=float, default=IDLE, help="seconds of each measurement")
     arguments = parser.parse_args()
     arguments.shots.mkdir(parents=True, exist_ok=True)
