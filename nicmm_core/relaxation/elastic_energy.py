@@ -69,7 +69,7 @@ class Balance:
 
 
 def balance(
-    surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, taut: float = 1.0
+    surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, tension_factor: float = 1.0
 ) -> Balance:
     """The weights for a curve.
 
@@ -81,12 +81,12 @@ def balance(
         Divides the tension and the weight of a map.
     apart : bool
         Whether strands are kept apart.
-    taut : float
+    tension_factor : float
         Factor of the tension alone.
     """
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     tension = _weight(nodes, (2.0 * np.pi / lengths) ** 2 / smoothness)
-    weights = Balance(taut * tension, 0.0)
+    weights = Balance(tension_factor * tension, 0.0)
     if surface.feature_map is not None:
         feature = surface.feature_weight / smoothness + OVER_TENSION * tension
         weights = replace(weights, feature=feature, held=nodes.ds)

@@ -66,7 +66,7 @@ class RelaxationConfig:
         has converged.
     least_decrease_before : float
         The same for the levels before.
-    stretch : float
+    spacing_ratio : float
         Ratio of the longest to the shortest step of a leg above which nodes are respaced.
     iterations : int
         Cap over all levels of one attempt.
@@ -76,7 +76,7 @@ class RelaxationConfig:
         Cap on the `Work` of one attempt.
     defer_tracing : bool
         Whether a first attempt traces the curve only after convergence.
-    taut : float
+    tension_factor : float
         Above 1, an additional first pass with the fewest nodes multiplies the tension by this.
     """
 
@@ -84,15 +84,15 @@ class RelaxationConfig:
     stepping: StepConfig = field(default_factory=StepConfig)
     least_decrease: float = 2e-3
     least_decrease_before: float = 0.1
-    stretch: float = 1.6
+    spacing_ratio: float = 1.6
     iterations: int = 100
     most_iterations: int = 200
     work: float = 800.0
     defer_tracing: bool = False
-    taut: float = 1.0
+    tension_factor: float = 1.0
 
 
-GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, taut=30.0)
+GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, tension_factor=30.0)
 """Settings for maps with lanes: the curve must find a lane with few nodes, since many hardly move.
 
 Few nodes take long steps. These may inflate a fold of the start into an arc from lane to lane, a
@@ -276,13 +276,13 @@ class _Attempt:
         """Relax the curve level by level; None if it cannot be traced."""
         config, curve = self.config, self.traced
         passes = [(level, 1.0) for level in config.levels]
-        if config.taut > 1.0:
-            passes.insert(0, (config.levels[0], config.taut))
+        if config.tension_factor > 1.0:
+            passes.insert(0, (config.levels[0], config.tension_factor))
         try:
-            for number, (level, taut) in enumerate(passes):
+            for number, (level, tension_factor) in enumerate(passes):
                 last = number == len(passes) - 1
                 least = config.least_decrease if last else config.least_decrease_before
-                curve = self._level(curve, level, least, taut)
+                curve = self._level(curve, level, least, tension_factor)
                 if self.status is not Status.CONVERGED:
                     break
         except _LostError:
@@ -292,7 +292,9 @@ class _Attempt:
             return self.traced
         return curve
 
-    def _level(self, curve: NodedCurve, level: int, least: float, taut: float) -> NodedCurve:
+    def _level(
+        self, curve: NodedCurve, level: int, least: float, tension_factor: float
+    ) -> NodedCurve:
         """Iterate with one number of nodes until the decrease of the energy is below the least."""
         config, least_damping = self.config, self.config.stepping.least_damping(level)
         damping = least_damping
@@ -302,7 +304,7 @@ class _Attempt:
         releases = stalled = 0
         least_energy = np.inf
         while True:
-            state = self._state(curve, nodes, held, taut)
+            state = self._state(curve, nodes, held, tension_factor)
             before = state.here.energy
             scale = max(bending_energy(nodes), STRAIGHT * before)
             done = None
@@ -336,14 +338,16 @@ class _Attempt:
                 releases, damping = releases + 1, least_damping
                 held = np.zeros(len(held), dtype=bool)
             moved = done is not None and done.farthest > SMALL_MOVE
-            if moved and _unevenness(nodes, curve.control_nodes) > config.stretch:
+            if moved and _unevenness(nodes, curve.control_nodes) > config.spacing_ratio:
                 curve = self.traced = self._respaced(self._traced(curve, nodes), level)
                 nodes = curve.nodes
                 held = np.zeros(len(nodes.positions), dtype=bool)
         return self._traced(curve, nodes)
 
-    def _state(self, curve: NodedCurve, nodes: Nodes, held: BoolArray, taut: float) -> _State:
-        weights = balance(self.surface, nodes, self.smoothness, self.simple, taut)
+    def _state(
+        self, curve: NodedCurve, nodes: Nodes, held: BoolArray, tension_factor: float
+    ) -> _State:
+        weights = balance(self.surface, nodes, self.smoothness, self.simple, tension_factor)
         strands = NearStrands(nodes) if self.simple else None
         stepping = Stepping(self.surface, weights, self.config.stepping, self.work, strands)
         return _State(curve, linearised(stepping, nodes), held, stepping)
@@ -381,7 +385,7 @@ class _Attempt:
     def _respaced(self, curve: NodedCurve, level: int) -> NodedCurve:
         """Respace the nodes, unless that would make strands touch."""
         alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
-        if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.stretch:
+        if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.spacing_ratio:
             return curve
         changed = respaced(self.surface, curve, level)
         if self.simple and not is_simple(self.surface, changed):

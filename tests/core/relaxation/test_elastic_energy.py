@@ -165,7 +165,7 @@ def test_a_taut_curve_has_more_tension_and_the_same_map(flat_disc, mapped):
     surface = surface_of(flat_disc, feature_map, 7.0)
     nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), True)
     plain = balance(surface, nodes, 2.0, apart=False)
-    taut = balance(surface, nodes, 2.0, apart=False, taut=30.0)
+    taut = balance(surface, nodes, 2.0, apart=False, tension_factor=30.0)
     assert taut.tension == pytest.approx(30.0 * plain.tension)
     assert taut.feature == plain.feature
     assert bool(plain.feature) is mapped

@@ -225,7 +225,7 @@ def states(mesh, curve, config=DEFAULT, smoothness=1.0):
 @pytest.mark.parametrize("smoothness", [0.3, 1.0, 5.0])
 def test_the_energy_never_rises(flat_disc, smoothness):
     """Without respacing nodes, which moves the places where they sample the curve."""
-    config = RelaxationConfig(levels=(128,), stretch=np.inf)
+    config = RelaxationConfig(levels=(128,), spacing_ratio=np.inf)
     _, seen = states(flat_disc, star(flat_disc), config, smoothness)
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
     values = []
