@@ -406,8 +406,10 @@ def picking(blender: Blender) -> None:
     check(second != first, "another curve")
     time.sleep(0.6)
     (on_first,) = blender.do(
+        # The foremost place beside the middle is seen, and far from the second curve.
         f"line = bpy.data.objects[{first!r}].data.splines[0].points\n"
-        "value = helper.pixels([list(line[int(len(line) * 0.07)].co[:3])])"
+        "beside = [point.co for point in line if abs(point.co[0]) > 0.4]\n"
+        "value = helper.pixels([list(min(beside, key=lambda place: place[1])[:3])])"
     )
     blender.move(on_first)
     time.sleep(0.5)
@@ -649,7 +651,9 @@ def convert(blender: Blender) -> None:
     choose_tool(blender)
     (on_curve,) = blender.do(
         "line = bpy.data.objects['Suzanne Curve'].data.splines[0].points\n"
-        "value = helper.pixels([list(line[int(len(line) * 0.07)].co[:3])])"
+        # The foremost place beside the middle is seen, and far from the second curve.
+        "beside = [point.co for point in line if abs(point.co[0]) > 0.4]\n"
+        "value = helper.pixels([list(min(beside, key=lambda place: place[1])[:3])])"
     )
     blender.click(on_curve)
     count_points(blender, 5)
