@@ -14,7 +14,7 @@ from ..scene.messages import in_words
 ITERATIONS = 3
 """Iterations for a move at most, which take one or two frames."""
 
-POINTS = 3000
+POINTS = 2000
 """Points of the curve times iterations for a move: an iteration takes time for every point."""
 
 MOST_STEPS = 60
