@@ -85,10 +85,11 @@ def _runtime(results: Results) -> str:
     }
     ratio = float(np.median(mean["nicmm"] / mean["variational"]))
     seconds = report.listed(f"`{method}` {mean[method].mean():.2f} s" for method in methods)
-    return (
+    return textwrap.fill(
         f"A first curve takes {seconds} on average over {len(sets)} meshes of some 4,000 vertices "
         f"(`python -m benchmarks runtime`); `nicmm` takes {ratio:.2f} of the time of "
-        "`variational`, median of the sets."
+        "`variational`, median of the sets.",
+        118,
     )
 
 

@@ -223,8 +223,11 @@ def _is_shown(context, candidate) -> bool:
     space = context.space_data
     if candidate.name not in context.view_layer.objects or not candidate.visible_get():
         return False
-    in_view = space is not None and space.type == "VIEW_3D"
-    return not in_view or candidate.visible_in_viewport_get(space)
+    if space is None or space.type != "VIEW_3D":
+        return True
+    if space.local_view:  # before Blender 5 the other question is answered wrongly there
+        return candidate.local_view_get(space)
+    return candidate.visible_in_viewport_get(space)
 
 
 def _is_behind_another(context, mesh_object, view: View, pixel, position) -> bool:
