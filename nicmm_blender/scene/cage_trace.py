@@ -133,7 +133,7 @@ def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces
 
 
 def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, (k,), -1 where there is none, and barycentrics, (k, 3), of points in the cage."""
+    """Triangles, (k,), -1 where unknown, and barycentrics, (k, 3), of points in the cage."""
     faces, barycentric = np.full(len(places.faces), -1), np.zeros((len(places.faces), 3))
     triangles = _TrianglesOf(surface, places.faces)
     for number, (face, copy) in enumerate(zip(places.faces, places.copies, strict=True)):

@@ -225,9 +225,9 @@ def _is_shown(context, candidate) -> bool:
         return False
     if space is None or space.type != "VIEW_3D":
         return True
-    if space.local_view:  # before Blender 5 the other question is answered wrongly there
-        return candidate.local_view_get(space)
-    return candidate.visible_in_viewport_get(space)
+    # Before Blender 5 only the evaluated object knows of the local view.
+    shown = candidate.evaluated_get(context.evaluated_depsgraph_get())
+    return shown.visible_in_viewport_get(space)
 
 
 def _is_behind_another(context, mesh_object, view: View, pixel, position) -> bool:
