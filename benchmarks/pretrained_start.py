@@ -121,7 +121,7 @@ def section(results: Results) -> str:
 def draw(results: Results, folder: Path) -> None:
     """Draw how far from the best known the curves of each start end."""
     figure, axes = plots.labelled(
-        "Curves at rest from several starts",
+        "Converged curves from several starts",
         "L ∫ κ_g² ds relative to the best known",
         "share of the sets",
     )

@@ -31,6 +31,14 @@ POSITION = bpy.props.FloatVectorProperty(
 )
 
 
+INDEX = bpy.props.IntProperty(
+    name="Point",
+    description="Index of the control point",
+    min=0,
+    options={"SKIP_SAVE"},
+)
+
+
 class _ChangesPoints(LongSolves):
     """Designs a curve through other points; a mixin with `changed(opened)`."""
 
@@ -136,12 +144,7 @@ class NICMM_OT_move_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     curve: CURVE
-    index: bpy.props.IntProperty(
-        name="Point",
-        description="Index of the control point",
-        min=0,
-        options={"SKIP_SAVE"},
-    )
+    index: INDEX
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
@@ -158,12 +161,7 @@ class NICMM_OT_remove_point(_ChangesPoints, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     curve: CURVE
-    index: bpy.props.IntProperty(
-        name="Point",
-        description="Index of the control point",
-        min=0,
-        options={"SKIP_SAVE"},
-    )
+    index: INDEX
 
     def changed(self, opened):
         return edited_curve.without_point(opened.points, self.checked_index(opened))
