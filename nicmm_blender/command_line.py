@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from . import settings
+from .scene.membership import is_in
 from .scene.messages import InputError
 
 COMMAND = "nicmm"
@@ -63,7 +64,7 @@ def activate(name: str | None) -> None:
                 f'--object: there is no object "{name}" in the file. Its meshes are '
                 + ", ".join(f'"{mesh}"' for mesh in meshes)
             )
-        if chosen.name not in context.view_layer.objects:
+        if not is_in(context.view_layer, chosen):
             raise InputError(
                 f'--object: "{name}" is not in the view layer "{context.view_layer.name}", which '
                 "is the active one of the file"

@@ -17,6 +17,7 @@ import numpy as np
 from ...nicmm_core.options import OPTIONS, Kind
 from . import designers, mesh_data, record_check, shown_surfaces
 from .cage_trace import CagePlaces, places_of, points_at, with_own_cage
+from .membership import is_in
 from .messages import InputError
 from .surface import group_weights, read
 
@@ -223,7 +224,7 @@ def mesh_of(curve_object):
 def present_mesh(context, curve_object):
     """The mesh object that a curve was designed on, or an error if it is not in the scene."""
     found = mesh_of(curve_object)
-    if found is None or found.name not in context.view_layer.objects:
+    if found is None or not is_in(context.view_layer, found):
         raise _absent(curve_object)
     return found
 

@@ -16,6 +16,7 @@ import bmesh
 
 from . import mesh_arrays
 from .cage_trace import CageTrace, trace
+from .membership import is_in
 from .messages import InputError
 from .vertex_weights import weights_on
 
@@ -210,12 +211,12 @@ def _is_sculpted_without_modifiers(mesh_object) -> bool:
 def _depsgraph_of(mesh_object):
     """The dependency graph in which the object is evaluated: that of the window, if it is there."""
     context = bpy.context
-    if mesh_object.name in context.view_layer.objects:
+    if is_in(context.view_layer, mesh_object):
         return context.evaluated_depsgraph_get()
     for scene in mesh_object.users_scene:
         for layer in scene.view_layers:
             layer.update()
-            if mesh_object.name in layer.objects:
+            if is_in(layer, mesh_object):
                 return layer.depsgraph
     raise InputError(
         f'"{mesh_object.name}" is in no view layer, so its modifiers are not computed. Bring it '

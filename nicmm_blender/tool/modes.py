@@ -9,6 +9,7 @@ import bpy
 
 from ..outputs import curve_object
 from ..scene import curve_record
+from ..scene.membership import is_in
 
 TOOLS = {
     "OBJECT": "nicmm.surface_curve",
@@ -42,11 +43,11 @@ def make_active(context, curve) -> None:
         mesh_object = curve_record.mesh_of(mesh_object)
     if context.mode == "OBJECT":
         shown = curve or mesh_object
-        if shown is not None and shown.name in context.view_layer.objects:
+        if shown is not None and is_in(context.view_layer, shown):
             curve_object.select_only(context, shown)
         return
     for other in curve_record.designed_on(mesh_object):
-        if other.name in context.view_layer.objects:
+        if is_in(context.view_layer, other):
             other.select_set(other == curve)
 
 

@@ -12,6 +12,7 @@ from mathutils import Vector
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, designers, shown_surfaces
+from ..scene.membership import is_in
 from ..scene.messages import InputError
 from .view import View, view_of
 
@@ -221,7 +222,7 @@ def radius_of(curve, surface) -> float:
 def _is_shown(context, candidate) -> bool:
     """Whether an object is visible in this viewport, also in its local view."""
     space = context.space_data
-    if candidate.name not in context.view_layer.objects or not candidate.visible_get():
+    if not is_in(context.view_layer, candidate) or not candidate.visible_get():
         return False
     if space is None or space.type != "VIEW_3D":
         return True
