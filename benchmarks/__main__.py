@@ -1,7 +1,8 @@
 """Measure, and write down what was measured.
 
 python -m benchmarks NAME [--quick]    one measurement
-python -m benchmarks all [--hours H]   all that are stale, timed ones first; run again to go on
+python -m benchmarks all [--hours H] [--jobs N]   all that are stale, timed ones first and alone,
+                                       the others N at a time; run again to go on
 python -m benchmarks stale             what was measured on other code, with what changed
 python -m benchmarks write             RESULTS.md and the figures in other documents, from the data
 """
@@ -10,8 +11,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 from tqdm import tqdm
 
@@ -71,6 +75,9 @@ def main() -> int:
     parser.add_argument(
         "--hours", type=float, help="with `all`: begin nothing that would end later"
     )
+    parser.add_argument(
+        "--jobs", type=int, default=1, help="with `all`: measurements at a time that are not timed"
+    )
     options = parser.parse_args()
     scale = Scale.QUICK if options.quick else Scale.SMOKE if options.smoke else Scale.FULL
     if options.name == "stale":
@@ -78,7 +85,8 @@ def main() -> int:
     if options.name == "write":
         write()
     elif options.name == "all":
-        measure_all(scale, options.hours)
+        failed = measure_all(scale, options.hours, options.jobs)
+        return int(bool(failed))
     else:
         measure_one(options.name, scale)
     return 0
@@ -95,27 +103,55 @@ def measure_one(name: str, scale: Scale) -> None:
         write()
 
 
-def measure_all(scale: Scale, hours: float | None) -> None:
-    """Run what is stale, timed measurements first while the machine is quiet.
+def measure_all(scale: Scale, hours: float | None, jobs: int) -> list[str]:
+    """Run what is stale and return what failed.
 
-    Each keeps its data when it ends, so an interrupted run goes on where it was.
+    Timed measurements run first and one by one, while the machine is quiet, then the others, `jobs`
+    at a time. Each keeps its data when it ends, so an interrupted run goes on where it was.
     """
     full = scale is Scale.FULL
-    names = [name for name in MEASUREMENTS if not full or evidence.what_changed(name)]
-    names.sort(
-        key=lambda name: not getattr(importlib.import_module(f"benchmarks.{name}"), "TIMED", False)
-    )
-    expected = {name: _expected(name) for name in names}
+    stale = [name for name in MEASUREMENTS if not full or evidence.what_changed(name)]
+    expected = {name: _expected(name) for name in stale}
+    timed = [name for name in stale if _is_timed(name)]
+    others = sorted(set(stale) - set(timed), key=lambda name: -expected[name])
+    failed: list[str] = []
     started = time.perf_counter()
+
+    def run(name: str) -> None:
+        passed = time.perf_counter() - started
+        if hours is not None and passed + expected[name] > 3600.0 * hours:
+            tqdm.write(f"{name} would end after the hours given: not begun")
+        else:
+            tqdm.write(f"{name} begun, {_in_words(expected[name])} expected")
+            if not run_apart(name, scale):
+                failed.append(name)
+                tqdm.write(f"{name} failed, see {_log_of(name)}")
+        bar.update(round(expected[name]))
+
     with tqdm(total=round(sum(expected.values())), bar_format=BAR) as bar:
-        for name in names:
-            passed = time.perf_counter() - started
-            bar.set_description(f"{name} ({_in_words(expected[name])})")
-            if hours is None or passed + expected[name] <= 3600.0 * hours:
-                measure_one(name, scale)
-            else:
-                tqdm.write(f"{name} would end after the hours given: not begun")
-            bar.update(round(expected[name]))
+        for names, at_once in ((timed, 1), (others, jobs)):
+            threads = ThreadPoolExecutor(at_once)
+            try:
+                list(threads.map(run, names))
+            finally:
+                threads.shutdown(cancel_futures=True)
+    return failed
+
+
+def run_apart(name: str, scale: Scale) -> bool:
+    """Run a measurement in a process of its own; return whether it succeeded."""
+    log = _log_of(name)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    flags = [] if scale is Scale.FULL else [f"--{scale.value}"]
+    with log.open("w", encoding="utf-8") as output:
+        done = subprocess.run(
+            [sys.executable, "-m", "benchmarks", name, *flags],
+            cwd=evidence.ROOT,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+    return done.returncode == 0
 
 
 def list_stale() -> int:
@@ -135,6 +171,10 @@ def write() -> None:
         report.draw(name, record, Scale.FULL)
     for path, text in documents.generated(records).items():
         path.write_text(text, encoding="utf-8")
+
+
+def _log_of(name: str) -> Path:
+    return evidence.QUICK_OUTPUT / "logs" / f"{name}.txt"
 
 
 def _is_timed(name: str) -> bool:

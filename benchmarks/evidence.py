@@ -66,7 +66,9 @@ def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
     }
     path = folder_of(scale) / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    unfinished = path.with_suffix(".part")
+    unfinished.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    unfinished.replace(path)  # others may be reading
     return load(name, scale)
 
 

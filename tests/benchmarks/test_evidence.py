@@ -91,14 +91,16 @@ def kept(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "write", lambda: None)
 
 
-def fake(monkeypatch, begun, fails=()):
-    def measure_one(name, scale):
+def fake(monkeypatch, begun, fails=(), interrupted=()):
+    def run_apart(name, scale):
         begun.append(name)
-        if name in fails:
+        if name in interrupted:
             raise KeyboardInterrupt
-        evidence.save(name, {}, 7200.0, scale)
+        if name not in fails:
+            evidence.save(name, {}, 7200.0, scale)
+        return name not in fails
 
-    monkeypatch.setattr(command, "measure_one", measure_one)
+    monkeypatch.setattr(command, "run_apart", run_apart)
 
 
 def test_stale_says_what_changed(kept, monkeypatch, capsys):
@@ -114,26 +116,40 @@ def test_stale_says_what_changed(kept, monkeypatch, capsys):
 
 def test_an_interrupted_run_goes_on_where_it_was(kept, monkeypatch):
     begun = []
-    fake(monkeypatch, begun, fails=("fuzz",))
+    fake(monkeypatch, begun, interrupted=("fuzz",))
     with pytest.raises(KeyboardInterrupt):
-        command.measure_all(Scale.FULL, None)
+        command.measure_all(Scale.FULL, None, 1)
     assert begun == ["messes", "fuzz"]
     fake(monkeypatch, begun)
-    command.measure_all(Scale.FULL, None)
+    command.measure_all(Scale.FULL, None, 1)
     assert begun == ["messes", "fuzz", "fuzz"]
-    command.measure_all(Scale.FULL, None)
+    command.measure_all(Scale.FULL, None, 1)
     assert begun == ["messes", "fuzz", "fuzz"]
+
+
+def test_a_failure_stops_nothing_else(kept, monkeypatch):
+    begun = []
+    fake(monkeypatch, begun, fails=("messes",))
+    assert command.measure_all(Scale.FULL, None, 2) == ["messes"]
+    assert sorted(begun) == ["fuzz", "messes"]
+    assert evidence.is_kept("fuzz") and not evidence.is_kept("messes")
+
+
+def test_a_run_apart_keeps_its_output(monkeypatch, tmp_path):
+    monkeypatch.setattr(command, "_log_of", lambda name: tmp_path / "log.txt")
+    assert not command.run_apart("nothing", Scale.SMOKE)
+    assert "invalid choice: 'nothing'" in (tmp_path / "log.txt").read_text()
 
 
 def test_nothing_is_begun_that_would_end_after_the_hours_given(kept, monkeypatch):
     begun = []
     fake(monkeypatch, begun)
-    command.measure_all(Scale.FULL, None)
+    command.measure_all(Scale.FULL, None, 1)
     for name in command.MEASUREMENTS:
         record = evidence.load(name)
         record["code"] = None
         (evidence.DATA / f"{name}.json").write_text(evidence.json.dumps(record))
-    command.measure_all(Scale.FULL, 1.0)
+    command.measure_all(Scale.FULL, 1.0, 1)
     assert begun == ["messes", "fuzz"]
-    command.measure_all(Scale.FULL, 3.0)
+    command.measure_all(Scale.FULL, 3.0, 1)
     assert begun == ["messes", "fuzz", "messes", "fuzz"]
