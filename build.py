@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Demo, tests and packages of NICMM Curves; needs Python 3.11 and nothing else.
+"""Runs the demo and the tests of NICMM Curves and builds its packages; needs only Python 3.11.
 
     python3 build.py demo      draw curves on Suzanne in headless Blender and render them
-    python3 build.py test      run every check; with --quick all but the slow tests
+    python3 build.py test      run every check; --quick leaves out the slow tests
     python3 build.py package   build the installable zips
 
 Each command makes `.venv/` on its first run and installs requirements.txt into it.
@@ -29,10 +29,10 @@ DIST = ROOT / "dist"
 REQUIREMENTS = ROOT / "requirements.txt"
 MANIFEST = "blender_manifest.toml"
 
-PYTHON = (3, 11)  # of Blender 4.5 and its bpy module
-BLENDER_PYTHONS = ("3.11", "3.13")  # of Blender 4.5 and 5.0, and of later ones
+PYTHON = (3, 11)  # the Python of Blender 4.5 and its bpy module
+BLENDER_PYTHONS = ("3.11", "3.13")  # of Blender 4.5 and 5.0, and of later versions
 
-# The wheel tags that each of Blender's platforms takes, the preferred one first.
+# The wheel tags that each of Blender's platforms accepts, in order of preference.
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),
     "windows-x64": ("win_amd64",),
@@ -40,9 +40,9 @@ PLATFORMS = {
 }
 
 LARGEST_ZIP = 120e6
-"""Bytes of a zip without PyTorch."""
+"""Largest size of a zip without PyTorch, in bytes."""
 
-# Blender brings its own NumPy, which every extension shares: it must not be in the zip.
+# NumPy is not bundled: all extensions share the NumPy that Blender includes.
 BUNDLED = ("libigl", "scipy")
 TORCH_COMPANIONS = (
     "filelock==4.2.11",
@@ -66,7 +66,7 @@ __all__ = ["register", "unregister"]
 
 
 class BuildError(Exception):
-    """A step cannot be done; the message says why and what to do."""
+    """A step has failed; the message says why and what to do."""
 
 
 def say(text: str) -> None:
@@ -74,7 +74,7 @@ def say(text: str) -> None:
 
 
 def run(arguments: Sequence[str | Path], environment: dict[str, str] | None = None) -> int:
-    """Run a command in the repository's root, its output shown, and return its exit status."""
+    """Run a command in the repository's root, show its output and return its exit status."""
     return subprocess.run(
         [str(argument) for argument in arguments],
         cwd=ROOT,
@@ -114,7 +114,7 @@ def check_python() -> None:
 
 
 def ensure_environment() -> None:
-    """Make `.venv/` with the pinned packages, unless it has them already."""
+    """Create `.venv/` with the pinned packages, unless it already contains them."""
     check_python()
     fingerprint = hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest()
     stamp = VENV / "installed.sha256"
@@ -140,13 +140,13 @@ def ensure_environment() -> None:
 
 
 def manifest() -> dict:
-    import tomllib  # here, so that an older Python reaches the message of check_python
+    import tomllib  # imported here, so that an older Python gets as far as check_python
 
     return tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
 
 
 def stage(folder: Path, wheels: Sequence[Path] = (), blender_platform: str = "") -> None:
-    """Lay the extension out in an empty folder, as it stands in the zip."""
+    """Copy the extension to a new folder, laid out as in the zip."""
     folder.mkdir(parents=True)
     for package in ("nicmm_blender", "nicmm_core"):
         shutil.copytree(
@@ -168,7 +168,7 @@ def stage(folder: Path, wheels: Sequence[Path] = (), blender_platform: str = "")
 
 
 def download(requirement: str, blender_platform: str, python: str) -> Path:
-    """The wheel of a package for a platform and a Python; each is downloaded once."""
+    """The wheel of a package for a platform and a Python version, downloaded on first use."""
     name, version = requirement.split("==")
     folder = DIST / "wheels" / f"{blender_platform}-python{python}"
     pattern = f"{name}-{version}-*.whl"
@@ -189,17 +189,17 @@ def download(requirement: str, blender_platform: str, python: str) -> Path:
 
 
 def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bool) -> list[Path]:
-    """The wheels of a zip, without repetition."""
+    """The wheels that a zip contains, each once."""
     requirements = [pinned(name) for name in BUNDLED]
     if with_torch:
-        # The registry's Linux wheel needs gigabytes of CUDA companions; the CPU build does not.
+        # The Linux wheel on PyPI depends on gigabytes of CUDA packages; the CPU build does not.
         local = "+cpu" if blender_platform == "linux-x64" else ""
         requirements += [pinned("torch") + local, *TORCH_COMPANIONS]
     wheels = {}
     for python in pythons:
         found = [download(requirement, blender_platform, python) for requirement in requirements]
-        # Blender counts a stable-ABI wheel for its major Python version only, and refuses the
-        # extension where no wheel names the minor version as well.
+        # For Blender, a wheel for the stable ABI supports the major Python version only. It refuses
+        # an extension if no wheel names the minor version.
         tag = f"-cp{python.replace('.', '')}-"
         if not any(tag in wheel.name for wheel in found):
             raise BuildError(f"No wheel is built for Python {python} itself ({tag.strip('-')})")
@@ -208,8 +208,8 @@ def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bo
 
 
 def blender_tool() -> tuple[Path, Path]:
-    """Blender's own packaging tool and its list of tags, from the installed bpy module."""
-    # Found without an import, which would start Blender.
+    """Paths of Blender's packaging tool and its list of tags, from the installed bpy module."""
+    # The module is located without importing it, since an import would start Blender.
     search = "import importlib.util as u; print(u.find_spec('bpy').submodule_search_locations[0])"
     bpy = subprocess.run([VENV_PYTHON, "-c", search], capture_output=True, text=True, check=True)
     scripts = next(Path(bpy.stdout.strip()).glob("*/scripts"))
@@ -225,7 +225,7 @@ def package(
     with_torch: bool = False,
     output: Path = DIST,
 ) -> Path:
-    """Build the zip of one platform, let Blender's own tool check it, and return its path."""
+    """Build the zip of one platform, validate it with Blender's own tool, and return its path."""
     ensure_environment()
     wheels = collect_wheels(blender_platform, pythons, with_torch)
     tool, tags = blender_tool()
@@ -252,7 +252,7 @@ def package(
 
 
 def this_platform() -> str:
-    """Blender's name of the platform that this runs on."""
+    """Blender's name for the platform on which this script runs."""
     system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system())
     machine = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64"}.get(platform.machine().lower())
     name = f"{system}-{machine}"
@@ -271,7 +271,7 @@ def command_demo(arguments: argparse.Namespace) -> int:
     ensure_environment()
     script = "close_ups.py" if arguments.close_ups else "suzanne.py"
     with tempfile.TemporaryDirectory() as user_folder:
-        # Blender finds the extension where an installed one stands; its wheels are in .venv.
+        # Blender finds the extension where it installs extensions; its wheels are in .venv.
         stage(Path(user_folder) / "extensions" / "user_default" / manifest()["id"])
         return run([VENV_PYTHON, ROOT / "demo" / script], {"BLENDER_USER_RESOURCES": user_folder})
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender side: reads Blender data, calls the core, writes Blender data.
+"""The Blender extension: reads Blender's data, calls the core, and writes Blender's data.
 
-Each folder imports only from those before it: `scene`, `outputs`, `operators`, `tool`, `interface`.
+The folders form layers, and each imports only from those before it: `scene`, `outputs`,
+`operators`, `tool`, `interface`.
 
-Nothing here loads the core, or a library that it needs, before a curve is requested. So the
-extension is enabled quickly even if a library is missing; the operator then reports which one.
+Nothing here loads the core, or a library that the core needs, before a curve is requested. The
+extension can therefore be enabled quickly, even if a library is missing; the operator then reports
+which one.
 """
 
 from . import command_line, preferences, settings

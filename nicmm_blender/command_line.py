@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c nicmm`: designs a curve on an object of a file and writes another file.
+"""The command `blender -c nicmm`: designs a curve on an object of a file and writes another file.
 
-The options are the properties of *Design Curve on Surface*, read from their Blender definitions.
+Its options are the properties of *Design Curve on Surface*, read from their Blender definitions.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     if not target.parent.is_dir():
         raise InputError(f"--output-file: there is no folder {target.parent}")
     if target.exists() and target.samefile(source):
-        raise InputError("--output-file is the file that is read; give another one")
+        raise InputError("--output-file is the same file as --file. Choose another file")
     bpy.ops.wm.open_mainfile(filepath=str(source), load_ui=False)
     activate(options.object)
     chosen = {name: getattr(options, name) for name in settings.PROPERTY_NAMES}
@@ -66,8 +66,8 @@ def activate(name: str | None) -> None:
             )
         if not is_in(context.view_layer, chosen):
             raise InputError(
-                f'--object: "{name}" is not in the view layer "{context.view_layer.name}", which '
-                "is the active one of the file"
+                f'--object: "{name}" is not in the active view layer of the file, '
+                f'"{context.view_layer.name}"'
             )
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -88,7 +88,7 @@ def _points(options: argparse.Namespace) -> dict:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options of the command."""
+    """The argument parser of the command."""
     made = argparse.ArgumentParser(
         prog=f"blender -c {COMMAND}",
         description="Draw a smooth curve on a mesh of a Blender file and write another file.",
@@ -97,16 +97,16 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--output-file", required=True, metavar="OUT.blend")
     made.add_argument("--object", metavar="NAME", help="default: the active object of the file")
     points = made.add_argument_group(
-        "control points", "By default the vertices selected in the file."
+        "control points", "By default, the vertices that are selected in the file."
     ).add_mutually_exclusive_group()
     points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
     points.add_argument(
         "--points",
         metavar="A,B,C",
-        help='vertex indices from 0, or positions in the local space: "0.5 0 1, 0 0 2, 41"',
+        help='vertex indices from 0, or positions in local space: "0.5 0 1, 0 0 2, 41"',
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
-    options = made.add_argument_group("settings", "As in the sidebar.")
+    options = made.add_argument_group("settings", "The same as in the sidebar.")
     for name in settings.PROPERTY_NAMES:
         options.add_argument(f"--{name.replace('_', '-')}", dest=name, **_option(described[name]))
     return made
@@ -114,7 +114,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _option(described) -> dict:
     """The argparse keywords for a Blender property."""
-    # argparse formats its help with %.
+    # argparse expands % in help texts.
     words = {"help": described.description.replace("%", "%%"), "default": None}
     if described.type == "BOOLEAN":
         return {"action": argparse.BooleanOptionalAction, **words}

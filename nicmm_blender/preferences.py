@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences of the extension, and a report of the libraries that were found."""
+"""Preferences of the extension, with a report of the libraries that were found."""
 
 import functools
 import importlib.metadata
@@ -9,7 +9,7 @@ import bpy
 from bpy.props import FloatProperty, IntProperty
 
 PACKAGE = __package__.rpartition(".")[0]
-"""Name of the extension for Blender."""
+"""Module name under which Blender knows the extension."""
 
 PATIENCE = 0.4
 KEPT_MESHES = 2
@@ -20,9 +20,9 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     patience: FloatProperty(
-        name="Wait For",
-        description="How long the window waits for a curve. A longer computation continues in "
-        "the background with a progress display, and Esc cancels it",
+        name="Wait Time",
+        description="How long Blender waits for a curve before it shows progress. A longer "
+        "computation continues while the window responds, and Esc cancels it",
         default=PATIENCE,
         min=0.0,
         max=10.0,
@@ -31,13 +31,13 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
     kept_meshes: IntProperty(
         name="Meshes Kept in Memory",
         description="Number of recently used meshes to keep in memory, so that further curves "
-        "on them are faster. Each mesh takes some 400 bytes per vertex",
+        "on them are faster. Each mesh takes about 400 bytes per vertex",
         default=KEPT_MESHES,
         min=0,
         max=64,
     )
     live_delay: FloatProperty(
-        name="Live Update After",
+        name="Live Update Delay",
         description="How long a mesh must stay unchanged before its curves are updated",
         default=LIVE_DELAY,
         min=0.05,
@@ -63,20 +63,20 @@ def library_report() -> tuple:
     lines = []
     for module, name in (("scipy", "SciPy"), ("igl", "libigl")):
         version = _version(module, name)
-        missing = f"{name} is missing: install the zip for this platform and this Blender"
+        missing = f"{name} is missing. Install the zip for this platform and Blender version"
         lines.append(f"{name} {version}" if version else missing)
     version = _version("torch", "torch")
     lines.append(
         f"PyTorch {version}: the method NICMM (Paper) can be used"
         if version
-        else "PyTorch was not found. Only the method NICMM (Paper) needs it, which is slower "
-        "than the default method"
+        else "PyTorch was not found. Only the method NICMM (Paper), which is slower than the "
+        "default method, needs it"
     )
-    return (*lines, "The extension does not use the network")
+    return (*lines, "The extension does not access the internet")
 
 
 def _version(module: str, distribution: str) -> str:
-    """Version of a package that can be imported, or an empty string."""
+    """The version of a package, or an empty string if it cannot be imported."""
     if importlib.util.find_spec(module) is None:
         return ""
     try:
@@ -86,22 +86,24 @@ def _version(module: str, distribution: str) -> str:
 
 
 def _get(name: str, default):
-    """A preference, or its default where the extension is not registered as an add-on."""
+    """The value of a preference, or its default if the extension is not registered as an add-on."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     found = None if addon is None else addon.preferences
     return default if found is None else getattr(found, name)
 
 
 def patience() -> float:
-    """Seconds that the window waits for a curve before the work continues in time slices."""
+    """Seconds that Blender waits for a curve before the work continues in time slices."""
     return _get("patience", PATIENCE)
 
 
 def kept_meshes() -> int:
+    """Number of meshes whose designers are kept in memory."""
     return _get("kept_meshes", KEPT_MESHES)
 
 
 def live_delay() -> float:
+    """Seconds that a mesh must stay unchanged before its curves are updated."""
     return _get("live_delay", LIVE_DELAY)
 
 

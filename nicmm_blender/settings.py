@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a curve for the operators and the sidebar: core options and outputs."""
+"""Defines and draws the settings of a curve for operators and sidebar: core options and outputs."""
 
 import bpy
 from bpy.props import (
@@ -18,14 +18,14 @@ from .scene import curve_record
 AUTOMATIC = (
     "AUTO",
     "Automatic",
-    "The order of selection where Blender has recorded it for all selected vertices, otherwise "
+    "In the order of selection if Blender has recorded it for all selected vertices, otherwise in "
     "the shortest order",
 )
-"""An order that only the extension has, listed before those of the core."""
+"""A choice of the option `order` that only the extension has, listed before those of the core."""
 
 
 def properties_of(options) -> dict:
-    """Blender properties for core options, by name; options that hold points are left out."""
+    """Blender properties for core options, by property name; options for points are left out."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
@@ -48,7 +48,7 @@ def _property(option):
             return EnumProperty(**words, items=items, default="AUTO")
         return EnumProperty(**words, items=items, default=curve_record.identifier(option.default))
     if option.kind is Kind.WEIGHTS:
-        words["description"] += ": a vertex group. Leave empty for none"
+        words["description"] += ". Choose a vertex group, or leave empty for none"
         return StringProperty(**words)
     names, values = ("min", "max", "soft_min", "soft_max"), (*option.limits, *option.usual)
     limits = {
@@ -65,7 +65,7 @@ SURFACE = {
     "use_modifiers": BoolProperty(
         name="Use Modifiers",
         description="Draw on the surface that the viewport shows, with modifiers and shape keys. "
-        "Otherwise on the mesh without them",
+        "If disabled, draw on the mesh without them",
         default=True,
     )
 }
@@ -78,7 +78,7 @@ class DesignProperties:
 
 
 class EditingProperties:
-    """The options of a curve that is being edited; its points already have an order."""
+    """The options of a curve that is being edited, without those that only a new curve has."""
 
     __annotations__ = (
         properties_of(
@@ -98,20 +98,20 @@ def _tube_property(default: bool):
 
 
 class OutputProperties:
-    """The output of a new curve or of one that is converted."""
+    """The output settings of a new or converted curve."""
 
     output: EnumProperty(
         name="Output",
-        description="What the curve becomes",
+        description="What to create from the curve",
         items=(
-            ("CURVE", "Curve", "A curve object of polylines. The mesh stays unchanged"),
+            ("CURVE", "Curve", "A curve object on the surface. The mesh stays unchanged"),
             (
                 "STICKY",
                 "Sticky Curves",
                 "A hair curves object that follows the mesh when it is deformed. "
                 "The mesh stays unchanged",
             ),
-            ("EDGES", "Cut Edges", "Cut the mesh so that the curve becomes edges of it"),
+            ("EDGES", "Cut Edges", "Cut the mesh so that the curve becomes a chain of its edges"),
             ("REGION", "Region", "The part of the mesh that the curve encloses"),
             ("PARTS", "Separate Parts", "Cut the mesh and separate it along the curve"),
         ),
@@ -119,27 +119,33 @@ class OutputProperties:
     )
     spline: EnumProperty(
         name="Spline",
-        description="The points of the curve object",
+        description="How the points of the curve object are placed",
         items=(
             (
                 "EVEN",
                 "Even",
-                "Evenly spaced from control point to control point, within a ten-thousandth of the "
-                "size of the mesh and a tenth of the radius",
+                "Points evenly spaced between control points. They stay within a ten-thousandth of "
+                "the size of the mesh, and a tenth of the radius, of the exact curve",
             ),
-            ("EXACT", "Exact", "Every crossing with an edge of the mesh: exactly on its faces"),
+            (
+                "EXACT",
+                "Exact",
+                "A point at every crossing with an edge of the mesh, so that the curve lies "
+                "exactly on its faces",
+            ),
             (
                 "BEZIER",
                 "Bézier",
-                "Few knots with handles, the control points among them. Sticky curves are spaced "
-                "evenly instead",
+                "A few points with handles, including all control points. Sticky curves use evenly "
+                "spaced points instead",
             ),
         ),
         default="EVEN",
     )
     radius: FloatProperty(
         name="Radius",
-        description="Radius of the curve. Zero: a share of the size of the mesh, Thickness",
+        description="Radius of the curve. If zero, Thickness sets it relative to the size of the "
+        "mesh",
         default=0.0,
         min=0.0,
         soft_max=1.0,
@@ -147,7 +153,7 @@ class OutputProperties:
     )
     offset: FloatProperty(
         name="Offset",
-        description="Distance of the curve from the surface along its normals",
+        description="Distance of the curve from the surface, along the normals of the surface",
         default=0.0,
         soft_min=-1.0,
         soft_max=1.0,
@@ -155,8 +161,8 @@ class OutputProperties:
     )
     thickness: FloatProperty(
         name="Thickness",
-        description="Radius of the curve relative to the size of the mesh, if Radius is zero. Zero "
-        "gives a line",
+        description="Radius of the curve relative to the size of the mesh, used if Radius is zero. "
+        "Set to zero for a line",
         default=0.004,
         min=0.0,
         soft_max=0.05,
@@ -166,17 +172,17 @@ class OutputProperties:
     tube: _tube_property(False)
     mark_seam: BoolProperty(
         name="Mark Seam",
-        description="Make the edges along the curve UV seams",
+        description="Mark the edges along the curve as UV seams",
         default=True,
     )
     mark_sharp: BoolProperty(
         name="Mark Sharp",
-        description="Make the edges along the curve sharp",
+        description="Mark the edges along the curve as sharp",
         default=False,
     )
     cut_faces: EnumProperty(
         name="Faces",
-        description="What cut faces become",
+        description="How cut faces are divided",
         items=(
             (
                 "POLYGONS",
@@ -187,14 +193,14 @@ class OutputProperties:
             (
                 "TRIANGLES",
                 "Triangles",
-                "Triangles. The shape of the surface stays exactly the same",
+                "Only triangles. The shape of the surface stays exactly the same",
             ),
         ),
         default="POLYGONS",
     )
     simplify: FloatProperty(
         name="Simplify",
-        description="Largest distance between the cut edges and the curve, relative to the mean "
+        description="Maximum distance between the cut edges and the curve, relative to the mean "
         "edge length. Larger values give fewer vertices inside faces",
         default=0.01,
         min=0.0,
@@ -207,16 +213,16 @@ class OutputProperties:
         name="Region As",
         description="How the region is marked",
         items=(
-            ("SELECTION", "Selection", "Select only its faces"),
+            ("SELECTION", "Selection", "Select its faces, and nothing else"),
             ("VERTEX_GROUP", "Vertex Group", "Assign its vertices to a new vertex group"),
-            ("FACE_SET", "Face Set", "Make its faces a new face set for Sculpt Mode"),
+            ("FACE_SET", "Face Set", "Assign its faces to a new face set for Sculpt Mode"),
         ),
         default="SELECTION",
     )
     region_cut: BoolProperty(
         name="Cut First",
         description="Cut the mesh along the curve so that the region ends exactly there. "
-        "Otherwise the region consists of the faces with more than half of their area inside",
+        "If disabled, the region consists of the faces with more than half of their area inside",
         default=False,
     )
     other_side: BoolProperty(
@@ -226,9 +232,9 @@ class OutputProperties:
     )
     parts_as: EnumProperty(
         name="Parts As",
-        description="What the parts become",
+        description="How the parts are separated",
         items=(
-            ("LOOSE", "Loose Parts", "Both stay in this mesh and no longer share vertices"),
+            ("LOOSE", "Loose Parts", "Both parts stay in this mesh, but no longer share vertices"),
             ("OBJECTS", "Objects", "The part that the curve encloses becomes a separate object"),
         ),
         default="LOOSE",
@@ -245,7 +251,7 @@ class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGr
 
 
 def choose_tube(operator) -> None:
-    """Enable *Tube* where strands look coarse; for operators called from the window.
+    """Enable *Tube* in Blender versions that draw strands coarsely; for calls from the window.
 
     A value that the caller has set, or that the user chose last time, is kept.
     """
@@ -254,7 +260,7 @@ def choose_tube(operator) -> None:
 
 
 def draw(layout, properties, mesh_object) -> None:
-    """Draw the settings for a curve on `mesh_object` or None, in the redo panel."""
+    """Draw all settings in the redo panel; `mesh_object` may be None."""
     draw_course(layout, properties)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
@@ -278,7 +284,7 @@ def draw_course(layout, properties) -> None:
 
 
 def draw_clearance(layout, properties) -> None:
-    """Draw the clearance, greyed out without obstacles."""
+    """Draw the clearance, greyed out if there are no obstacles."""
     row = layout.row()
     row.active = bool(properties.obstacle_group)
     row.prop(properties, "clearance")

@@ -1,7 +1,8 @@
-"""NICMM: smooth curves on triangle meshes by a physics-informed network.
+"""NICMM: smooth curves on triangle meshes, computed with a physics-informed network.
 
-The main path is `design.design_curve`; `design.py` names the stages in order. Names are loaded when
-they are first used: `options` can be imported without the libraries that the others need.
+The entry point is `design_curve`; `design.py` lists the stages in order. The modules behind the
+public names are imported on first use, so `nicmm_core.options` can be imported without loading the
+libraries that the other modules need.
 """
 
 import importlib
@@ -75,7 +76,7 @@ _NAMES = {
     ),
     "status": ("Status",),
 }
-"""What each module gives to the package."""
+"""The public names of the package, by the module that defines them."""
 
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}
 

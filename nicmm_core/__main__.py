@@ -18,11 +18,11 @@ from .options import Kind, Option
 from .path.via_points import parse_via_points
 
 AUTOMATIC = ("sharp", "curvature")
-"""Maps that a mesh gives by itself."""
+"""Maps that can be computed from the mesh alone."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command; 0 when it succeeded, 2 with a message on standard error when it did not."""
+    """Run a command and return the exit status: 0, or 2 after a message on standard error."""
     given = _parser().parse_args(arguments)
     try:
         given.run(given)
@@ -94,13 +94,16 @@ def _design(given: argparse.Namespace) -> None:
 
 
 def numbered(path: str, number: int) -> str:
-    """The file of an alternative: ``curve-1.obj`` beside ``curve.obj``."""
+    """Add the number of an alternative to a path: ``curve.obj`` becomes ``curve-1.obj``.
+
+    The design itself has number 0 and keeps the path.
+    """
     plain = Path(path)
     return str(plain.with_stem(f"{plain.stem}-{number}")) if number else path
 
 
 def _flag(option: Option) -> dict[str, Any]:
-    """How argparse takes an option."""
+    """Keyword arguments of ``add_argument`` for an option."""
     words = f"{option.description[:1].lower()}{option.description[1:]}"
     if option.kind is Kind.SWITCH:
         return {"action": f"store_{str(not option.default).lower()}", "help": f"do not {words}"}
@@ -121,7 +124,7 @@ def _flag(option: Option) -> dict[str, Any]:
 
 
 def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
-    """The value of an option, as `design_curve` takes it."""
+    """The parsed value of an option in the form that `design_curve` accepts."""
     value = getattr(given, option.name)
     if option.kind is Kind.POINTS:
         return parse_via_points(value) or None

@@ -1,4 +1,7 @@
-"""Checks of arguments: the options in the table, weights and bounds."""
+"""Checks the arguments of public functions: options, numbers, weights and vertex values.
+
+Every check raises an error that names the argument and says what to pass instead.
+"""
 
 from __future__ import annotations
 
@@ -16,23 +19,24 @@ from .options import Kind, Option
 
 
 def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options of a curve, each checked by its kind.
+    """Check the options of a curve, each according to its kind.
 
     Parameters
     ----------
     mesh : Mesh
     given : mapping
-        A value for every option in `options.OPTIONS`.
+        A value for the name of every option in `options.OPTIONS`.
 
     Returns
     -------
     dict
-        By name, with weights as (V,) float arrays. `path.via_points` checks points.
+        The checked values by name, with weights as (V,) float arrays. Via points are returned
+        unchecked; `path.via_points` checks them.
 
     Raises
     ------
     ArgumentError
-        If one cannot be used.
+        If a value is invalid, or if an option is set without the option that it needs.
     """
     checked = {each.name: _checked(mesh, each, given[each.name]) for each in options.OPTIONS}
     for each in options.OPTIONS:
@@ -59,7 +63,7 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
 
 
 def _checked_number(option: Option, value: Any) -> float:
-    """A finite number within the limits of an option."""
+    """Convert a value to a finite float within the limits of an option."""
     low, high = option.limits
     what = "a length" if option.kind is Kind.LENGTH else "a number"
     number = checked_number(option.name, value, f"{what}{_limits(option)}")
@@ -69,7 +73,7 @@ def _checked_number(option: Option, value: Any) -> float:
 
 
 def checked_number(name: str, value: Any, what: str = "a finite number") -> float:
-    """A finite number; otherwise an ArgumentError says to pass ``what``."""
+    """Convert a value to a finite float, or raise an ArgumentError that asks for ``what``."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError) as error:
@@ -85,7 +89,7 @@ def _limits(option: Option) -> str:
 
 
 def _checked_count(option: Option, value: Any) -> int:
-    """A whole number within the limits of an option."""
+    """Convert a value to an int within the limits of an option."""
     low, high = option.limits
     if not (_is_whole(value) and low <= value <= high):
         raise ArgumentError(f"{option.name} is {value!r}; pass a whole number{_limits(option)}")
@@ -97,7 +101,7 @@ def _is_whole(value: Any) -> bool:
 
 
 def check_iterations(max_iterations: Any) -> None:
-    """Raise ArgumentError unless it is a positive whole number, or None."""
+    """Raise ArgumentError unless the limit is a positive whole number or None."""
     if max_iterations is not None and not (_is_whole(max_iterations) and max_iterations >= 1):
         raise ArgumentError(
             f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
@@ -116,7 +120,10 @@ def check_torch() -> None:
 
 
 def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -> FloatArray:
-    """One number for each vertex, (V,), possibly infinite; raises ArgumentError otherwise."""
+    """Convert values to one float per vertex, shape (V,), or raise ArgumentError.
+
+    The values may be infinite or NaN.
+    """
     try:
         checked = real_array(values)
     except (TypeError, ValueError) as error:
@@ -129,7 +136,7 @@ def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -
 
 
 def checked_map(name: str, weights: ArrayLike | None, mesh: Mesh) -> FloatArray | None:
-    """Weights in [0, 1] at the vertices, (V,); raises ArgumentError otherwise."""
+    """Convert weights to floats in [0, 1] at the vertices, (V,), or raise ArgumentError."""
     if weights is None:
         return None
     checked = checked_vertex_values(name, weights, mesh, "weight")

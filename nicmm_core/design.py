@@ -1,18 +1,19 @@
-"""The entry point: from a mesh and control points to a curve. Read this file first.
+"""The entry point: computes a curve from a mesh and control points. Read this file first.
 
-A request is checked, faces inside obstacles are removed (`repair.free_surface`), the remaining
-surface is made a manifold if it is not one (`repaired_surface`), and the curve is designed there
-(`surface_designer`):
+A request is checked, and faces inside obstacles are removed (`repair.free_surface`). If the
+remaining surface is not a manifold, it is repaired (`repaired_surface`). The curve is designed on
+this manifold (`surface_designer`). The default method takes the steps
 
-control points → courses that do not cross (`courses`), compared → relaxation of the curve,
+control points → courses without crossings (`courses`), compared by their energy → relaxation of the
+best course,
 
-or, where no course is found,
+or, if no course is found,
 
 control points → initial loop → signed distance → features (`problem`) → pretrained network
 → its level set → one loop through the points → contour → relaxation of the curve.
 
-Except on small meshes, all steps but the last are done on a coarse mesh of the same surface, and
-the curve is mapped from there to the fine mesh (`coarsening`).
+Except on small meshes, all steps before the relaxation run on a coarse mesh of the same surface,
+and the curve is mapped from there to the fine mesh (`coarsening`).
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ PARTS = (
 
 @dataclass(frozen=True)
 class _Free:
-    """The part of the surface outside obstacles."""
+    """The surface outside the obstacles of a request, kept for the next request."""
 
     obstacles: FloatArray
     clearance: float
@@ -58,11 +59,11 @@ class _Free:
 
 
 class Designer:
-    """Designs many curves on one surface.
+    """Designs any number of curves on one mesh.
 
-    Everything that depends only on the mesh is computed once. Results are not cached: equal
-    arguments give equal curves, the same as `design_curve`, whatever was designed before. Threads
-    may share a Designer: it designs one curve after the other.
+    Everything that depends only on the mesh is computed once. Earlier designs have no effect on
+    later ones: equal arguments always give the same curve, which is also that of `design_curve`.
+    Threads may share a Designer; it designs one curve at a time.
 
     Parameters
     ----------
@@ -97,21 +98,23 @@ class Designer:
         max_iterations: int | None = None,
         progress: Progress | None = None,
     ) -> Design:
-        """Design a curve; arguments, result and errors as in `design_curve`, and those below.
+        """Design a curve.
+
+        The result and the other parameters and errors are those of `design_curve`.
 
         Parameters
         ----------
         start : Design or SurfaceCurve, optional
             A curve on this mesh from which the design starts; only with the method "nicmm". Its
-            course and the order of its points are kept, so the result may differ from that without
-            a start, and `via_points` have no effect. Obstacles, maps and smoothness may differ.
-            Control points may have been moved by up to a tenth of the curve's length, added or
-            removed. The cost depends on the curve and not on the mesh, as needed when a point is
-            dragged.
+            course and the order of its points are kept, so the result may differ from a design
+            without a start, and `via_points` have no effect. Obstacles, maps and smoothness may
+            differ from those of the start. Control points may have been added, removed, or moved by
+            up to a tenth of the curve's length. The cost depends on the curve and not on the size
+            of the mesh, so a start suits interactive dragging of a point.
         max_iterations : int, optional
-            Limit on the iterations of the relaxation; only with the method "nicmm". The status is
-            `ITERATION_LIMIT` until the curve has converged; for interactive drawing, pass each
-            design as the next start until then.
+            Limit on the iterations of the relaxation; only with the method "nicmm". If the curve
+            has not converged by then, the status is `ITERATION_LIMIT`. For interactive drawing,
+            pass each design as the next start until the curve has converged.
 
         Raises
         ------
@@ -156,7 +159,7 @@ class Designer:
 
     @contextlib.contextmanager
     def _its_turn(self) -> Iterator[None]:
-        """Wait until no other thread uses this Designer, or the caller cancels."""
+        """Wait until no other thread uses this Designer; the caller may cancel while waiting."""
         while not self._lock.acquire(timeout=INTERVAL):
             checkpoint()
         try:
@@ -165,7 +168,7 @@ class Designer:
             self._lock.release()
 
     def _on_manifold(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request]:
-        """The first manifold on which the points are connected, and the request there."""
+        """The first manifold that connects the points, its designer, and the request on it."""
         surface = self._surface_off_obstacles(request)
         found = surface.find(request)
         if found is not None:
@@ -176,7 +179,7 @@ class Designer:
         raise UnreachableError(PARTS)
 
     def _surface_off_obstacles(self, request: Request) -> RepairedSurface:
-        """The surface outside obstacles, kept for the next request with the same ones."""
+        """The surface outside obstacles; it is kept until a request has other obstacles."""
         obstacles, clearance = request.obstacles, request.clearance
         if obstacles is None:
             return self._whole
@@ -191,7 +194,7 @@ class Designer:
 
 
 def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
-    """Whether a design already meets a request, on a mapped mesh."""
+    """Whether a design is already the complete answer to a request on a mapped mesh."""
     resumable = design.resumable
     return (
         resumable is not None
@@ -202,7 +205,7 @@ def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
 
 
 def _check_start(start: object, method: str, max_iterations: int | None, alternatives: int) -> None:
-    """Raise ArgumentError unless these fit the method and each other."""
+    """Raise ArgumentError unless the arguments fit the method and each other."""
     check_iterations(max_iterations)
     if alternatives and (method != "nicmm" or start is not None or max_iterations is not None):
         raise ArgumentError(
@@ -240,34 +243,36 @@ def design_curve(
     mesh : Mesh
     control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
         Vertex indices, points on the surface, or faces with barycentric coordinates; at least
-        three, or two of an open curve.
+        three for a closed curve and two for an open one.
     closed : bool, default True
-        Whether the curve is closed, or open from the first point visited to the last.
+        Whether the curve is closed. An open curve runs from the first point visited to the last.
     order : {"given", "shortest"}
-        Visit the points in the given order, or in the shortest one, cyclic for a closed curve. The
-        fairest curve may visit them in another order than the shortest loop.
+        Whether the curve visits the points in the given order or in the order of the shortest path
+        through them, which is cyclic for a closed curve. With "shortest", a course that would cross
+        itself may visit them in yet another order. The shortest order is not always the fairest.
     via_points : mapping, optional
-        Selects one of several courses between two control points. It maps the index of a control
-        point to points, in any form that control points may have, which the initial path to the
-        next control point passes, such as ``{1: [57]}``. The curve does not pass them exactly. Only
-        for the order "given".
+        Points that select one of several courses between two control points, such as
+        ``{1: [57]}``. The key is the index of a control point. The value has points, in any form
+        that control points may have, through which the initial path to the next control point
+        runs. The curve does not pass through them exactly. Only for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
-        The level set of the pretrained network, relaxed on the surface (the default); the method of
-        the paper, which trains the network further for every curve; or the same energy minimised
-        without a network.
+        The best of many candidate courses, or else the level set of the pretrained network, relaxed
+        on the surface (the default); the method of the paper, which trains the network further for
+        every curve; or the same energy minimised without a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
-        Weights that the curve avoids and weights that it follows. No curve enters a face whose
-        three corners are obstacles of weight 1; lower weights cost in proportion.
+        Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
+        a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.
     clearance : float, default 0
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
     alternatives : int, default 0
-        Most other curves along other courses to return too, in `Design.alternatives`, the fairest
-        first. Only with the method "nicmm".
+        Largest number of further curves, along other courses, to return in `Design.alternatives`.
+        Only with the method "nicmm".
     progress : callable, optional
-        Called a few times a second with the fraction done and the points of the present curve, at
-        first none. If it returns False, the design stops with the last curve, or with none.
+        Called up to ten times a second with the fraction done and the points of the current curve,
+        an (n, 3) array that is empty at first. If the function returns False, the design stops and
+        returns the last curve, or none if there is none yet.
 
     Returns
     -------
@@ -278,8 +283,8 @@ def design_curve(
     ControlPointError
         If there are too few points, or one is repeated, out of range or off the surface.
     UnreachableError
-        If no such curve exists on the surface, or only one that winds round itself too often, or if
-        obstacles of weight 1 separate the points.
+        If no simple curve through the points exists on the surface, if every path found winds
+        around itself too often, or if obstacles of weight 1 separate the points.
     ArgumentError
         If another argument cannot be used.
     MissingPackageError

@@ -1,4 +1,4 @@
-"""What a design gives back: how it ended, the curve, and what belongs to it."""
+"""The result of a design: its status, the curve, and the energy and level set of the curve."""
 
 from __future__ import annotations
 
@@ -21,24 +21,28 @@ class Design:
     Attributes
     ----------
     status : Status
+        How the design ended.
     curves : list of SurfaceCurve
-        One entry when all is well; none where a design was cancelled before there was a curve.
+        One curve, unless the status is `NOT_ONE_CURVE`. Empty if the design was cancelled before
+        there was a curve.
     iterations : int
-        Of the network's training, of the solver, or of the relaxation.
+        Number of iterations of the relaxation, the network's training or the variational solver.
     seconds : float
+        Duration of the design.
     energy : dict of str to float
-        The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", for lengths in
-        square roots of the surface's area; empty where there is no curve.
+        The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", with lengths in
+        units of the square root of the surface's area. Empty if there is no curve.
     breaking_vertices : int
-        Vertices whose predicted sign would have split the curve or missed a point, so that the
-        initial level set replaces the predicted one around them; 0 when it was one loop by itself.
+        Number of vertices whose predicted sign would have split the curve or missed a control
+        point. Around them the initial level set replaces the predicted one. 0 if the predicted zero
+        set was one loop, or if no level set was predicted.
     find_field : callable
-        Finds `field` when it is first asked for.
+        Computes `field` on first access.
     resumable : Resumable or None
-        What another design goes on from by ``start=``; None where `curves` has to do.
+        State from which a design with ``start=`` continues; None if it continues from `curves`.
     alternatives : list of Design
-        Curves along other courses, the fairest first, each at least 2 % of the diagonal away from
-        the others somewhere; empty unless they were asked for.
+        Curves along other courses, the fairest first. Each is somewhere at least 2 % of the
+        diagonal away from this curve and from the other alternatives. Empty unless requested.
     """
 
     status: Status
@@ -59,11 +63,11 @@ class Design:
 
     @cached_property
     def field(self) -> FloatArray:
-        """Level-set values in mesh units at the input mesh's vertices, shape (V,).
+        """Level-set values at the vertices of the input mesh, in mesh units, shape (V,).
 
-        Negative inside, or the distance without sign where the curve is open or bounds no region.
-        Vertices that are not connected to the control points get the largest value: they are
-        outside.
+        They are negative inside the curve. If the curve is open or bounds no region, they are
+        unsigned distances. Vertices that are not connected to the control points count as outside
+        and get the largest value.
 
         Raises
         ------
@@ -74,7 +78,7 @@ class Design:
 
 
 def cancelled_design(seconds: float) -> Design:
-    """A design that was cancelled before there was a curve."""
+    """The result of a design that was cancelled before there was a curve."""
 
     def no_field() -> FloatArray:
         raise CurveError(

@@ -1,6 +1,6 @@
-"""What can go wrong, by type: one root, and a message that says what to change.
+"""The exceptions of this package, with the base class `NicmmError`.
 
-Every message names the argument, says what was found and what would mend it.
+Every message names the argument, and says what was found and what to change.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PointName:
-    """A point by its argument and its index there, as messages name it."""
+    """The name of a point in messages: the name of its argument, and its index there."""
 
     argument: str
     index: int
@@ -20,12 +20,12 @@ class PointName:
 
 
 class NicmmError(Exception):
-    """Root of every error that this package raises for what it was given.
+    """Base class of all errors that this package raises because of its input.
 
     Attributes
     ----------
     points : tuple of PointName
-        The points that the message names.
+        Points that the message names.
     """
 
     def __init__(self, message: str, *points: PointName) -> None:
@@ -34,7 +34,7 @@ class NicmmError(Exception):
 
 
 class MeshError(NicmmError):
-    """The vertex or face array cannot be a triangle mesh."""
+    """The vertices and faces, or the mesh file, do not give a usable triangle mesh."""
 
 
 class ControlPointError(NicmmError):
@@ -42,16 +42,16 @@ class ControlPointError(NicmmError):
 
 
 class UnreachableError(NicmmError):
-    """No curve on this surface can do what was asked."""
+    """No curve on this surface can satisfy the request."""
 
 
 class ArgumentError(NicmmError):
-    """Another argument (a method, a map, a weight, a file) has a value that cannot be used."""
+    """Another argument, such as a method, map, weight or file, has a value that cannot be used."""
 
 
 class CurveError(NicmmError):
-    """A curve cannot be used so: it is not on the mesh, meets itself or bounds no region."""
+    """A curve cannot be used for this: it is not on the mesh, meets itself or bounds no region."""
 
 
 class MissingPackageError(NicmmError):
-    """A method needs a package that is not installed."""
+    """The chosen method needs a package that is not installed."""

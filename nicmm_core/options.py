@@ -1,8 +1,9 @@
-"""The options of a curve besides its control points, each defined once.
+"""The table of the options of a curve, each defined once.
 
-`design_curve`, the command line and Blender's properties take names, defaults, limits and
-descriptions from here. This module imports nothing of the package, so that Blender can read it
-without loading the core.
+The checks in `arguments`, the command line and Blender's properties take names, defaults, limits
+and descriptions from this table. The signature of `design_curve` repeats names and defaults, which
+a test compares. This module imports nothing from the package, so that Blender can read it without
+loading the core.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 FEWEST_CLOSED, FEWEST_OPEN = 3, 2
-"""Control points of a closed and of an open curve at least."""
+"""Least number of control points of a closed curve and of an open one."""
 
 
 class Kind(Enum):
-    """What the value of an option is."""
+    """The kind of value that an option takes."""
 
     SWITCH = "True or False"
     CHOICE = "one of several names"
@@ -28,7 +29,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Choice:
-    """One of several names: as scripts pass it, as users see it, and what it does."""
+    """One of the values of a choice: its name in scripts, its label and its effect."""
 
     name: str
     label: str
@@ -42,22 +43,23 @@ class Option:
     Attributes
     ----------
     name : str
-        Of the keyword argument.
+        Name of the keyword argument.
     kind : Kind
     default : object
     label : str
-        What users see.
+        Label in user interfaces.
     description : str
-        A sentence without its full stop.
+        Tooltip and command-line help, without the last full stop.
     choices : tuple of Choice
+        Accepted values of a choice.
     limits : (float, float)
-        Of a number, a count or a length, both included.
+        Smallest and largest value of a number, a count or a length, both included.
     usual : (float, float)
-        Limits of a slider.
+        Range of a slider, inside the limits.
     needs : str
-        The option without which this one has no effect.
+        Name of the option without which this one has no effect, or "".
     flag : str
-        Of the command line, where it is not the name; for a switch, what turns it off.
+        Command-line flag, if it differs from the name. The flag of a switch inverts its default.
     """
 
     name: str
@@ -73,7 +75,7 @@ class Option:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Those that can be chosen."""
+        """Names of the choices."""
         return tuple(choice.name for choice in self.choices)
 
 
@@ -163,9 +165,9 @@ OPTIONS: tuple[Option, ...] = (
         usual=(0.0, 5.0),
     ),
 )
-"""In the order in which users see them."""
+"""All options, in the order in which user interfaces show them."""
 
 
 def option(name: str) -> Option:
-    """The option with a name."""
+    """The option with a given name."""
     return next(each for each in OPTIONS if each.name == name)

@@ -1,8 +1,8 @@
-"""Progress of a design and its cancellation.
+"""Progress reports and cancellation of a design.
 
-Any stage may take long, from the search for a path to the relaxation. So all of them call
-`checkpoint` often, which costs little more than reading a clock. `watched` sets the progress
-function of the design running in this context, so that stages need no parameter for it.
+Any stage may take a long time, from the search for a path to the relaxation. So every stage calls
+`checkpoint` often; a call costs little more than reading a clock. `watched` sets the progress
+function of the design that runs in the current context, so that stages need no parameter for it.
 
 `checkpoint` may raise `CancelledError`. Call it only where data that outlive the design are
 consistent.
@@ -21,27 +21,31 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 Progress = Callable[[float, FloatArray], object]
-"""Called with the fraction done and the points of the current curve, (n, 3); False cancels."""
+"""Function of the fraction done and the points of the current curve, (n, 3).
+
+It cancels the design by returning False.
+"""
 
 Placement = Callable[[FloatArray], FloatArray]
-"""From positions on a copy of a mesh to those on the mesh that the caller gave, (n, 3)."""
+"""Map from positions on a copy of a mesh, (n, 3), to positions on the mesh of the caller."""
 
 INTERVAL = 0.1
 """Least time between two calls of a progress function, in seconds.
 
-A cancellation takes effect within 0.2 s.
+A cancellation usually takes effect within 0.2 s. On meshes of a million faces it may take longer,
+since checkpoints are farther apart there.
 """
 
 SHOWING = 10.0
-"""Least time between two evaluations of the points, relative to the duration of the last one."""
+"""Pause between two evaluations of the points, relative to the duration of the earlier one."""
 
 
 class CancelledError(Exception):
-    """The caller has cancelled. Internal: the status of a design reports it to the caller."""
+    """The caller has cancelled. Internal: `Design.status` reports the cancellation."""
 
 
 class _Watch:
-    """A progress function with the time of its next call and its last arguments."""
+    """A progress function with the time of its next call and the arguments of its last call."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -51,7 +55,7 @@ class _Watch:
         self._shown = self._stopped = False
         self._next_call = time.perf_counter() + INTERVAL
         self._next_points = 0.0
-        # The current subrange of the whole, and where its points are shown.
+        # The subrange of the current stage, and the map of its points to the mesh of the caller.
         self.low, self.high = 0.0, 1.0
         self.place: Placement = lambda points: points
 
@@ -66,7 +70,7 @@ class _Watch:
             self._pending = lambda: place(points())
         now = time.perf_counter()
         new = self._pending is not None and now >= self._next_points
-        # The first curve is shown at once.
+        # The first curve is shown without waiting for the interval.
         if now < self._next_call and (self._shown or not new):
             return
         self._next_call = now + INTERVAL
@@ -75,7 +79,7 @@ class _Watch:
             self._points, self._shown = find(), True
             after = time.perf_counter()
             self._next_points = after + SHOWING * (after - now)
-        # A copy, which the caller may modify.
+        # The caller may modify the copy.
         answer = self._progress(self._fraction, self._points.copy())
         self._stopped = isinstance(answer, bool | np.bool_) and not answer
         self._next_call = time.perf_counter() + INTERVAL
@@ -88,7 +92,7 @@ _watch: ContextVar[_Watch | None] = ContextVar("watch", default=None)
 
 @contextlib.contextmanager
 def watched(progress: Progress | None) -> Iterator[None]:
-    """Report progress within this block to a function, or to none; False cancels."""
+    """Report the progress of this block to a function, if there is one; False cancels."""
     token = _watch.set(None if progress is None else _Watch(progress))
     try:
         yield
@@ -118,7 +122,7 @@ def checkpoint(done: float | None = None, points: Callable[[], FloatArray] | Non
 
 @contextlib.contextmanager
 def subrange(start: float, end: float) -> Iterator[None]:
-    """Map progress within this block to a subrange of the current range, by fractions."""
+    """Map the progress of this block to a subrange, given by two fractions of the current range."""
     watch = _watch.get()
     if watch is None:
         yield
@@ -134,7 +138,7 @@ def subrange(start: float, end: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def placed(place: Placement) -> Iterator[None]:
-    """Show the points of this block, (n, 3), at the positions that a function gives them."""
+    """Map the points that this block reports, (n, 3), to other positions by a function."""
     watch = _watch.get()
     if watch is None:
         yield

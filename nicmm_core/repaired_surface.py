@@ -1,7 +1,7 @@
-"""The manifolds of a surface with their designers, and the map of requests and designs to them.
+"""Finds a manifold for each request, and maps requests, starts and designs between it and the mesh.
 
-A mesh without defects is its own manifold. Otherwise `repair.nonmanifold` has several methods to
-make one, and the first is used on which the points of a request are connected.
+A mesh without defects is used directly. Otherwise `repair.nonmanifold` has several methods to make
+a manifold, which are tried in turn until the points of the request are connected.
 """
 
 from __future__ import annotations
@@ -26,13 +26,16 @@ from .surface_designer import SurfaceDesigner
 
 
 class RepairedSurface:
-    """Manifolds of some faces of a mesh, each made when it is first needed, and then kept.
+    """Manifolds made from the same faces of a mesh by different methods, with their designers.
+
+    Each manifold is made when it is first needed, and then kept.
 
     Parameters
     ----------
     mesh : Mesh
+        The given mesh.
     usable : (u,) int array
-        The faces that curves may enter, ascending.
+        Faces that curves may enter, ascending.
     """
 
     def __init__(self, mesh: Mesh, usable: IntArray) -> None:
@@ -43,7 +46,7 @@ class RepairedSurface:
     def first(self) -> MappedMesh:
         """The manifold in which the straightest pairs of faces are joined at non-manifold edges."""
         first = self._repair(0)
-        assert first is not None  # only the others may be None
+        assert first is not None  # only later methods may return None
         return first[0]
 
     @property
@@ -53,9 +56,10 @@ class RepairedSurface:
         return [one[0] for one in made if one is not None][-1]
 
     def find(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request] | None:
-        """A manifold on which the points are connected, its designer, and the request there.
+        """Find a manifold on which the points of a request are connected.
 
-        None if they are connected on no manifold.
+        Returns the manifold, its designer and the request mapped to it, or None if the points are
+        connected on no manifold.
         """
         for number in range(REPAIRS):
             found = self._repair(number)
@@ -65,6 +69,7 @@ class RepairedSurface:
         return None
 
     def _repair(self, number: int) -> tuple[MappedMesh, SurfaceDesigner] | None:
+        """The manifold made by one method, with its designer; None if `repaired` returns None."""
         while len(self._made) <= number:
             mapped = repaired(self._mesh, len(self._made), self._usable)
             self._made.append(None if mapped is None else (mapped, SurfaceDesigner(mapped.mesh)))
@@ -97,13 +102,14 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     Returns
     -------
     Resumable or SurfaceCurve
-        Each point of a SurfaceCurve in the face of the segment after it.
+        The start on the mapped mesh. Each point of a SurfaceCurve is given in the face of the
+        segment that begins there.
 
     Raises
     ------
     CurveError
-        If the start is not one curve through its control points on the original, or enters
-        obstacles.
+        If the start is not one curve through its control points on the original, enters faces that
+        curves may not enter, or passes a non-manifold edge where the repair has cut it.
     """
     if isinstance(start, Design):
         resumable = start.resumable
@@ -147,14 +153,14 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
-    """An open curve from its first control point to its last one."""
+    """The part of an open curve between its first and its last control point."""
     index = curve.control_index
     kept = slice(index[0], index[-1] + 1)
     return curve_on_mesh(mesh, False, curve.faces[kept], curve.barycentric[kept], index - index[0])
 
 
 def design_on_original(mapped: MappedMesh, design: Design) -> Design:
-    """Map a design on a mapped mesh to the original."""
+    """Map a design from a mapped mesh to the original."""
     if not mapped.differs:
         return design
     return replace(

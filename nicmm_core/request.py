@@ -1,4 +1,4 @@
-"""What a curve is asked for, checked and in one form, so that requests can be compared."""
+"""A checked request for a curve, in one canonical form, so that requests can be compared."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .path.via_points import LocatedViaPoints
 
 @dataclass(frozen=True)
 class Request:
-    """A curve on a mesh; nothing in it belongs to the caller.
+    """A request for a curve on a mesh; it shares no data with the caller.
 
     Attributes
     ----------
@@ -24,13 +24,15 @@ class Request:
     closed : bool
     order : {"given", "shortest"}
     via_points : dict
-        From the index of a control point to points on the path to the next one.
+        Points on the path to the next control point, by the index of the control point before.
     method : {"nicmm", "nicmm-paper", "variational"}
     smoothness : float
     obstacles : (V,) float array or None
     clearance : float
-        Distance from obstacles of weight 1.
+        Least distance from obstacles of weight 1, in mesh units.
     alignment : (V,) float array or None
+    alternatives : int
+        Largest number of further curves along other courses.
     """
 
     points: SurfacePoints
@@ -46,18 +48,18 @@ class Request:
 
     @property
     def has_maps(self) -> bool:
-        """Whether there is something to avoid or to follow."""
+        """Whether there are obstacles or an alignment map."""
         return self.obstacles is not None or self.alignment is not None
 
     @property
     def named_points(self) -> dict[str, SurfacePoints]:
-        """All points, by the argument that they come from."""
+        """Control points and via points, by the argument that contains them."""
         via = {f"via_points[{key}]": points for key, points in self.via_points.items()}
         return {"control_points": self.points, **via}
 
 
 def renumbered_request(there: Renumbered, request: Request) -> Request:
-    """A request on the original of a renumbered mesh as one on that."""
+    """Map a request from the original of a renumbered mesh to the renumbered copy."""
     via_points = {key: there.points(points) for key, points in request.via_points.items()}
     return replace(
         request,
@@ -69,7 +71,7 @@ def renumbered_request(there: Renumbered, request: Request) -> Request:
 
 
 def same_request(one: Request, other: Request) -> bool:
-    """Whether requests do not differ at all."""
+    """Whether two requests are equal in every field."""
     return all(
         _same(getattr(one, field.name), getattr(other, field.name)) for field in fields(Request)
     )

@@ -1,7 +1,7 @@
-"""Generated shapes for pretraining, tests and examples, without any files.
+"""Generates meshes for pretraining, tests and examples, so that no mesh files are needed.
 
-`creature` makes random bodies with limbs, as coarse as scanned collections, so that the training
-data contain thin parts, saddles and tips.
+`creature` makes random bodies with limbs, as coarse as the meshes in collections of scans, so that
+the training data contain thin parts, saddles and tips.
 """
 
 from __future__ import annotations
@@ -26,7 +26,15 @@ def sphere(subdivisions: int = 4) -> Mesh:
 
 
 def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int = 48) -> Mesh:
-    """Torus about the z axis."""
+    """Torus round the z axis.
+
+    Parameters
+    ----------
+    major, minor : float
+        Radius of the centre line, and radius of the tube.
+    around, across : int
+        Numbers of vertices along the centre line and round the tube.
+    """
     u, v = np.meshgrid(
         np.arange(around) * 2 * np.pi / around,
         np.arange(across) * 2 * np.pi / across,
@@ -60,7 +68,7 @@ def cube(pieces: int = 8) -> Mesh:
 
 
 def disc(rings: int = 24) -> Mesh:
-    """Flat unit disc in the xy plane: rings of 6, 12, 18 … vertices round a centre."""
+    """Flat unit disc in the xy plane, with rings of 6, 12, 18 … vertices round its centre."""
     points = [np.zeros((1, 2))]
     for ring in range(1, rings + 1):
         angle = np.arange(6 * ring) * 2 * np.pi / (6 * ring)
@@ -71,14 +79,14 @@ def disc(rings: int = 24) -> Mesh:
 
 
 def annulus(rings: int = 16, hole: float = 0.3) -> Mesh:
-    """The unit disc without the vertices within the hole's radius."""
+    """Flat unit disc without the vertices that are no farther from its centre than ``hole``."""
     whole = disc(rings)
     outside = np.linalg.norm(whole.vertices, axis=1) > hole
     return _used_part(whole.vertices, whole.faces[outside[whole.faces].all(axis=1)])
 
 
 def moebius_strip(around: int = 48, across: int = 8) -> Mesh:
-    """A strip of width 0.8 about the unit circle with a half twist."""
+    """Strip of width 0.8 along the unit circle, with a half twist."""
     u, v = np.meshgrid(
         np.arange(around) * 2 * np.pi / around, np.linspace(-0.4, 0.4, across + 1), indexing="ij"
     )
@@ -91,14 +99,14 @@ def moebius_strip(around: int = 48, across: int = 8) -> Mesh:
 
 
 def double_torus(faces: int = 700, subdivisions: int = 1) -> Mesh:
-    """A surface of genus two: two rings side by side along the x axis.
+    """Surface of genus two: two rings side by side along the x axis.
 
     Parameters
     ----------
     faces : int
-        Faces after decimation, before subdivision.
+        Number of faces after decimation and before subdivision.
     subdivisions : int
-        Loop subdivisions, each of which multiplies the faces by four.
+        Number of Loop subdivisions, each of which multiplies the number of faces by four.
     """
     x, y, z = (np.linspace(-a, a, n) for a, n in ((1.7, 46), (1.0, 28), (0.5, 16)))
     grid = np.stack([g.ravel() for g in np.meshgrid(z, y, x, indexing="ij")][::-1], axis=1)
@@ -111,17 +119,18 @@ def double_torus(faces: int = 700, subdivisions: int = 1) -> Mesh:
 
 
 def creature(seed: int, resolution: int = 48, faces: int = 500, subdivisions: int = 2) -> Mesh:
-    """A random body with two to five limbs, decimated and Loop subdivided.
+    """Random body with two to five limbs, decimated and then smoothed by Loop subdivision.
 
     Parameters
     ----------
     seed : int
+        Seed of the random shape.
     resolution : int
-        Grid cells along the longest side of the implicit surface.
+        Number of grid cells along the longest side of the box around the implicit surface.
     faces : int
-        Faces after decimation, before subdivision.
+        Number of faces after decimation and before subdivision.
     subdivisions : int
-        Loop subdivisions, each of which multiplies the faces by four.
+        Number of Loop subdivisions, each of which multiplies the number of faces by four.
     """
     generator = np.random.default_rng(seed)
     starts, ends, radii = [], [], []
@@ -148,7 +157,7 @@ def creature(seed: int, resolution: int = 48, faces: int = 500, subdivisions: in
 def _capsules(
     starts: FloatArray, ends: FloatArray, radii: FloatArray, resolution: int
 ) -> tuple[FloatArray, IntArray]:
-    """Smooth union of capsules as the zero set of a distance on a grid."""
+    """Smooth union of capsules, as the zero set of a distance sampled on a grid."""
     low = np.minimum(starts, ends).min(axis=0) - 2 * radii.max()
     high = np.maximum(starts, ends).max(axis=0) + 2 * radii.max()
     cell = (high - low).max() / resolution
@@ -177,13 +186,13 @@ def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArra
 
 
 def _used_part(vertices: FloatArray, faces: IntArray) -> Mesh:
-    """Faces with only the vertices that they use."""
+    """Mesh of the given faces, with only the vertices that they use."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], renumbered.reshape(-1, 3).astype(np.int64))
 
 
 def _halved_quads(a: IntArray, b: IntArray, c: IntArray, d: IntArray) -> IntArray:
-    """Triangles abc of all quads, then triangles acd, (n, 3)."""
+    """Two triangles for each quad abcd, (n, 3): abc of all quads, then acd of all quads."""
     halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((a, b, c), (a, c, d))]
     return np.concatenate(halves)
 

@@ -1,8 +1,8 @@
-"""The start of a design: an earlier curve, moved to control points that may differ.
+"""Fits a start, an earlier curve, to the control points of a request.
 
 The course of the start is kept. Control points may have been moved, added or removed: `moved_start`
-matches them with the points of the start and moves the curve to them. A start that cannot be used
-raises `CurveError`; there is no fallback to another course.
+matches them with the control points of the start and moves the curve to them. A start that cannot
+be used raises `CurveError`; there is no fallback to another course.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .request import Request
 WITHOUT_START = "; design it without start"
 
 LONGEST_TRACE = 1.5
-"""Longest trace from the old to the new place of a control point, relative to their distance."""
+"""Longest trace of a control point to its new position, relative to the straight distance."""
 
 STEPS = 4
 """Steps in which a curve is moved if it would cross itself in one step."""
@@ -40,20 +40,20 @@ ITERATIONS_OF_A_STEP = 3
 
 @dataclass(frozen=True)
 class Resumable:
-    """The relaxed curve of a design with its nodes.
+    """A relaxed curve with its nodes, from which a later design can continue.
 
     Attributes
     ----------
     mesh : Mesh
-        The manifold on which it lies.
+        The manifold on which the curve lies.
     request : Request
-        The request that it meets, on this mesh.
+        The request that the curve answers, on this manifold.
     curve : NodedCurve
     visited : (k,) int array
-        The index in the request of each control node.
+        For each control node, the index of its control point in the request.
     collisions : int
-        Number of next designs in which strands are assumed to collide, so that every iteration is
-        traced.
+        Number of the following designs in which strands are assumed to collide, so that every
+        iteration is traced.
     """
 
     mesh: Mesh
@@ -66,32 +66,37 @@ class Resumable:
 def moved_start(
     surface: CurveSurface, start: Resumable | SurfaceCurve, request: Request
 ) -> tuple[NodedCurve, IntArray]:
-    """The curve of a start, moved to the control points of a request.
+    """Move the curve of a start to the control points of a request.
+
+    If the request has as many control points as the start, points are matched by index or by their
+    order along the start, whichever moves them less; a SurfaceCurve is matched by distance if the
+    order is "shortest". Otherwise points at unchanged positions are matched, and every new point is
+    inserted at the nearest position on the curve, between its neighbours if the order is "given".
 
     Parameters
     ----------
     surface : CurveSurface
         The surface of the start.
     start : Resumable or SurfaceCurve
-        Each point of a SurfaceCurve in the face of the segment after it.
+        A curve on the surface. The points of a SurfaceCurve must be given in the face of the
+        segment after them.
     request : Request
-        If it has as many control points as the start, each point moves to the one with the same
-        index. Otherwise points are matched by position, and a new point is inserted at the nearest
-        position on the curve between its neighbours.
+        The request with the new control points.
 
     Returns
     -------
     NodedCurve
-        Simple.
+        The moved curve, which is simple.
     (k,) int array
-        The index in the request of each control node.
+        For each control node, the index of its control point in the request.
 
     Raises
     ------
     CurveError
-        If the start is open instead of closed or closed instead of open, is not simple, or visits
-        the points in another order, if a point is farther away than `LONGEST_MOVE` times the
-        curve's length, or if the moved curve would cross itself.
+        If the start is open where a closed curve is requested or vice versa, is not simple, visits
+        the points in another order, or has another number of control points and none at an
+        unchanged position; if a point has moved by more than `LONGEST_MOVE` times the curve's
+        length; or if the moved curve would cross itself.
     """
     if isinstance(start, Resumable):
         curve, visited = start.curve, start.visited
@@ -146,7 +151,10 @@ def _moved_in_steps(
 def _routes(
     surface: CurveSurface, curve: NodedCurve, points: SurfacePoints
 ) -> list[SurfacePoints] | None:
-    """Points on the trace from each control node to its new position, including both ends."""
+    """For each control node, points on the trace to its new position, including both ends.
+
+    None if one of the traces fails.
+    """
     mesh, at_controls = surface.mesh, curve.control_nodes
     here = curve.nodes.places[at_controls]
     inside = SurfacePoints(here.faces, strictly_inside(here.barycentric))
@@ -164,7 +172,7 @@ def _routes(
 
 
 def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: SurfacePoints) -> None:
-    """Raise CurveError if a control point is too far away from its node."""
+    """Raise CurveError if a control node has to move too far to its control point."""
     away = points[visited].positions(mesh) - curve.nodes.positions[curve.control_nodes]
     distance = np.linalg.norm(away, axis=1)
     longest = LONGEST_MOVE * curve.length
@@ -180,7 +188,10 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
 def _nearest_numbering(
     mesh: Mesh, curve: NodedCurve, visited: IntArray | None, request: Request
 ) -> IntArray:
-    """The index of the point for each control node, for equal numbers of both."""
+    """For each control node, the index of its control point, if there are as many as nodes.
+
+    Of the possible numberings, the one with the smallest maximum move is taken.
+    """
     count = len(request.points)
     numberings = [np.arange(count)]
     if visited is not None and (request.order == "shortest" or _ascending(visited, curve.closed)):
@@ -195,7 +206,7 @@ def _nearest_numbering(
 
 
 def _ascending(numbers: IntArray, closed: bool) -> bool:
-    """Whether numbers ascend; on a closed curve, from any starting point."""
+    """Whether indices ascend; on a closed curve, from some starting point."""
     first = int(numbers.argmin()) if closed else 0
     return bool((np.diff(np.roll(numbers, -first)) > 0).all())
 
@@ -203,7 +214,7 @@ def _ascending(numbers: IntArray, closed: bool) -> bool:
 def _begun_at_first(
     surface: CurveSurface, curve: NodedCurve, visited: IntArray
 ) -> tuple[NodedCurve, IntArray]:
-    """A closed curve from its control point 0 on, and which points its control nodes are."""
+    """Rotate a closed curve so that it begins at control point 0; return it and its indices."""
     first = int(visited.argmin())
     whole = curve.surface_curve(surface.mesh)
     whole = replace(whole, control_index=np.roll(whole.control_index, -first))
@@ -213,13 +224,13 @@ def _begun_at_first(
 def _with_other_points(
     surface: CurveSurface, curve: NodedCurve, request: Request
 ) -> tuple[NodedCurve, IntArray]:
-    """The same curve with control nodes at, or nearest to, the points of a request.
+    """Replace the control nodes of a curve by nodes at, or nearest to, the points of a request.
 
     Returns
     -------
     NodedCurve
     (k,) int array
-        The index in the request of each control node.
+        For each control node, the index of its control point in the request.
     """
     mesh = surface.mesh
     line = _Line(mesh, curve)
@@ -271,18 +282,18 @@ class _Line:
         self.length = float(self.arc[-1])
 
     def begun_at(self, arc: float) -> _Line:
-        """The same closed polyline, beginning at another of its points."""
+        """The same closed polyline, beginning at its point nearest to an arc length."""
         return _Line(self.mesh, self.curve, int(np.abs(self.arc - arc).argmin()))
 
     def nearest(self, position: FloatArray, low: float, high: float) -> float:
-        """The arc length, between two bounds, of the nearest point to a position, (3,)."""
+        """Arc length of the point nearest to a position, (3,), between two arc lengths."""
         start = self.positions
         step = np.roll(start, -1, axis=0) - start
         start, step = start[: len(self.arc) - 1], step[: len(self.arc) - 1]
         lengths = np.maximum(np.diff(self.arc), tolerances.TINY)
         squared = (step * step).sum(axis=1)
         share = ((position - start) * step).sum(axis=1) / np.where(squared > 0.0, squared, 1.0)
-        with np.errstate(over="ignore"):  # along segments of hardly any length
+        with np.errstate(over="ignore"):  # on segments of almost no length
             begin, end = (low - self.arc[:-1]) / lengths, (high - self.arc[:-1]) / lengths
         share = np.clip(share, np.clip(begin, 0.0, 1.0), np.clip(end, 0.0, 1.0))
         distance = np.linalg.norm(start + share[:, None] * step - position, axis=1)
@@ -291,7 +302,7 @@ class _Line:
         return float(self.arc[segment] + share[segment] * lengths[segment])
 
     def with_points(self, arcs: FloatArray) -> SurfaceCurve:
-        """The curve with control points at ascending arc lengths; an open one is cut off there."""
+        """The curve with control points at ascending arc lengths; an open one is trimmed there."""
         n = len(self.polyline)
         apart = np.abs(self.arc[:n, None] - arcs)
         at_point = apart <= tolerances.AT_ONE_PLACE * self.mesh.diagonal

@@ -1,6 +1,6 @@
-"""Designs curves on a manifold: starts from an earlier curve, a course or the network.
+"""Designs a curve on a manifold: from an earlier curve, from a course, or from the network.
 
-This is the main course of a checked request; `design` is its entry point.
+This is the pipeline of a checked request; `design` is its entry point.
 """
 
 from __future__ import annotations
@@ -43,28 +43,35 @@ from .start import Resumable, moved_start
 from .status import Status
 
 STARTED = 0.6
-"""Approximate fraction of the time before relaxation begins."""
+"""Approximate fraction of the total time that passes before the relaxation."""
 
 SOON_DONE = 10
-"""The limit on iterations of a relaxation, relative to the number that most curves need."""
+"""Limit on the iterations of a relaxation, relative to the number that most curves need.
+
+Since most curves converge long before the limit, reported progress rises quickly at first.
+"""
 
 STRONGLY_BENT = 80.0
-"""L ∮ κ_g² ds above which courses are sought again, with random lengths, and the best is kept.
+"""L ∮ κ_g² ds above which the search is repeated with random lengths, and the best result kept.
 
-Twice that of a circle: such curves wind around thin limbs, where a search misses more courses.
+It is twice the value of a circle. Curves above it wind around thin limbs, where a search misses
+more courses.
 """
 
 DRAWS = 2
-"""Searches with random lengths."""
+"""Number of searches with random lengths."""
 
 MOST_TRACED = 20_000
-"""Points of curves times iterations of their relaxations above which no more courses are sought."""
+"""Sum of points times iterations over the relaxations above which the search is not repeated."""
 
 MOST_TRIED = 10
-"""Courses relaxed for alternatives, besides two for each: many relax to the same curve."""
+"""Courses relaxed for alternatives, in addition to two for each alternative.
+
+Many courses relax to the same curve.
+"""
 
 COLLISIONS = 3
-"""Designs for which strands are assumed to collide after a collision."""
+"""Number of designs after a collision for which strands are assumed to collide again."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,7 @@ class _Start:
     """A simple curve on the mesh from which relaxation begins."""
 
     curve: SurfaceCurve | NodedCurve
-    visited: IntArray  # (k,) control points in the order visited
+    visited: IntArray  # (k,) indices of control points in the order visited
     surface: CurveSurface
     unit: float  # square root of the surface's area
     breaking: int = 0
@@ -80,12 +87,12 @@ class _Start:
 
 
 class SurfaceDesigner:
-    """Designs curves on one mesh; computes once what depends only on the mesh.
+    """Designs curves on one manifold. What depends only on the mesh is computed once.
 
     Parameters
     ----------
     mesh : Mesh
-        Every face has an area, and no edge has more than two faces.
+        A mesh whose faces all have an area and whose edges have at most two faces.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -104,16 +111,16 @@ class SurfaceDesigner:
         ----------
         request : Request
         started : float
-            Time at which the design began, by `time.perf_counter`.
+            Value of `time.perf_counter` when the design began.
         start : Resumable or SurfaceCurve, optional
             A curve on this mesh from which the method "nicmm" starts.
         max_iterations : int, optional
-            Limit on the iterations of the relaxation in total.
+            Limit on the total number of iterations of the relaxation.
 
         Raises
         ------
         UnreachableError
-            If no simple curve passes the points in this order.
+            If no simple curve passes through the points in this order.
         CurveError
             If the start cannot be used.
         """
@@ -152,7 +159,7 @@ class SurfaceDesigner:
         return self._relaxed(request, begin, config, max_iterations, started)
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
-        """Relax the best course, or the curve of the network where none is found."""
+        """Relax the best course, or the curve of the network if no course is found."""
         config = RelaxationConfig() if request.alignment is None else GUIDED
         with subrange(0.0, STARTED):
             courses = self._course_starts(request)
@@ -180,11 +187,11 @@ class SurfaceDesigner:
             return _fairest(start.surface, designs, request)
 
     def _drawn_courses(self, request: Request) -> list[Iterator[_Start]]:
-        """The courses of each search with random lengths, each search begun on first use."""
+        """The courses of each search with random lengths. A search begins on first use."""
         return [self._course_starts(request, draw) for draw in range(1, 1 + DRAWS)]
 
     def _course_starts(self, request: Request, draw: int = 0) -> Iterator[_Start]:
-        """Courses that are simple on the mesh, the best first; draws above 0 give others."""
+        """Courses that are simple on the mesh, the best first; draws above 0 use random lengths."""
         there, unit = self._curve_surface(request), self._unit(request)
         if self._coarse_starts.is_large(request):
             for found in self._coarse_starts.courses(request, draw):
@@ -206,7 +213,7 @@ class SurfaceDesigner:
                 yield _Start(curve, course.visited, there, unit)
 
     def _start_by_network(self, request: Request) -> _Start:
-        """The zero set of the network's level set, or the path where that is not one curve."""
+        """The zero set of the network's level set, or the path if the zero set is not simple."""
         coarse = self._coarse_starts.by_network(request)
         if coarse is not None:
             return _Start(
@@ -239,7 +246,7 @@ class SurfaceDesigner:
         max_iterations: int | None,
         started: float,
     ) -> Design:
-        """Relax a curve to a design."""
+        """Relax a start and return the result as a design."""
         if max_iterations is not None:
             config = replace(config, most_iterations=max_iterations)
 
@@ -267,7 +274,7 @@ class SurfaceDesigner:
     def _level_set_design(
         self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
     ) -> Design:
-        """The design of a level set."""
+        """The design whose curve is the zero set of a level set, without relaxation."""
         one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
         return Design(
             status=solution.status if one else Status.NOT_ONE_CURVE,
@@ -280,7 +287,7 @@ class SurfaceDesigner:
         )
 
     def _solution(self, problem: Problem, request: Request, watch: _FieldWatch) -> Solution:
-        """The level set of a method other than "nicmm"."""
+        """Solve for the level set by a method other than "nicmm"."""
         weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
         if request.method == "variational":
             return variational.solve(problem, weights, variational.VariationalConfig(), watch)
@@ -315,7 +322,7 @@ class SurfaceDesigner:
 def _repay_another_search(designs: list[Design]) -> bool:
     """Whether the first curve bends so much that the search may have missed a far better one.
 
-    Not where the relaxations took long, as on needles: another one would take as long.
+    False if the relaxations took long, as on needles, since another one would take as long.
     """
     resumable = designs[0].resumable
     assert resumable is not None
@@ -326,7 +333,7 @@ def _repay_another_search(designs: list[Design]) -> bool:
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
-    """The design of least energy, with others that differ from it and from each other."""
+    """The design of least energy; its alternatives differ from it and from each other."""
     curves = [design.resumable.curve for design in designs if design.resumable is not None]
     if len(designs) == 1 or len(curves) < len(designs):
         return designs[0]
@@ -349,7 +356,7 @@ def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> 
 
 
 def _differs(start: _Start, designs: list[Design]) -> bool:
-    """Whether a course is apart from the curves of designs, as they are now."""
+    """Whether a course is apart from the curves of all designs so far."""
     assert isinstance(start.curve, NodedCurve)
     positions, limit = start.curve.nodes.positions, APART * start.surface.mesh.diagonal
     return all(
@@ -360,7 +367,7 @@ def _differs(start: _Start, designs: list[Design]) -> bool:
 
 
 class _FieldWatch:
-    """Reports the zero set during the solution for a level set, and keeps the last one."""
+    """Reports the zero set while a level set is computed, and keeps the last one reported."""
 
     def __init__(self, mesh: Mesh, problem: Problem) -> None:
         self._mesh, self._problem = mesh, problem
@@ -375,7 +382,7 @@ class _FieldWatch:
 
     @property
     def solution(self) -> Solution:
-        """The level set shown last, after a solver was cancelled."""
+        """The level set reported last, as the solution of a cancelled solver."""
         assert self.shown is not None  # checked by the caller
         field = self.shown.field
         terms = loss_terms(energy_surface(self._problem), field)
@@ -389,8 +396,9 @@ class _FieldWatch:
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
-    """φ in mesh units at the input vertices."""
+    """φ at the input vertices, in mesh units; vertices without φ get the largest value."""
     if problem.bundle is not None:
+        # A section of a sign bundle has no sign at a vertex: the sign depends on the face.
         field = np.abs(field)
     inputs = problem.working.input_vertex
     values = np.full(len(mesh.vertices), field.max() * problem.unit)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar and the menu entries."""
+"""The sidebar panels and the menu entries."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of the curves designed on a mesh."""
+"""The list of curves designed on a mesh, in the sidebar."""
 
 import bpy
 from bpy.props import IntProperty
@@ -15,7 +15,7 @@ UPDATE_ICON = "FILE_REFRESH"
 
 
 class NICMM_UL_curves(bpy.types.UIList):
-    """All objects of the file, filtered to the curves on one mesh"""
+    """List of the curves designed on the mesh, filtered from all objects of the file"""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_name):
         row = layout.row(align=True)
@@ -46,7 +46,7 @@ def _active_index(_window_manager) -> int:
 
 
 def _activate(_window_manager, index: int) -> None:
-    """Make an object active, in Object Mode only: in other modes the mesh must stay active."""
+    """Make an object active, but only in Object Mode: in other modes the mesh must stay active."""
     context = bpy.context
     if context.mode == "OBJECT" and index < len(bpy.data.objects):
         chosen = bpy.data.objects[index]
@@ -71,7 +71,7 @@ def register() -> None:
     bpy.utils.register_class(NICMM_UL_curves)
     bpy.types.WindowManager.nicmm_active_curve = IntProperty(
         name="Active Curve",
-        description="The active curve in the viewport",
+        description="Active curve in the viewport",
         get=_active_index,
         set=_activate,
         options={"SKIP_SAVE"},

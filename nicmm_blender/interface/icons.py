@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Icons of the operators, the same in panels and menus."""
+"""Icons of the operators, shared by panels and menus."""
 
 DESIGN = "CURVE_BEZCIRCLE"
 EDIT = "CURVE_PATH"

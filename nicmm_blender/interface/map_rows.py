@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel rows to choose, create and paint a map, and their menus."""
+"""Panel rows for choosing, creating and painting a map, with their menus."""
 
 import bpy
 
@@ -7,7 +7,7 @@ from ..operators import maps
 
 
 def draw_row(layout, properties, role: str, context, mesh_object) -> None:
-    """Draw the field of a vertex group with buttons to create and paint it."""
+    """Draw the vertex group field of a map, with buttons that create and paint the group."""
     field = maps.FIELDS[role]
     row = layout.row(align=True)
     row.prop_search(properties, field, mesh_object, "vertex_groups")

@@ -18,9 +18,9 @@ def draw_in_menu(menu, context) -> None:
 
 
 def draw_edit(layout, context) -> None:
-    """Draw the entry of the tool, named after what it does with the active object.
+    """Draw the menu entry of the tool, labelled by what it does with the active object.
 
-    Not in Edit Mode, which the tool does not draw in.
+    In Edit Mode the entry is left out, because the tool does not work there.
     """
     if context.mode not in modes.TOOLS:
         return
@@ -30,13 +30,13 @@ def draw_edit(layout, context) -> None:
 
 
 def draw_in_context_menu(menu, context) -> None:
-    """Draw the entries in vertex select mode only: Edit Mode has one context menu for all."""
+    """Draw the entries in vertex select mode only; all select modes share one context menu."""
     if context.tool_settings.mesh_select_mode[0]:
         draw_in_menu(menu, context)
 
 
 def draw_conversions(menu, context) -> None:
-    """Draw one entry for each output if a designed curve is active."""
+    """Draw a submenu with all outputs if a designed curve is active."""
     if not curve_record.has_record(context.active_object):
         return
     _begin(menu)

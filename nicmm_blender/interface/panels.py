@@ -13,7 +13,7 @@ from . import curve_list, icons, map_rows, menus
 
 
 class SidebarPanel:
-    """The sidebar tab that holds all panels."""
+    """Base of all panels: places them in one tab of the sidebar."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -21,7 +21,7 @@ class SidebarPanel:
 
 
 class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
-    """Settings and button for a new curve"""
+    """Settings of the active curve, or of a new one"""
 
     bl_label = "NICMM Curves"
 
@@ -43,7 +43,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
             setattr(operator, name, getattr(properties, name))
         menus.draw_edit(layout, context)
         if context.mode == "EDIT_MESH":
-            layout.label(text="The tool draws in Object Mode", icon="INFO")
+            layout.label(text="The tool works in Object Mode", icon="INFO")
 
     def _draw_conversion(self, layout, properties) -> None:
         layout.separator()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators of buttons and scripts, and how they run."""
+"""The operators for buttons and scripts, and the code that runs them."""

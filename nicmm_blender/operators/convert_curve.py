@@ -20,7 +20,7 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 
     keep_original: BoolProperty(
         name="Keep Original",
-        description="Keep the curve object",
+        description="Keep the original curve object",
         default=False,
     )
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a designed curve as properties of its object, which take effect at once.
+"""The settings of a designed curve as properties of its object, which take effect immediately.
 
 They are read from the record of the curve. A change designs the curve again; if that is impossible,
-the curve and its settings stay, and the reason is shown below them.
+the curve and its settings stay as they were, and the reason is shown below the settings.
 """
 
 import functools
@@ -21,11 +21,11 @@ COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_
 DRAWING = ("spline", "offset")
 
 _problems: dict = {}
-"""Messages by the session_uid of the curve."""
+"""Messages about changes that were impossible, by the session_uid of the curve."""
 
 
 def problem_of(curve) -> str:
-    """Why the last change of a curve's settings was impossible; may be empty."""
+    """Why the last change of a curve's settings was impossible; empty if it was not."""
     return _problems.get(curve.session_uid, "")
 
 
@@ -44,7 +44,7 @@ def _read(group, name: str, default):
 
 
 def _write(group, name: str, value) -> None:
-    """Change a setting of a curve, or note why that is impossible."""
+    """Change a setting of a curve, or store the reason why that is impossible."""
     from ... import nicmm_core as nicmm
 
     curve = group.id_data
@@ -111,7 +111,7 @@ def _set_radius(context, curve, value: float) -> None:
 
 
 def _property(name: str, given):
-    """The property of a setting, read from the record and written to it."""
+    """A property that reads a setting from the record of its curve and writes it there."""
     words = {**given.keywords}
     default = words.get("default", "")
     get, put = functools.partial(_read, name=name, default=default), _setter(name)
@@ -131,7 +131,7 @@ def _setter(name: str):
 
 def _radius_property():
     words = dict(settings.OutputProperties.__annotations__["radius"].keywords)
-    words["description"] = "Radius of the curve; zero gives a line"
+    words["description"] = "Radius of the curve. Set to zero for a line"
     return bpy.props.FloatProperty(
         **words, get=_get_radius, set=lambda group, value: _write(group, "radius", value)
     )
@@ -141,7 +141,7 @@ _GIVEN = settings.EditingProperties.__annotations__ | settings.OutputProperties.
 
 
 class NICMM_PG_curve_settings(bpy.types.PropertyGroup):
-    """Settings of a designed curve; a change designs it again"""
+    """Settings of a designed curve. A change designs the curve again"""
 
     __annotations__ = {  # noqa: RUF012 - as Blender reads it
         **{name: _property(name, _GIVEN[name]) for name in (*COURSE, *DRAWING)},
@@ -150,7 +150,7 @@ class NICMM_PG_curve_settings(bpy.types.PropertyGroup):
 
 
 def draw_in_header(layout, curve) -> None:
-    """Draw the settings that are changed most while drawing."""
+    """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
     layout.prop(values, "closed")

@@ -14,7 +14,8 @@ from ..scene.surface import read, shown_beyond_the_cage
 from . import polls
 from .long_solves import LongSolves
 
-ORDER_NAMES = {  # by the core's name, and whether the points are the selected vertices
+# For reports, by the core's name of the order and whether the points are the selected vertices.
+ORDER_NAMES = {
     ("given", True): "in the order of selection",
     ("given", False): "in the order given",
     ("shortest", True): "in the shortest order",
@@ -33,7 +34,7 @@ class NICMM_OT_design_curve(
 
     points: StringProperty(
         name="Points",
-        description="Control points instead of the selected vertices, for scripts: vertex indices "
+        description="Control points instead of the selected vertices, for scripts. Vertex indices "
         "or positions in the object's local space, separated by commas, such as 12, 80, 0.5 0 1",
         options={"HIDDEN", "SKIP_SAVE"},
     )
@@ -65,8 +66,8 @@ class NICMM_OT_design_curve(
         request = design_request.for_points(mesh_object, surface, points, order, asked)
         if self.alternatives and self.output not in writing.SEPARATE:
             raise InputError(
-                "Alternatives are separate curves. Choose the output Curve or Sticky Curves, or "
-                "set them to 0"
+                "Alternatives are separate curves. Set Output to Curve or Sticky Curves, or set "
+                "Alternatives to 0"
             )
         return [replace(request, options={**request.options, "alternatives": self.alternatives})]
 
@@ -94,7 +95,7 @@ class NICMM_OT_design_curve(
         mesh_object = request.mesh_object()
         made = [
             writing.apply(context, mesh_object, request.surface, each.curves, self, request.asked)
-            for each in [*design.alternatives[::-1], design]  # the fairest is active at the end
+            for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
@@ -118,7 +119,7 @@ def _summary(mesh_object, design, order: str, asked) -> str:
 
 
 def _other_selections() -> str:
-    """A warning if other meshes in Edit Mode have selected vertices; may be empty."""
+    """A warning if other meshes in Edit Mode have selected vertices; empty if none has."""
     context = bpy.context
     names = [
         f'"{other.name}"'

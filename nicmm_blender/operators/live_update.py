@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Updates curves when the surface that they lie on, or a weight that they use, changes.
 
-Blender's handlers only record that something has changed, in any mode. Once it has stayed unchanged
-for the delay set in the preferences, a timer compares the digest that each curve was designed on
-with the present one (`curve_record.digest`) and designs the outdated curves again, in time slices.
-Reading a surface and writing a curve change no mesh object, and undo restores a curve together with
-its digest, so an update never triggers another one.
+Blender's handlers only record which objects have changed, in any mode. Once nothing has changed for
+the delay set in the preferences, a timer compares the digest that each curve was designed with to
+the current one (`curve_record.digest`) and designs the outdated curves again, in time slices.
+Neither reading a surface nor writing a curve changes a mesh object, and undo restores a curve
+together with its digest, so an update never triggers another one.
 """
 
 import time
@@ -27,24 +27,24 @@ PAUSE = 0.01
 """Seconds between two turns, in which Blender handles events."""
 
 WAIT = 0.1
-"""Seconds until the next check whether curves may be written."""
+"""Seconds until the next check whether work may begin or continue."""
 
 
 class _Updates:
-    """Changes and work in progress; holds no Blender objects, since undo replaces them."""
+    """Recorded changes and work in progress. Holds no Blender objects, since undo replaces them."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all changes and work."""
-        self.changed: set = set()  # of mesh objects, by their session_uid
+        """Discard all recorded changes and all work."""
+        self.changed: set = set()  # session_uids of mesh objects
         self.everything = False
         self.last_change = 0.0
         self.work = None
         self.requests: list = []
-        self.curves: list = []  # by their session_uid, one for each request
-        self.failed: dict = {}  # from a curve's session_uid to the digest and the message
+        self.curves: list = []  # session_uids of curves, one for each request
+        self.failed: dict = {}  # session_uid of a curve to its digest and message
         self.is_reading = False
 
     def note(self, objects: set, everything: bool = False) -> None:
@@ -66,7 +66,7 @@ _updates = _Updates()
 
 
 def tick() -> float | None:
-    """Work for one turn; return the seconds until the next one, or None when all is done."""
+    """Work for one turn; return the seconds until the next turn, or None if nothing is left."""
     if not _live_scenes():
         _updates.stop()
         return None
@@ -87,7 +87,7 @@ def tick() -> float | None:
 
 
 def messages(mesh_object) -> list:
-    """Messages of the curves on a mesh that could not be updated."""
+    """Messages about the curves on a mesh that could not be updated."""
     found = [
         _updates.failed.get(each.session_uid) for each in curve_record.designed_on(mesh_object)
     ]
@@ -111,8 +111,8 @@ def _begin() -> None:
 
 @contextmanager
 def _unnoticed():
-    """Read surfaces without noticing that temporary objects come and go in the file."""
-    bpy.context.view_layer.update()  # what the user has changed is noticed
+    """Ignore changes inside the block: reading surfaces makes and removes temporary objects."""
+    bpy.context.view_layer.update()  # report pending changes of the user before ignoring any
     _updates.is_reading = True
     try:
         yield
@@ -122,7 +122,7 @@ def _unnoticed():
 
 
 def _ask(designed, mesh_object, surfaces: dict) -> None:
-    """Add a request for a curve if it is outdated; `surfaces` holds those read before."""
+    """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
     uid = designed.session_uid
     now = ""
     try:
@@ -169,7 +169,7 @@ def _write() -> None:
 
 
 def _has_to_wait() -> bool:
-    """Whether Blender renders or plays, or a modal operator of the extension is running."""
+    """Whether updates have to wait for a render, playback or a modal operator of the extension."""
     if _plays() and not any(scene.nicmm_live_playback for scene in _live_scenes()):
         return True
     running = (
@@ -181,7 +181,7 @@ def _has_to_wait() -> bool:
 
 
 def _plays() -> bool:
-    """Whether an animation is played in a window."""
+    """Whether an animation is playing in any window."""
     return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
 
 
@@ -200,7 +200,7 @@ def _live_curves() -> list:
 def note_changes(scene, depsgraph) -> None:
     """Record changed mesh objects after an update of the dependency graph.
 
-    Strokes in Sculpt Mode are reported as changes of the object's shading only.
+    In Sculpt Mode changes of shading count too, because Blender reports strokes as such.
     """
     if not scene.nicmm_live_update or _updates.is_reading:
         return
@@ -219,14 +219,14 @@ def note_changes(scene, depsgraph) -> None:
 
 @persistent
 def note_frame(scene, _depsgraph=None) -> None:
-    """Check all curves after a change of the frame, but not while Blender renders."""
+    """Check all curves after a frame change, but not during a render."""
     if scene.nicmm_live_update and not bpy.app.is_job_running("RENDER"):
         _updates.note(set(), everything=True)
 
 
 @persistent
 def note_other_state(*_arguments) -> None:
-    """Check all curves after undo, redo or opening a file."""
+    """Check all curves after undo, redo, or opening a file."""
     _updates.stop()
     if _live_scenes():
         _updates.note(set(), everything=True)
@@ -256,14 +256,14 @@ HANDLERS = (
 def register() -> None:
     bpy.types.Scene.nicmm_live_update = BoolProperty(
         name="Live Update",
-        description="Design the curves of this scene again whenever the surface that they lie on, "
-        "or a weight that they use, has changed, in any mode and after a change of the frame",
+        description="Update the curves of this scene automatically when their surface or the "
+        "weights that they use change, in any mode and after frame changes",
         default=False,
         update=_switched,
     )
     bpy.types.Scene.nicmm_live_playback = BoolProperty(
         name="During Playback",
-        description="Also update curves while an animation is played. Otherwise they are updated "
+        description="Also update curves during animation playback. If disabled, curves are updated "
         "when it stops",
         default=False,
         update=_switched,

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The base of operators that design curves: the window responds during long computations.
+"""The base of operators that design curves and keep the window responsive meanwhile.
 
 Scripts, the redo panel and background Blender run `execute`, which returns when the curves are
-done. In the window `invoke` waits for as long as most curves take. A longer computation continues
-in time slices on timer events until it is done or Esc is pressed.
+done. In the window `invoke` first waits for a short time, which is enough for most curves. A longer
+computation then continues in time slices on timer events until it is done or Esc is pressed.
 """
 
 import sys
@@ -23,7 +23,7 @@ TURN = 0.03
 """Seconds of work for each timer event, about the duration of one frame."""
 
 LONGEST_TURN = 0.25
-"""Seconds. A turn takes as long as the window needs to draw, up to this limit."""
+"""Maximum duration of a turn in seconds. Up to this limit, a turn takes as long as drawing does."""
 
 PASSED_ON = NAVIGATION | {
     "MOUSEMOVE",
@@ -32,21 +32,21 @@ PASSED_ON = NAVIGATION | {
     "WHEELOUTMOUSE",
     "WINDOW_DEACTIVATE",
 }
-"""Events that do not change the data that the operator works on."""
+"""Events that are passed on to Blender, since they do not change the data of the operator."""
 
 
-# Operators that wait for timer events.
+# Operators that are waiting for timer events.
 _running: list = []
 
 
 class LongSolves:
     """A mixin for operators with `requests(context)` and `finish(context, requests, answers)`.
 
-    An answer is a design of the core or an error.
+    Each answer is a `Design` of the core or an exception.
     """
 
     has_handler = False
-    """Whether Blender already sends events to the operator."""
+    """Whether the operator has a modal handler already, so that no second one is added."""
 
     def execute(self, context):
         return reporting(self, lambda: self._all_at_once(context))
@@ -87,7 +87,7 @@ class LongSolves:
         return self.answer(context, self.requests(context))
 
     def answer(self, context, requests: list):
-        """Answer requests at once or in time slices, then finish."""
+        """Answer requests and finish, immediately if they are quick, otherwise in time slices."""
         self._requests = requests
         self._work = turns.Work(lambda progress: answer_all(requests, progress))
         if self._work.turn(preferences.patience()):
@@ -114,7 +114,7 @@ class LongSolves:
             request = self._requests[_place(self._work.fraction, len(self._requests))]
             self._partial.show(request.in_world(self._shown), request.asked.closed)
         percent = round(100 * self._work.fraction)
-        context.workspace.status_text_set(f"{self.bl_label}: {percent} %   |   Esc: Cancel")
+        context.workspace.status_text_set(f"{self.bl_label}: {percent}%   |   Esc: Cancel")
 
     def _tidy(self, context):
         _running.remove(self)
@@ -130,7 +130,7 @@ def stop_all() -> None:
 
 
 def answer_all(requests: list, progress) -> list:
-    """Answer requests one after another; touches no Blender data."""
+    """Answer requests one after another, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 
     answers: list = []
@@ -159,7 +159,7 @@ def _place(fraction: float, count: int) -> int:
 
 
 def reporting(operator, work):
-    """Run an operator's work; turn expected errors into reports."""
+    """Run the work of an operator and turn expected errors into reports."""
     from ... import nicmm_core as nicmm
 
     try:

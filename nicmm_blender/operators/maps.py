@@ -21,10 +21,16 @@ FIELDS = {"OBSTACLES": "obstacle_group", "ALIGNMENT": "alignment_group"}
 NAMES = {"OBSTACLES": "Obstacles", "ALIGNMENT": "Alignment"}
 
 SOURCES = (
-    ("PAINT", "Empty", "No weights yet; paint them", "BRUSH_DATA", 0),
+    ("PAINT", "Empty", "Start without weights and paint them", "BRUSH_DATA", 0),
     ("SELECTION", "Selected Vertices", "The selected vertices", "RESTRICT_SELECT_OFF", 1),
     ("CURVATURE", "Curvature", "Where the surface is strongly curved", "SPHERECURVE", 2),
-    ("SHARP_EDGES", "Sharp Edges", "Edges whose faces meet at an angle", "MOD_EDGESPLIT", 3),
+    (
+        "SHARP_EDGES",
+        "Sharp Edges",
+        "Edges where the normals of the faces differ by Angle or more",
+        "MOD_EDGESPLIT",
+        3,
+    ),
     ("MARKED_SHARP", "Edges Marked Sharp", "Edges marked as sharp", "EDGESEL", 4),
     ("SEAMS", "Seams", "Edges marked as UV seams", "UV_EDGESEL", 5),
 )
@@ -42,7 +48,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
     source: EnumProperty(name="From", description="Source of the weights", items=SOURCES)
     angle: FloatProperty(
         name="Angle",
-        description="Smallest angle between the normals of two faces at a sharp edge",
+        description="Minimum angle between the normals of two faces at a sharp edge",
         subtype="ANGLE",
         default=np.radians(30.0),
         min=0.0,
@@ -50,7 +56,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
     )
     strength: FloatProperty(
         name="Strength",
-        description="Largest weight. Curves never enter an obstacle of weight 1",
+        description="Maximum weight. Curves never enter an obstacle of weight 1",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -107,7 +113,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
     bl_label = "Paint Map"
     bl_options = {"REGISTER", "UNDO"}
 
-    role: EnumProperty(name="Map", description="Which map to paint", items=ROLES)
+    role: EnumProperty(name="Map", description="Map to paint", items=ROLES)
 
     @classmethod
     def poll(cls, context):
@@ -124,7 +130,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
             return {"FINISHED"}
         if not name:
             raise InputError(
-                f"No vertex group is chosen for {NAMES[self.role]}. Choose one, or make a new map"
+                f"No vertex group is chosen for {NAMES[self.role]}. Choose one, or create a new map"
             )
         mesh_data.check_local(mesh_object, "its weights cannot be changed")
         group = vertex_group(mesh_object, name)
@@ -134,13 +140,13 @@ class NICMM_OT_paint_map(bpy.types.Operator):
 
 
 def settings_of(context):
-    """The properties that name the maps: those of the active curve, or of the next one."""
+    """The settings that name the maps: those of the active curve, or of a new curve."""
     curve = edited_curve.active(context)
     return context.scene.nicmm_curves if curve is None else curve.nicmm_settings
 
 
 def is_painting(context, mesh_object, name: str) -> bool:
-    """Whether Weight Paint mode is active with this group."""
+    """Whether Weight Paint mode is active and paints this group."""
     active = None if mesh_object is None else mesh_object.vertex_groups.active
     return context.mode == "PAINT_WEIGHT" and active is not None and active.name == name
 

@@ -7,7 +7,7 @@ from . import viewports
 
 COLOUR = (1.0, 0.6, 0.1, 1.0)
 WIDTH = 2.0
-"""Pixels, times the scale of the interface."""
+"""Line width in pixels at a resolution scale of 1."""
 
 
 class PartialCurve:

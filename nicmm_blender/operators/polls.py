@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks whether an operator can be used, and the messages of disabled buttons."""
+"""Checks whether an operator can run, with the messages that disabled buttons show."""
 
 OBJECT = ({"OBJECT"}, "Switch to Object Mode")
 OBJECT_OR_EDIT = ({"OBJECT", "EDIT_MESH"}, "Switch to Object Mode or Edit Mode")
@@ -15,16 +15,29 @@ TOOL_OR_EDIT = (
     {"OBJECT", "EDIT_MESH", "SCULPT", "PAINT_WEIGHT"},
     "Switch to Object Mode, Edit Mode, Sculpt Mode or Weight Paint",
 )
-"""Modes that an operator works in, and the message in other modes."""
+"""The modes in which an operator works, and the message shown in other modes."""
 
 NO_MESH = "Make a mesh object active"
 NO_CURVE = "Make a designed curve active"
 NO_MESH_OR_CURVE = "Make a mesh or a designed curve active"
-"""Messages where the active object is of the wrong kind."""
+"""Messages for an active object of the wrong type."""
 
 
 def usable(operator, context, has_object: bool, missing: str, modes: tuple) -> bool:
-    """Whether the active object and the mode are right for an operator."""
+    """Whether an operator can run; if not, set its message.
+
+    Parameters
+    ----------
+    operator : type
+        Class of the operator.
+    context : bpy.types.Context
+    has_object : bool
+        Whether the active object is suitable.
+    missing : str
+        Message if it is not.
+    modes : tuple
+        Modes in which the operator works, and the message for other modes.
+    """
     names, switch = modes
     if not has_object:
         operator.poll_message_set(missing)

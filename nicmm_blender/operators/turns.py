@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long work in time slices ("turns"): a thread that runs only while the caller waits for it.
 
-The core works from beginning to end and calls a progress function now and then. So that Blender
-can draw its window in between, the work runs in a thread that blocks inside this function at the
-end of each turn. Caller and thread never run at the same time, so Blender's Python sees only one
-thread. The work must not access Blender's data.
+The core computes a curve in one call and calls a progress function now and then. So that Blender
+can draw its window in between, the work runs in a thread that blocks inside the progress function
+at the end of each turn. Caller and thread never run at the same time, so at any time only one of
+them uses Blender's Python. The work must not access Blender's data.
 """
 
 import atexit
@@ -14,9 +14,9 @@ import time
 import numpy as np
 
 STACK = 64 * 1024 * 1024
-"""Bytes. Except on Linux, the default stack of a thread is far smaller than the main thread's."""
+"""Stack size in bytes. Except on Linux, threads get far less than the main thread by default."""
 
-# Work whose thread is blocked; `stop_all` ends these threads.
+# Work whose thread exists and is blocked; `stop_all` ends these threads.
 _parked: set = set()
 
 
@@ -26,10 +26,11 @@ class Work:
     Attributes
     ----------
     fraction : float
-        Fraction of the work done.
+        Fraction of the work that is done.
     polyline : (n, 3) float array
-        The curve so far.
+        The unfinished curve; empty if there is none yet.
     done : bool
+        Whether the function has returned, raised an error or been cancelled.
     """
 
     def __init__(self, function) -> None:
@@ -43,7 +44,7 @@ class Work:
         self.done = False
 
     def turn(self, seconds: float) -> bool:
-        """Continue for about this time; return whether the work is done."""
+        """Continue for about this many seconds; return whether the work is done."""
         if self.done:
             return True
         if self._thread is None:
@@ -57,7 +58,7 @@ class Work:
         return self.done
 
     def result(self):
-        """Return the result of the function, or raise its error; only when it is done."""
+        """Return the result of the function or raise its error. Call only when the work is done."""
         if self._error is not None:
             raise self._error
         return self._result
@@ -73,7 +74,7 @@ class Work:
     def _start(self) -> None:
         before = threading.stack_size(STACK)
         try:
-            # A daemon, so that Blender can always quit; `stop_all` joins it first.
+            # A daemon thread, so that Blender can always quit; `stop_all` joins it before that.
             self._thread = threading.Thread(target=self._run, name="nicmm", daemon=True)
             self._thread.start()
         finally:

@@ -12,7 +12,7 @@ from .long_solves import LongSolves
 
 
 class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
-    """Design curves again with their own settings, on the present mesh and weights"""
+    """Design curves again with their own settings, on the current mesh and weights"""
 
     bl_idname = "nicmm.update_curves"
     bl_label = "Update Curves"
@@ -24,8 +24,8 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
     use_panel: BoolProperty(
-        name="Settings of the Panel",
-        description="Replace the settings of each curve by those in the sidebar",
+        name="Use Sidebar Settings",
+        description="Replace the settings of each curve with those in the sidebar",
         default=False,
     )
 
@@ -79,7 +79,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
 
 
 def named(name: str):
-    """Return the designed curve with this name."""
+    """Return the designed curve with a name, or raise an error if there is none."""
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
         raise InputError(f'There is no designed curve "{name}". Choose one in the list of curves')
@@ -87,7 +87,7 @@ def named(name: str):
 
 
 def request_again(designed, chosen=None):
-    """A request to design a curve again, with its own settings or others."""
+    """A request to design a curve again, with its recorded settings or with `chosen`."""
     mesh_object = curve_record.existing_mesh(designed)
     mesh_data.synchronise(mesh_object)
     asked = curve_record.asked_of(designed) if chosen is None else chosen

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D viewports while an operator runs: navigation events and redrawing."""
+"""Navigation events and redrawing of the 3D viewports while an operator runs."""
 
 import bpy
 
@@ -13,7 +13,7 @@ NAVIGATION = {
     "MOUSESMARTZOOM",
     "NDOF_MOTION",
 }
-"""Events that move the view; Blender handles them."""
+"""Events that move the view, which operators leave to Blender."""
 
 
 def redraw() -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What objects show of a curve: evenly spaced points, every crossing of an edge, or Bézier knots.
+"""Computes what objects show of a curve: even points, every edge crossing, or Bézier knots.
 
-Fitting is done by the core, in the lengths of the scene. The record of an object always holds the
-exact curve.
+The core does the fitting, in a space with the proportions of the scene. Whatever an object shows,
+its record holds the exact curve.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from ..scene import designers
 EVEN, EXACT, BEZIER = "EVEN", "EXACT", "BEZIER"
 
 COLLINEAR = 1e-4
-"""Sine of the angle up to which the handles of a knot are on one line."""
+"""Sine of the angle up to which the two handles of a knot count as collinear."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,10 @@ class Polyline:
 
 @dataclass(frozen=True)
 class Knots:
-    """Bézier knots of a spline in the mesh's local space, each (n, 3), and which are smooth."""
+    """Bézier knots of a spline with their handles, in the mesh's local space, each (n, 3).
+
+    `smooth`, (n,), tells whether the handles of a knot are collinear.
+    """
 
     closed: bool
     points: np.ndarray
@@ -46,7 +49,7 @@ class Knots:
 
 
 def splines(surface, curves, drawing: Drawing) -> list:
-    """The splines of curves, as `Polyline` or `Knots`."""
+    """The splines that show curves, each a `Polyline` or `Knots`."""
     if drawing.spline == BEZIER:
         return [_knots(surface, curve, drawing) for curve in curves]
     return [
@@ -56,7 +59,7 @@ def splines(surface, curves, drawing: Drawing) -> list:
 
 
 def on_surface(surface, curves, drawing: Drawing) -> list:
-    """Curves with faces and barycentrics at the points of the polyline that is drawn."""
+    """Curves of the core whose points are those of the polylines to draw."""
     if drawing.spline == EXACT:
         return curves
     from ...nicmm_core.splines.even_spacing import even_curve
@@ -66,7 +69,7 @@ def on_surface(surface, curves, drawing: Drawing) -> list:
 
 
 def automatic_radius(surface, radius: float, thickness: float) -> float:
-    """A radius in scene units: the given one, or a share of the size of the surface."""
+    """The radius in scene units; if it is zero, the given fraction of the surface's diagonal."""
     return radius or thickness * surface.diagonal * surface.scale
 
 
@@ -86,7 +89,7 @@ def _knots(surface, curve, drawing: Drawing) -> Knots:
 
 
 def _lifted(surface, curve, offset: float) -> np.ndarray:
-    """Points of a curve in the mesh's local space, lifted off the surface."""
+    """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)
     from ...nicmm_core.splines.offset import lifted

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes splines as a Blender curve object, and links new objects to the scene.
+"""Writes splines to a Blender curve object, and links new objects to the scene.
 
-A curve object is a child of its mesh object. Where that is scaled differently along its axes, the
-child has a space of its own without scale: a tube would be flat in that of the mesh.
+A curve object is a child of its mesh object. If the mesh object is scaled non-uniformly, the child
+gets an unscaled space of its own, since a tube would be flattened in the space of the mesh.
 """
 
 import bpy
@@ -14,7 +14,7 @@ from .clean_curves import Knots
 
 
 def new_object(mesh_object, surface, splines, radius: float):
-    """Make a curve object from splines of `clean_curves`; the radius is in scene units."""
+    """Create a curve object from splines of `clean_curves`; the radius is in scene units."""
     name = f"{mesh_object.name} Curve"
     curve = bpy.data.curves.new(name, "CURVE")
     curve.dimensions = "3D"
@@ -27,7 +27,7 @@ def new_object(mesh_object, surface, splines, radius: float):
 
 
 def adopt(made, mesh_object, surface) -> None:
-    """Make an object a child of the mesh, in the mesh's local space or in one without scale."""
+    """Make an object a child of the mesh, in the mesh's local space or in an unscaled one."""
     made.parent = mesh_object
     if surface.keeps_proportions:
         made.matrix_parent_inverse = Matrix()
@@ -41,19 +41,19 @@ def adopt(made, mesh_object, surface) -> None:
 
 
 def scale_of(made, surface) -> float:
-    """Length in the scene of a unit of a child's space."""
+    """Length in the scene of one unit of the space of a child object."""
     inverse = np.array(made.matrix_parent_inverse)[:3, :3]
     return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
 
 
 def scale_in_scene(made, mesh_object) -> float:
-    """The same without a surface; `mesh_object` is the parent."""
+    """The same as `scale_of`, from the parent `mesh_object` instead of its surface."""
     placement = np.array(mesh_object.matrix_world @ made.matrix_parent_inverse)[:3, :3]
     return float(np.cbrt(abs(np.linalg.det(placement)))) or 1.0
 
 
 def in_its_space(made, points: np.ndarray) -> np.ndarray:
-    """Points in the mesh's local space, (n, 3), in the space of a child."""
+    """Transform points (n, 3) from the mesh's local space to the space of a child object."""
     if made.parent is None or made.matrix_parent_inverse == Matrix():
         return points
     to_child = np.linalg.inv(np.array(made.matrix_parent_inverse))
@@ -61,7 +61,7 @@ def in_its_space(made, points: np.ndarray) -> np.ndarray:
 
 
 def write_splines(made, splines) -> None:
-    """Replace the splines of a curve object; materials, radii and tilts of its points stay."""
+    """Replace the splines of a curve object; their materials, radii and tilts are kept."""
     curve = made.data
     before = [_Profile(spline) for spline in curve.splines]
     curve.splines.clear()
@@ -101,7 +101,7 @@ def _bezier_spline(made, knots: Knots):
 
 
 class _Profile:
-    """Material of a spline, and radii and tilts along it."""
+    """The material of a spline, with its radii and tilts as functions of arc length."""
 
     NEUTRAL = (("radius", 1.0), ("tilt", 0.0))
 
@@ -112,7 +112,7 @@ class _Profile:
         self.cyclic = spline.use_cyclic_u
 
     def give_to(self, spline) -> None:
-        """Interpolate radii and tilts by the share of the length."""
+        """Apply the material to a spline, and interpolate radii and tilts by arc length."""
         spline.material_index = self.material
         for name, neutral in self.NEUTRAL:
             values = self.values[name]
@@ -129,7 +129,10 @@ def _points_of(spline):
 
 
 def _along(spline) -> np.ndarray:
-    """The share of the length before each point; of a cyclic spline, 1 is the first again."""
+    """Arc length at each point as a fraction of the total.
+
+    For a cyclic spline the first point is repeated at the end, with the fraction 1.
+    """
     points = _points_of(spline)
     width = 3 if spline.type == "BEZIER" else 4
     places = np.empty((len(points), width), dtype=np.float32)
@@ -147,13 +150,13 @@ def _get(points, name: str) -> np.ndarray:
 
 
 def place(context, mesh_object, curve_object) -> None:
-    """Link a new curve to the scene, and select it."""
+    """Link a new curve object to the scene and select it."""
     link(context, mesh_object, curve_object)
     _select(context, curve_object)
 
 
 def link(context, mesh_object, new_object) -> None:
-    """Link a new object to the collections of the mesh, and to the local view."""
+    """Link a new object to the collections of the mesh, and add it to an active local view."""
     for collection in _collections(context, mesh_object):
         collection.objects.link(new_object)
     if getattr(context.space_data, "local_view", None):
@@ -161,7 +164,7 @@ def link(context, mesh_object, new_object) -> None:
 
 
 def _collections(context, mesh_object):
-    """The mesh's collections, or the scene's one if all are linked from another file."""
+    """The collections of the mesh, or the scene collection if all are linked from other files."""
     editable = [found for found in mesh_object.users_collection if found.library is None]
     return editable or [context.scene.collection]
 
@@ -175,7 +178,7 @@ def remove(curve_object) -> None:
 
 
 def select_only(context, chosen) -> None:
-    """Make an object active and the only selected one; in Object Mode only."""
+    """Make an object active and select nothing else; works in Object Mode only."""
     for selected in context.selected_objects:
         selected.select_set(False)
     context.view_layer.objects.active = chosen
@@ -183,7 +186,7 @@ def select_only(context, chosen) -> None:
 
 
 def _select(context, curve_object) -> None:
-    """Select the curve. In Object Mode it becomes active; in Edit Mode the mesh stays active."""
+    """Select the curve; in Object Mode make it active too. In other modes the mesh stays active."""
     if context.mode == "OBJECT":
         select_only(context, curve_object)
     curve_object.select_set(True)

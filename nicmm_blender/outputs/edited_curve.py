@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Changes the control points and settings of a designed curve: opens, designs and writes it.
 
-It holds no Blender objects, since undo replaces them.
+An opened curve holds no references to Blender objects, since undo replaces them.
 """
 
 from dataclasses import dataclass, replace
@@ -21,20 +21,22 @@ MAPS = ("obstacle_group", "alignment_group")
 
 @dataclass(frozen=True)
 class Opened:
-    """A curve on the present surface, or a new one.
+    """A designed curve on the current surface, or a new curve.
 
     Attributes
     ----------
     curve_uid, mesh_uid : int
-        The session_uid of the objects; 0 for a new curve.
+        The session_uid of the curve object, 0 for a new curve, and of the mesh object.
     surface : Surface
+        The current surface.
     asked : Asked
+        Settings of the curve.
     points : SurfacePoints of the core
-        The control points.
+        Control points on the surface.
     curve : SurfaceCurve of the core, or None
-        None if it has to be designed again.
+        The recorded curve; None if the curve is new or has to be designed again.
     remark : str
-        For the user; may be empty.
+        Text that is appended to reports; may be empty.
     """
 
     curve_uid: int
@@ -60,17 +62,17 @@ class Opened:
         return self.surface.points(self.points.faces, self.points.barycentric)
 
     def polyline(self) -> np.ndarray:
-        """The curve's points in the object's local space, (n, 3); the first again if closed."""
+        """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
         return polyline_of(self.surface, self.curve)
 
 
 def by_uid(uid: int):
-    """The object with a session_uid, or None."""
+    """The object with this session_uid, or None."""
     return next((found for found in bpy.data.objects if found.session_uid == uid), None)
 
 
 def polyline_of(surface, curve) -> np.ndarray:
-    """A curve's points in the object's local space, (n, 3); the first again if it is closed."""
+    """Points of a curve in the object's local space, (n, 3); a closed curve repeats the first."""
     if curve is None:
         return np.zeros((0, 3))
     line = surface.points(curve.faces, curve.barycentric)
@@ -78,23 +80,23 @@ def polyline_of(surface, curve) -> np.ndarray:
 
 
 def chosen(context, name: str):
-    """The designed curve with a name, or the active one; None for a new curve."""
+    """The designed curve with a name; for an empty name the active curve, or None without one."""
     if not name:
         return active(context)
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
         raise InputError(
-            f'There is no designed curve "{name}". Give the name of a designed curve, or no name '
-            "for a new curve"
+            f'There is no designed curve "{name}". Give the name of a designed curve, or leave it '
+            "empty for a new curve"
         )
     return found
 
 
 def active(context):
-    """The designed curve that is being drawn: the active object.
+    """The designed curve that is being drawn, or None.
 
-    In Sculpt Mode and Weight Paint the mesh is active, so there it is the only selected curve on
-    it.
+    It is the active object. In Sculpt Mode and Weight Paint, where the mesh has to be active, it is
+    the selected curve on that mesh, if exactly one is selected.
     """
     found = context.active_object
     if curve_record.has_record(found):
@@ -112,9 +114,16 @@ def active(context):
 def opened(context, edited, asked: Asked | None = None, keeps_course: bool = False) -> Opened:
     """Read a curve and its surface, or the active mesh for a new curve.
 
-    `asked` are other settings than those of the curve, or of the panel for a new one. With other
-    settings the best course may be a different one; with another smoothness the present one can be
-    kept.
+    Parameters
+    ----------
+    context : bpy.types.Context
+    edited : bpy.types.Object or None
+        The curve object; None for a new curve.
+    asked : Asked, optional
+        Settings to use instead of those of the curve, or of the sidebar for a new curve.
+    keeps_course : bool, default False
+        Whether the curve keeps its course if only the smoothness differs. With any other change of
+        settings it is designed from scratch, because another course may be the best one.
     """
     from ... import nicmm_core as nicmm
 
@@ -156,7 +165,7 @@ def opened(context, edited, asked: Asked | None = None, keeps_course: bool = Fal
 
 
 def request(edited: Opened, points) -> list:
-    """The request for the curve through other points, in a list; empty if they are too few."""
+    """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:
         return []
     asked = replace(edited.asked, method="NICMM")
@@ -165,7 +174,7 @@ def request(edited: Opened, points) -> list:
 
 
 def curves_of(answers: list) -> list:
-    """The curves of the answers to `request`; an error is raised."""
+    """The curves in the answers to `request`; an answer that is an error is raised."""
     for answer in answers:
         if isinstance(answer, Exception):
             raise answer
@@ -175,9 +184,9 @@ def curves_of(answers: list) -> list:
 
 
 def write(context, edited: Opened, points, curves: list, settings):
-    """Write curves through points into the object, or a new one; return the object.
+    """Write curves through points to the curve object, or to a new one; return the object.
 
-    `settings` holds the output settings of a new one.
+    `settings` holds the output settings of a new object.
     """
     mesh_object, made = edited.mesh_object, edited.curve_object
     if made is None:
@@ -194,7 +203,10 @@ def write(context, edited: Opened, points, curves: list, settings):
 
 
 def located(edited: Opened, positions: np.ndarray, name: str):
-    """Positions on the surface in the object's local space, (k, 3), as points of the core."""
+    """SurfacePoints of the core at positions (k, 3) on the surface, in the object's local space.
+
+    `name` is the name of the argument in error messages.
+    """
     from ...nicmm_core.geometry.surface_points import locate_points
     from ..scene import designers
 
@@ -204,7 +216,7 @@ def located(edited: Opened, positions: np.ndarray, name: str):
 
 
 def with_point(points, number: int, place, replaced: bool = False):
-    """Points with one more before another, or in its place; `place` is a single point."""
+    """Points with the single point `place` inserted at an index, or replacing the point there."""
     from ... import nicmm_core as nicmm
 
     rest = points
@@ -217,12 +229,12 @@ def with_point(points, number: int, place, replaced: bool = False):
 
 
 def without_point(points, number: int):
-    """Points without one of them."""
+    """Points without the one at an index."""
     return points[np.delete(np.arange(len(points)), number)]
 
 
 def _curve_of(edited, surface):
-    """The recorded curve of an object; None if it has to be designed again."""
+    """The recorded curve of an object, or None if it has to be designed again."""
     if not curve_record.lies_on(edited, surface):
         return None
     curves = curve_record.recall(edited, surface)

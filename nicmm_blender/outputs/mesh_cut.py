@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Applies a cut of the core to a Blender mesh and interpolates all of its attributes.
+"""Applies a cut of the core to a Blender mesh and interpolates all attributes of the mesh.
 
 Faces that the curve does not touch stay unchanged. Blender itself interpolates every layer of the
 mesh at new vertices, corners and edges: weights, shape keys, colours and each UV map. Corners are
@@ -17,7 +17,7 @@ from ..scene.messages import InputError
 
 @contextmanager
 def editable(mesh_object):
-    """Yield the mesh as a BMesh and write it back at the end; in Object Mode or Edit Mode."""
+    """Yield the mesh as a BMesh and write it back at the end, in Object Mode or Edit Mode."""
     mesh = mesh_object.data
     if mesh_object.mode == "EDIT":
         edited = bmesh.from_edit_mesh(mesh)
@@ -35,7 +35,7 @@ def editable(mesh_object):
 
 
 def check_editable(mesh_object, cuts: bool) -> None:
-    """Refuse a mesh that cannot be changed, or whose change would affect other objects."""
+    """Raise an error if the mesh cannot be changed, or if a change would affect other objects."""
     mesh = mesh_object.data
     name = mesh_object.name
     library = mesh.library or mesh_object.library
@@ -54,12 +54,12 @@ def check_editable(mesh_object, cuts: bool) -> None:
     if users > 1:
         raise InputError(
             f'The mesh of "{name}" is shared by {users} users, and all of them would change. '
-            "Make it a single user (Object > Relations > Make Single User > "
+            "Make it single-user (Object > Relations > Make Single User > "
             "Object & Data) or choose an output that does not change the mesh"
         )
     if cuts and any(modifier.type == "MULTIRES" for modifier in mesh_object.modifiers):
         raise InputError(
-            f'"{name}" has a Multiresolution modifier, whose details belong to the present faces. '
+            f'"{name}" has a Multiresolution modifier, whose details belong to the current faces. '
             "Apply it first, or choose an output that does not cut"
         )
 
@@ -67,9 +67,9 @@ def check_editable(mesh_object, cuts: bool) -> None:
 class CornerNormals:
     """Custom normals of a mesh in Object Mode, to be restored after a cut.
 
-    Blender stores them relative to the faces round a vertex, so the stored values cannot be
-    interpolated. In Edit Mode they are nevertheless, which is a good approximation if these faces
-    are nearly flat.
+    Blender stores them relative to the faces round each vertex, so the stored values should not be
+    interpolated. In Edit Mode Blender interpolates them nevertheless, which is a good approximation
+    if these faces are nearly flat.
     """
 
     def __init__(self, mesh_object) -> None:
@@ -81,7 +81,7 @@ class CornerNormals:
             self.loop_starts = _loop_starts(mesh)
 
     def after_cut(self, surface, cut, polygons, weights) -> np.ndarray:
-        """Normals of all corners, (n, 3): unchanged faces in order, then the new ones."""
+        """Normals of all corners (n, 3): first the unchanged faces in order, then the new faces."""
         counts = np.diff(self.loop_starts, append=len(self.values))
         stays = np.ones(len(counts), dtype=bool)
         stays[polygons.source] = False
@@ -107,11 +107,29 @@ def _loop_starts(mesh) -> np.ndarray:
 
 
 def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
-    """Cut a BMesh; return its vertices, and its faces: unchanged ones, then the new ones.
+    """Cut a BMesh.
 
-    Vertices are numbered as in the core's cut. Parameters: the BMesh, the mesh that it was read
-    from, the `surface.Surface` that the core was given, its `CutMesh`, the `CutPolygons` made
-    from that, and the weights of the cut's corners.
+    Parameters
+    ----------
+    edited : bmesh.types.BMesh
+        Mesh to cut.
+    mesh : bpy.types.Mesh
+        The mesh that `edited` was read from.
+    surface : Surface
+        The surface that the core has cut.
+    cut : CutMesh
+        The cut of the core.
+    polygons : CutPolygons
+        Polygons made from the cut.
+    weights : (F', 3, 3) float array
+        Barycentric coordinates of the corners of the cut in their source triangles.
+
+    Returns
+    -------
+    vertices : list of bmesh.types.BMVert
+        Vertices in the order of the cut.
+    faces : list of bmesh.types.BMFace
+        First the unchanged faces in order, then the new faces.
     """
     for sequence in (edited.verts, edited.edges, edited.faces):
         sequence.ensure_lookup_table()
@@ -167,7 +185,7 @@ def _new_vertices(edited, surface, cut, vertices: list) -> list:
 
 
 def _split_edges(edited, surface, cut, vertices: list) -> list:
-    """Divide cut edges; the parts take the attributes of the old edges, which are returned."""
+    """Add the parts of the cut edges, with their attributes; return the old edges."""
     along: dict = {}
     n_input = len(surface.local)
     for new, (face, weight) in enumerate(
@@ -181,7 +199,7 @@ def _split_edges(edited, surface, cut, vertices: list) -> list:
     old = []
     for (low, high), points in along.items():
         edge = edited.edges.get((vertices[low], vertices[high]))
-        if edge is None:  # the diagonal of a polygon
+        if edge is None:  # a diagonal inside a polygon is no edge of the mesh
             continue
         old.append(edge)
         order = [low, *(vertex for _, vertex in sorted(points)), high]
@@ -191,7 +209,7 @@ def _split_edges(edited, surface, cut, vertices: list) -> list:
 
 
 class _SourceTriangles:
-    """Temporary faces for the triangles of polygons, from which corners are interpolated."""
+    """Temporary faces for the triangles of polygons, as sources for interpolated corners."""
 
     def __init__(self, edited, mesh, surface, old_faces: dict) -> None:
         self.edited, self.surface, self.old_faces = edited, surface, old_faces
@@ -200,7 +218,7 @@ class _SourceTriangles:
         self.helper_vertices: list = []
 
     def interpolate(self, face, place: int, triangle: int, weight) -> None:
-        """Set a corner of a face from the corners of a triangle."""
+        """Interpolate the layers at a corner of a face from the corners of a triangle."""
         polygon = int(self.surface.polygons[triangle])
         source = self.old_faces[polygon]
         places = (self.surface.loops[triangle] - self.loop_starts[polygon]).tolist()
@@ -214,7 +232,7 @@ class _SourceTriangles:
         if len(source.loops) == 3:
             return source
         if triangle not in self.faces:
-            # On separate vertices, since two faces cannot have the same ones.
+            # On new vertices, since two faces of a BMesh cannot share all their vertices.
             corners = [self.edited.verts.new(source.loops[place].vert.co) for place in places]
             helper = self.edited.faces.new(corners)
             for corner, place in enumerate(places):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes a curve as a hair curves object that follows its deforming mesh.
 
-The attributes of each point are its polygon, the three vertices of its triangle and its barycentric
+Each point stores as attributes its polygon, the three vertices of its triangle and its barycentric
 coordinates. A Geometry Nodes group (`sticky_nodes`) reads the positions of these vertices after all
 modifiers.
 """
@@ -14,21 +14,21 @@ from .clean_curves import on_surface
 from .curve_object import adopt, in_its_space, scale_of
 
 RADIUS = "nicmm_radius"
-"""Property of a drawing without a curve."""
+"""Custom property that keeps the radius of a drawing while it has no curve."""
 
 
 def are_drawn_with_all_points() -> bool:
-    """Whether Blender draws hair curves point by point, in the viewport and in EEVEE.
+    """Whether Blender draws hair curves with all their points, in the viewport and in EEVEE.
 
-    Before Blender 5.0 it draws every strand with 8 points, or 16, 32 or 64 with the scene's
-    Additional Subdivision. Versions that draw all points also have the shape Cylinder.
+    Before Blender 5.0 it draws every strand with 8 points, or with 16, 32 or 64 if the scene has
+    Additional Subdivision. Versions that draw all points also have the hair shape Cylinder.
     """
     shapes = bpy.types.RenderSettings.bl_rna.properties["hair_type"].enum_items
     return "CYLINDER" in shapes
 
 
 def add(mesh_object, surface, curves, drawing, tube: bool):
-    """Create the object without linking it to a collection."""
+    """Create the hair curves object without linking it to a collection."""
     name = f"{mesh_object.name} Curve"
     made = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
     adopt(made, mesh_object, surface)
@@ -40,7 +40,7 @@ def add(mesh_object, surface, curves, drawing, tube: bool):
 
 
 def write(made, surface, curves, drawing) -> None:
-    """Replace the curves of a hair curves object; radii of its points stay."""
+    """Replace the curves of a hair curves object; the radii along them are kept."""
     data = made.data
     radii = _radii(data)
     if not len(data.points):
@@ -73,12 +73,12 @@ def write(made, surface, curves, drawing) -> None:
 
 
 def radius_of(data) -> float:
-    """The greatest radius of the points, or that of the curve before it lost them."""
+    """The largest radius of the points; without points, the radius that was kept."""
     return float(_radii(data)[1].max()) if len(data.points) else float(data.get(RADIUS, 0.0))
 
 
 def set_radius(data, radius: float) -> None:
-    """Scale the radii of the points to a greatest one."""
+    """Scale the radii of the points so that the largest has this value."""
     if not len(data.points):
         data[RADIUS] = radius
         return
@@ -89,7 +89,10 @@ def set_radius(data, radius: float) -> None:
 
 
 def _radii(data) -> tuple[np.ndarray, np.ndarray]:
-    """Radii along all curves: shares of the points, and values; zero without points."""
+    """Radii along all curves: position of each point as a fraction of all points, and its radius.
+
+    Without points, both are a single zero.
+    """
     attribute = data.attributes.get("radius")
     if attribute is None or not len(attribute.data):
         return np.zeros(1), np.zeros(1)
@@ -99,10 +102,23 @@ def _radii(data) -> tuple[np.ndarray, np.ndarray]:
 
 
 def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:
-    """Three vertices of the mesh without modifiers near each point, and the place relative to them.
+    """Express points relative to three vertices of the cage.
 
-    Vertices, (n, 3), are -1 where modifiers do not keep them in front of the others. Places,
-    (n, 3), are amounts of two sides and of the normal, which has the length of the first side.
+    Parameters
+    ----------
+    surface : Surface
+        The surface that the points lie on.
+    faces, barycentric : (n,) int array, (n, 3) float array
+        Triangle and barycentric coordinates of each point.
+
+    Returns
+    -------
+    corners : (n, 3) int array
+        Three vertices of the cage near each point; -1 if the modifiers do not keep these vertices
+        at the start of the vertex list, with the same indices.
+    offsets : (n, 3) float array
+        Coordinates of each point relative to the first vertex, along the two sides from there and
+        along the normal, scaled to the length of the first side.
     """
     if surface.cage is None:
         flat = np.zeros(len(faces))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group that keeps points on their surface, and can give the strands a tube.
+"""The Geometry Nodes group that keeps points on their surface and can turn strands into tubes.
 
-A point is at the same place of the same triangle as long as the surface has as many vertices as
-when the curve was drawn. Otherwise, for example at another level of subdivision, its place is
-estimated from a face of the mesh without modifiers, whose vertices most modifiers keep in front,
-and is the nearest point of the surface.
+As long as the surface has the same number of vertices as when the curve was drawn, each point stays
+at the same position in the same triangle. Otherwise, for example at another subdivision level, its
+position is estimated from three vertices of the cage, which most modifiers keep at the start of the
+vertex list, and then moved to the nearest point of the surface.
 
 A file keeps the group that it was saved with.
 """
@@ -14,25 +14,29 @@ import bpy
 GROUP_NAME = "NICMM Surface Curve"
 
 CORNERS = ("vertex_1", "vertex_2", "vertex_3")
-"""Attributes of a point: the vertices of its triangle."""
+"""Attributes of a point: the three vertices of its triangle."""
 
 CAGE_CORNERS = ("cage_1", "cage_2", "cage_3")
-"""Three vertices of its face in the mesh without modifiers; -1 where they are unknown."""
+"""Attributes of a point: three vertices of its face of the cage; -1 if unknown."""
 
 BARYCENTRIC, CAGE_OFFSET = "barycentric", "cage_offset"
-"""Its place in the triangle; and relative to the three vertices, along two sides and the normal."""
+"""Attributes of a point: its barycentric coordinates, and its offset from the three cage vertices.
+
+The offset is given along two sides and along the normal, as `sticky_curves.on_cage` computes it.
+"""
 
 VERTICES, OFFSET = "surface_vertices", "offset"
-"""The number of vertices of the surface, and the distance from it."""
+"""Attributes of a point: the surface's number of vertices, and the point's distance from it."""
 
 SURFACE, TUBE = "Surface", "Tube"
 """Inputs of the group: the mesh object, and whether to make a tube."""
+
 SIDES = 12
-"""Sides of the tube: as many as Blender's default bevel of curves."""
+"""Number of sides of the tube, the same as for Blender's default bevel of curves."""
 
 
 def add_modifier(curves_object, mesh_object, tube: bool) -> None:
-    """Add the modifier with which a hair curves object follows a mesh object."""
+    """Add the modifier that makes a hair curves object follow a mesh object."""
     modifier = curves_object.modifiers.new(GROUP_NAME, "NODES")
     modifier.node_group = node_group()
     _set_input(modifier, SURFACE, mesh_object)
@@ -40,8 +44,8 @@ def add_modifier(curves_object, mesh_object, tube: bool) -> None:
 
 
 def node_group():
-    """The group of the file, created if it is missing or incomplete."""
-    group = bpy.data.node_groups.get((GROUP_NAME, None))  # not one that is linked
+    """The node group of the file, created if it is missing or incomplete."""
+    group = bpy.data.node_groups.get((GROUP_NAME, None))  # None: no group linked from a library
     return group if group is not None and _is_whole(group) else _new_group()
 
 
@@ -51,7 +55,7 @@ def _new_group():
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket(SURFACE, in_out="INPUT", socket_type="NodeSocketObject")
     socket = group.interface.new_socket(TUBE, in_out="INPUT", socket_type="NodeSocketBool")
-    socket.description = "Show the strands as a mesh with their radius"
+    socket.description = "Show the strands as a tube mesh with their radius"
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     column = _Column(group)
     inputs = column.node("NodeGroupInput", 0)
@@ -64,7 +68,7 @@ def _new_group():
     lifted = column.vectors("NORMALIZE", normal)
     lifted = column.scaled(lifted, column.attribute(OFFSET, "FLOAT"))
     target = column.node("GeometryNodeSetPosition", 7)
-    # Hair curves are Catmull-Rom splines; only nodes change the type reliably.
+    # Hair curves are Catmull-Rom splines, and only a node changes their type reliably.
     straight = column.node("GeometryNodeCurveSplineType", 6)
     straight.spline_type = "POLY"
     column.link(_output(inputs, "Geometry"), straight.inputs["Curve"])
@@ -77,7 +81,7 @@ def _new_group():
 
 
 def _in_triangle(column, surface) -> tuple:
-    """The place and the normal of a point in its triangle."""
+    """The position and normal of each point in its triangle."""
     position = column.node("GeometryNodeInputPosition", 1)
     normal = column.node("GeometryNodeInputNormal", 1)
     corners = [column.attribute(name, "INT") for name in CORNERS]
@@ -86,7 +90,7 @@ def _in_triangle(column, surface) -> tuple:
     found = []
     for field in (_output(position, "Position"), _output(normal, "Normal")):
         first, second, last = (column.sample(surface, field, corner) for corner in corners)
-        # Relative to the last corner, so that rounding in the sum of the weights has no effect.
+        # Relative to the last corner, because rounded weights may not sum to exactly 1.
         value = last
         for corner, weight in zip((first, second), weights.outputs, strict=False):
             value = column.added(value, column.vectors("SUBTRACT", corner, last), weight)
@@ -95,7 +99,7 @@ def _in_triangle(column, surface) -> tuple:
 
 
 def _is_unchanged(column, surface):
-    """Whether the surface has as many vertices as when the curve was drawn."""
+    """Whether the surface has the same number of vertices as when the curve was drawn."""
     size = column.node("GeometryNodeAttributeDomainSize", 2)
     column.link(surface, size.inputs["Geometry"])
     same = column.node("FunctionNodeCompare", 3)
@@ -106,7 +110,7 @@ def _is_unchanged(column, surface):
 
 
 def _nearest(column, surface):
-    """The point of the surface nearest to the place estimated from a face without modifiers."""
+    """The point of the surface nearest to the position estimated from the cage."""
     position = _output(column.node("GeometryNodeInputPosition", 1), "Position")
     corners = [column.attribute(name, "INT") for name in CAGE_CORNERS]
     first, second, last = (column.sample(surface, position, corner) for corner in corners)
@@ -134,7 +138,7 @@ def _nearest(column, surface):
 
 
 def _with_tube(column, curves, inputs):
-    """The curves, or a tube round them."""
+    """The curves, or the tube if that is chosen."""
     radius = _output(column.node("GeometryNodeInputRadius", 8), "Radius")
     widest = column.node("GeometryNodeAttributeStatistic", 8)
     widest.data_type, widest.domain = "FLOAT", "POINT"
@@ -142,7 +146,7 @@ def _with_tube(column, curves, inputs):
     column.link(radius, _input(widest, "Attribute"))
     circle = column.node("GeometryNodeCurvePrimitiveCircle", 8)
     circle.inputs["Resolution"].default_value = SIDES
-    # Strands without a radius are lines; without a profile, the tube consists of edges only.
+    # If all radii are zero, no profile is used, and the mesh consists of edges only.
     profile = column.switch(8, _output(widest, "Max"), None, _output(circle, "Curve"))
     mesh = column.node("GeometryNodeCurveToMesh", 9)
     mesh.inputs["Fill Caps"].default_value = True
@@ -154,7 +158,7 @@ def _with_tube(column, curves, inputs):
 
 
 def _is_whole(group) -> bool:
-    """Whether a group with this name has the parts that the modifier needs."""
+    """Whether a group has the parts that the modifier needs."""
     return (
         group.bl_idname == "GeometryNodeTree"
         and _interface_input(group, SURFACE) is not None
@@ -175,7 +179,7 @@ def _group_output(group):
 
 
 class _Column:
-    """Adds nodes in columns from left to right."""
+    """Adds nodes and links to a group, and places the nodes in columns from left to right."""
 
     def __init__(self, group) -> None:
         self.group = group
@@ -201,7 +205,7 @@ class _Column:
         return _output(node, "Attribute")
 
     def sample(self, geometry, field, index):
-        """A vector field at a vertex of a geometry."""
+        """The value of a vector field at one vertex of a geometry."""
         node = self.node("GeometryNodeSampleIndex", 2)
         node.data_type, node.domain = "FLOAT_VECTOR", "POINT"
         self.link(geometry, _input(node, "Geometry"))
@@ -210,7 +214,7 @@ class _Column:
         return _output(node, "Value")
 
     def switch(self, column: int, condition, if_false, if_true, kind: str = "GEOMETRY"):
-        """Switch between two values, of which either may be None (empty)."""
+        """Switch between two values; None leaves an input empty."""
         node = self.node("GeometryNodeSwitch", column)
         node.input_type = kind
         for name, source in (("Switch", condition), ("False", if_false), ("True", if_true)):
@@ -223,7 +227,7 @@ class _Column:
         return self.switch(5, condition, if_false, if_true, "VECTOR")
 
     def vectors(self, operation: str, *operands):
-        """The vector that an operation makes of others."""
+        """The result of a vector operation."""
         node = self.node("ShaderNodeVectorMath", 3)
         node.operation = operation
         for operand, socket in zip(operands, node.inputs, strict=False):
@@ -239,16 +243,17 @@ class _Column:
         return node.outputs[0]
 
     def added(self, vector, other, factor):
-        """A vector plus a multiple of another one."""
+        """A vector plus a multiple of another vector."""
         return self.vectors("ADD", vector, self.scaled(other, factor))
 
 
 def _output(node, name: str):
-    """The enabled socket; before Blender 5 a node has one of each name for every data type."""
+    """The enabled output with a name; before Blender 5 a node has one for each data type."""
     return next(socket for socket in node.outputs if socket.name == name and socket.enabled)
 
 
 def _input(node, name: str):
+    """The enabled input with a name."""
     return next(socket for socket in node.inputs if socket.name == name and socket.enabled)
 
 

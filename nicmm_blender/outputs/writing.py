@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a curve as a separate object, or as cut edges, a region or parts of the mesh."""
+"""Writes a curve as a separate object, or as cut edges, a region or separate parts of its mesh."""
 
 from dataclasses import dataclass
 
@@ -13,17 +13,21 @@ from . import curve_object, mesh_cut, sticky_curves
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
 SEPARATE = ("CURVE", "STICKY")
-"""Outputs that are objects of their own."""
+"""Outputs that are separate objects."""
 
 FACE_SETS = ".sculpt_face_set"
+"""Blender's attribute for face sets."""
+
 DEFAULT_FACE_SET = 1
 INSIDE = ".nicmm_inside"
+"""Temporary face layer that marks the faces inside the curve."""
+
 REGION_NAME = "Region"
 
 
 @dataclass
 class _Cutting:
-    """A mesh object with a curve on it, cut by the core but not yet in Blender."""
+    """A mesh object whose surface the core has cut along a curve, before Blender's mesh is cut."""
 
     mesh_object: object
     surface: object
@@ -36,7 +40,7 @@ class _Cutting:
 def apply(context, mesh_object, surface, curves, settings, asked) -> str:
     """Create the chosen output and return a summary for the report.
 
-    `asked` holds the settings of the curves, a `curve_record.Asked`.
+    `settings` holds the output settings, `asked` the settings of the curves.
     """
     if settings.output in SEPARATE:
         made = as_object(mesh_object, surface, curves, settings)
@@ -45,8 +49,8 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
         return f"{sum(len(curve.faces) for curve in curves)} points"
     if len(curves) != 1:
         raise InputError(
-            f"There are {len(curves)} curves, and only one can be cut. Choose the output Curve to "
-            "see them"
+            f"There are {len(curves)} curves, and only one can be cut. Set Output to Curve to see "
+            "them"
         )
     if surface.cage is not None:
         raise InputError(
@@ -60,7 +64,7 @@ def apply(context, mesh_object, surface, curves, settings, asked) -> str:
 
 
 def as_object(mesh_object, surface, curves, settings):
-    """Create a curve object without linking it to a collection."""
+    """Create an object that shows curves, without linking it to a collection."""
     radius = automatic_radius(surface, settings.radius, settings.thickness)
     drawing = Drawing(settings.spline, radius, settings.offset)
     if settings.output == "STICKY":
@@ -69,9 +73,9 @@ def as_object(mesh_object, surface, curves, settings):
 
 
 def redraw(drawn, surface, curves) -> None:
-    """Replace the curves in a curve object; its radius, materials and modifiers stay."""
+    """Replace the curves in a curve object; its radius, materials and modifiers are kept."""
     kind = curve_record.drawn_as(drawn)
-    if kind is None:  # of a version before, in the space of its mesh
+    if kind is None:  # an object of an earlier version is in the space of its mesh
         kind = {"spline": EXACT, "offset": 0.0}
     elif drawn.parent is not None and drawn.parent == curve_record.mesh_of(drawn):
         curve_object.adopt(drawn, drawn.parent, surface)
@@ -85,7 +89,7 @@ def redraw(drawn, surface, curves) -> None:
 
 
 def show_unfinished(drawn, surface, curve) -> None:
-    """Show a curve that is being changed in an object, with all its points."""
+    """Show a curve that is being changed in its object, with all points of the exact curve."""
     kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
     drawing = Drawing(EXACT, 0.0, kind["offset"])
     if drawn.type == "CURVES":
@@ -95,12 +99,12 @@ def show_unfinished(drawn, surface, curve) -> None:
 
 
 def drawn_as(settings) -> dict:
-    """The settings of a drawing that a record holds."""
+    """The settings of a drawing that a record stores."""
     return {"spline": settings.spline, "offset": settings.offset}
 
 
 def check_replaceable(designed) -> None:
-    """Refuse a curve object whose points cannot be replaced."""
+    """Raise an error if the points of a curve object cannot be replaced."""
     library = designed.library or designed.data.library
     if library is not None:
         raise InputError(
@@ -112,7 +116,7 @@ def check_replaceable(designed) -> None:
 
 
 def replace(designed, request, answer) -> None:
-    """Replace the curve in a curve object by that of an answer."""
+    """Replace the curve in a curve object with the curve of an answer."""
     if isinstance(answer, Exception):
         raise InputError(str(answer)) from answer
     if not answer.curves:
@@ -165,7 +169,7 @@ def _region(context, mesh_object, surface, curve, settings) -> str:
     if settings.region_as == "SELECTION":
         context.tool_settings.mesh_select_mode = (False, False, True)
     with mesh_cut.editable(mesh_object) as edited:
-        # New layers first: adding one invalidates the Python objects of the elements.
+        # Add new layers first, since that invalidates the Python objects of the elements.
         layer = _region_layer(edited, settings.region_as)
         if settings.region_cut:
             vertices, faces = _cut_in_blender(edited, cutting)
@@ -264,7 +268,7 @@ def _enclosed(cutting: _Cutting, other_side: bool):
 
 
 def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
-    """Which faces of the cut Blender mesh are inside: unchanged ones, then the new ones."""
+    """Which faces of the cut Blender mesh are inside: first the unchanged faces, then the new."""
     n_polygons = int(cutting.surface.polygons.max()) + 1
     by_polygon = np.zeros(n_polygons, dtype=bool)
     by_polygon[cutting.surface.polygons[cutting.cut.source_face]] = region.cut_faces
@@ -275,7 +279,7 @@ def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
 
 
 def _mostly_inside(cutting: _Cutting, region) -> np.ndarray:
-    """Which faces of the original Blender mesh are inside with more than half of their area."""
+    """Which faces of the uncut Blender mesh have more than half of their area inside."""
     polygons, areas = cutting.surface.polygons, cutting.core_mesh.face_areas
     within = np.bincount(polygons, areas * region.share)
     return within > 0.5 * np.bincount(polygons, areas)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads Blender's data, and the record of its design in a curve object."""
+"""Reads meshes from Blender, and reads and writes the design record of curve objects."""

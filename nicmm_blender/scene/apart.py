@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluation of a temporary object in a scene of its own, apart from the user's data."""
+"""Evaluates a temporary object in a separate scene, without touching the user's data."""
 
 from contextlib import contextmanager
 
@@ -8,9 +8,9 @@ import bpy
 
 @contextmanager
 def evaluated_apart(temporary):
-    """Yield the evaluated mesh of an object in no scene, valid inside the block only.
+    """Yield the evaluated mesh of an object that is in no scene; it is valid inside the block only.
 
-    The object and its mesh, which no other object may use, are removed afterwards.
+    The object and its mesh are removed afterwards, so no other object may use that mesh.
     """
     data = temporary.data
     scene = bpy.data.scenes.new("NICMM")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the vertices and faces of a cage are in the surface that modifiers generate from it.
+"""Maps between a cage and the surface that modifiers generate from it.
 
-A temporary copy of the object gets attributes with the identity of its vertices and faces, and the
-modifiers carry them to the surface. The user's mesh is never written to: that would report a change
-of it, and is impossible where the mesh is linked from another file.
+A temporary copy of the object gets attributes that identify its vertices and faces, and the
+modifiers carry these attributes over to the surface. The user's mesh is never written to: Blender
+would report it as changed, and a mesh linked from another file cannot be written to at all.
 """
 
 from dataclasses import dataclass, replace
@@ -15,34 +15,36 @@ from .mesh_arrays import corner_vertices, read, triangle_faces
 from .mesh_arrays import positions as positions_of
 
 VERTEX, FACE, PLACE = "nicmm_vertex", "nicmm_face", "nicmm_place"
-"""Attributes of the copy."""
+"""Names of the attributes of the copy."""
 
 INSIDE = -1e-4
-"""Least barycentric coordinate of a place inside a triangle: attributes have single precision."""
+"""Smallest barycentric coordinate that counts as inside: attributes have single precision."""
 
 SAME_PLACE = 1e-5
-"""Greatest distance of two triangles that hold the same place, in diagonals of the surface."""
+"""Distance up to which two positions count as the same, relative to the surface's diagonal."""
 
 
 @dataclass(frozen=True)
 class CageTrace:
-    """The cage of a generated surface.
+    """How a generated surface is related to its cage.
+
+    A place in a face of the cage is given by two coordinates, in which the corners of the face are
+    those of a regular polygon on the unit circle.
 
     Attributes
     ----------
     positions : (n, 3) float array
-        Of the vertices of the cage, in the object's local space.
+        Positions of the cage's vertices in the object's local space.
     vertices : (n,) int array
-        The vertex of the surface that each vertex of the cage became; -1 where it no longer exists.
+        Vertex of the surface that each vertex of the cage became; -1 if it no longer exists.
     sizes : tuple of int
         Numbers of vertices, faces and corners of the cage.
     corners : (P, 3) int array
-        The first three vertices of each face of the cage.
+        First three vertices of each face of the cage.
     faces : (F,) int array
-        The face of the cage that each triangle of the surface comes from; -1 where unknown.
+        Face of the cage that each triangle of the surface comes from; -1 if unknown.
     places : (F, 3, 2) float array
-        Coordinates of the triangles' corners in that face, whose corners are those of a regular
-        polygon round the origin.
+        Places of the corners of each triangle in that face.
     """
 
     positions: np.ndarray
@@ -60,10 +62,12 @@ class CagePlaces:
     Attributes
     ----------
     faces : (k,) int array
-        -1 where unknown.
+        Face of the cage for each point; -1 if unknown.
     places : (k, 2) float array
+        Place of each point in its face.
     copies : (k,) int array
-        Which of the copies that modifiers make of the face, in the order of the surface's faces.
+        Index of the copy of the face, among all copies that modifiers make of it, in the order of
+        the surface's triangles.
     """
 
     faces: np.ndarray
@@ -72,17 +76,22 @@ class CagePlaces:
 
 
 def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
-    """Find the cage in the shown mesh of an object; None where it has the cage's faces.
+    """Trace the cage of an object through its modifiers.
+
+    Returns None if the modifiers leave the faces as they are, since then vertices and faces of the
+    surface are those of the cage.
 
     Parameters
     ----------
     mesh_object : bpy.types.Object
+        The mesh object.
     shown : bpy.types.Mesh
-        With modifiers.
+        Its mesh with modifiers.
     loops : (F, 3) int array
-        Corners of its triangles.
+        Corners of the triangles of that mesh.
     cage_mesh : callable
-        Gives a context with the mesh without modifiers.
+        Function of the mesh object that returns a context manager, which yields the mesh without
+        modifiers.
     """
     if not any(modifier.show_viewport for modifier in mesh_object.modifiers):
         return None
@@ -93,7 +102,7 @@ def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
 
 
 def with_own_cage(surface):
-    """The surface of a cage, as one that modifiers generate from itself."""
+    """Describe the surface of a cage as generated from itself, each face being its own source."""
     polygons, loops = surface.polygons, surface.loops
     totals = np.bincount(polygons) + 2
     starts = np.full(len(totals), np.iinfo(np.int64).max)
@@ -111,13 +120,23 @@ def with_own_cage(surface):
 
 
 def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Coordinates of corners of a face, by their number and that of all its corners."""
+    """Coordinates of corners of a face, by their index in the face and its number of corners."""
     angle = 2.0 * np.pi * number / total
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces:
-    """Points of a generated surface, by triangle and barycentrics, in faces of the cage."""
+    """Find points of a generated surface in faces of the cage.
+
+    Parameters
+    ----------
+    surface : Surface
+        A surface with a `cage`.
+    faces : (k,) int array
+        Triangle of each point.
+    barycentric : (k, 3) float array
+        Barycentric coordinates of each point in its triangle.
+    """
     cage = surface.cage
     places = np.einsum("nj,njk->nk", barycentric, cage.places[faces])
     found = CagePlaces(cage.faces[faces], places, np.zeros(len(faces), dtype=np.int64))
@@ -133,7 +152,15 @@ def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces
 
 
 def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, (k,), -1 where unknown, and barycentrics, (k, 3), of points in the cage."""
+    """Find points in faces of the cage on a generated surface.
+
+    Returns
+    -------
+    faces : (k,) int array
+        Triangle of each point; -1 if unknown.
+    barycentric : (k, 3) float array
+        Barycentric coordinates of each point in its triangle.
+    """
     faces, barycentric = np.full(len(places.faces), -1), np.zeros((len(places.faces), 3))
     triangles = _TrianglesOf(surface, places.faces)
     for number, (face, copy) in enumerate(zip(places.faces, places.copies, strict=True)):
@@ -144,7 +171,7 @@ def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
 
 
 class _TrianglesOf:
-    """The triangles of a surface that come from some faces of the cage."""
+    """Looks up the triangles of a surface that come from given faces of the cage."""
 
     def __init__(self, surface, faces: np.ndarray) -> None:
         self.surface = surface
@@ -153,7 +180,7 @@ class _TrianglesOf:
         self.sorted = surface.cage.faces[self.order]
 
     def at(self, face: int, place: np.ndarray) -> list:
-        """The copies of a place, as pairs of triangle, (1,), and barycentrics, (1, 3)."""
+        """All copies of a place, each as triangle (1,) and barycentric coordinates (1, 3)."""
         if face < 0:
             return []
         first, last = np.searchsorted(self.sorted, [face, face + 1])
@@ -174,7 +201,7 @@ class _TrianglesOf:
 
 
 def _barycentric(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates, (n, 3), of a place in triangles, (n, 3, 2); -1 in flat ones."""
+    """Barycentric coordinates (n, 3) of a place in triangles (n, 3, 2); -1 in degenerate ones."""
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     to = place - triangles[:, 0]
     area = _cross(first, second)
@@ -189,7 +216,7 @@ def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 class _Copy:
-    """A copy of an object in a scene of its own, whose mesh has the attributes."""
+    """A copy of an object, to be evaluated in a separate scene, whose mesh has the attributes."""
 
     def __init__(self, mesh_object, cage) -> None:
         self.mesh_object, self.cage = mesh_object, cage
@@ -223,7 +250,8 @@ class _Copy:
         vertices = np.full(len(positions), -1)
         faces, places = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
         domains = {VERTEX: "POINT", FACE: "FACE", PLACE: "CORNER"}
-        # A simulation may differ in the copy, and nodes may remove or move attributes.
+        # A simulation may run differently in the copy, and nodes may remove attributes or move them
+        # to another domain.
         if _have_equal_faces(mesh, shown):
             kept = {
                 name: attribute
@@ -252,19 +280,19 @@ def _have_equal_faces(one, other) -> bool:
 
 
 def _first_equal(wanted: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The first row of `among` with the same bytes as each row of `wanted`, or -1."""
+    """For each row of `wanted`, the first row of `among` with the same bytes, or -1."""
     known, order = np.unique(_keys(wanted), return_index=True)
     keys = _keys(among)
     at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
     equal = np.flatnonzero(known[at] == keys)[::-1]
     equal = equal[(among[equal] == wanted[order[at[equal]]]).all(axis=1)]
     found = np.full(len(wanted), -1)
-    found[order[at[equal]]] = equal  # the last assignment, of the first row, counts
+    found[order[at[equal]]] = equal  # the last assignment, which is the first row, wins
     return found
 
 
 def _keys(rows: np.ndarray) -> np.ndarray:
-    """The first two of three single-precision numbers of each row as one number."""
+    """The first two single-precision numbers of each row, combined into one integer key."""
     return np.ascontiguousarray(rows[:, :2]).view(np.uint64)[:, 0]
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record that a curve object stores of its design, also in a saved file.
+"""Reads and writes the record of its design that each curve object stores, also in a saved file.
 
 Each point is stored by the three vertices of its triangle and its barycentric coordinates: vertices
 keep their indices when the mesh is moved or deformed, and when the file is opened again. Control
 points are stored in the same form, together with the settings, so that the curve can be edited. On
-a surface that modifiers generate they are also stored by the face of the mesh that they come from:
-it stays the same when the level of a subdivision changes.
+a surface that modifiers generate, each control point is also stored by the face of the cage that it
+comes from, because that face stays the same when the subdivision level changes.
 """
 
 import hashlib
@@ -22,27 +22,31 @@ from .messages import InputError
 from .surface import group_weights, read
 
 KEY = "nicmm_curve"
+"""Custom property of the object that holds the record."""
+
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
 VERSION = 2
-"""Version of the record's format. Records of release 0.1.0 have none and count as 0; those of
-version 1 know nothing of modifiers."""
+"""Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
+of version 1 do not store whether modifiers are used."""
+
 DESIGNED_ON = "nicmm_designed_on"
+"""Custom property of the object's data that holds the digest at the time of the design."""
 
 
 def identifier(name: str) -> str:
-    """The Blender identifier of a choice of the core."""
+    """The Blender identifier of one of the core's choices."""
     return name.upper().replace("-", "_")
 
 
 def property_name(option) -> str:
-    """The Blender property for a core option; weights come from a vertex group."""
+    """The name of the Blender property for a core option; for weights it names a vertex group."""
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
 def _default(option):
-    """The default of the Blender property."""
+    """The default of the Blender property for a core option."""
     if option.kind is Kind.WEIGHTS:
         return ""
     if option.kind is Kind.CHOICE:
@@ -53,14 +57,14 @@ def _default(option):
 WITHOUT_MODIFIERS = ", use_modifiers=False"
 
 OF_A_DESIGN = ("order", "alternatives")
-"""Options that matter once: control points are stored in the order visited."""
+"""Options that matter only once, since control points are stored in the order visited."""
 
 RECORDED = tuple(
     option
     for option in OPTIONS
     if option.kind is not Kind.POINTS and option.name not in OF_A_DESIGN
 )
-"""Options in a record."""
+"""Options that a record stores."""
 
 Asked = make_dataclass(
     "Asked",
@@ -75,13 +79,16 @@ Asked = make_dataclass(
 
 
 def groups_of(asked: Asked) -> list:
-    """Names of the vertex groups that a curve depends on."""
+    """Names of the vertex groups that a curve depends on; an empty name means none."""
     names = [property_name(option) for option in RECORDED if option.kind is Kind.WEIGHTS]
     return [getattr(asked, name) for name in names]
 
 
 def arguments_of(asked: Asked, weights) -> dict:
-    """Arguments of the core; `weights` maps the name of a vertex group to weights, "" to None."""
+    """Settings as keyword arguments for the core.
+
+    `weights` is a function from the name of a vertex group to its weights, and from "" to None.
+    """
     values = {}
     for option in RECORDED:
         value = getattr(asked, property_name(option))
@@ -97,7 +104,7 @@ def arguments_of(asked: Asked, weights) -> dict:
 
 
 def asked_by(properties) -> Asked:
-    """The settings in the properties of an operator or the scene."""
+    """The settings of a curve from the properties of an operator or the scene."""
     return Asked(**{field.name: getattr(properties, field.name) for field in fields(Asked)})
 
 
@@ -106,9 +113,23 @@ def remember(
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
-    `drawn` is None for an object of a version that drew all points. `controls` are the control
-    points as SurfacePoints of the core; by default those of the curves. A drawing with too few
-    points for a curve has no curves.
+    Parameters
+    ----------
+    curve_object : bpy.types.Object
+        Object that gets the record.
+    mesh_object : bpy.types.Object
+        Mesh object that the curves lie on.
+    surface : Surface
+        Its surface.
+    curves : list of SurfaceCurve
+        The curves; empty for a drawing that has too few points for a curve.
+    asked : Asked
+        Settings of the curves.
+    drawn : dict or None
+        Spline type and offset of the drawing; None for an object of an earlier version, which drew
+        all points.
+    controls : SurfacePoints, optional
+        Control points; by default those of the curves.
     """
     if controls is None:
         found = [curve.control_index[curve.control_index >= 0] for curve in curves]
@@ -151,8 +172,9 @@ def _flat(arrays: list) -> list:
 
 
 def digest(mesh_object, surface, asked: Asked) -> str:
-    """A hash of everything that a curve depends on."""
-    words = repr(asked).replace(WITHOUT_MODIFIERS, "")  # as in records of version 1
+    """A hash of everything that a curve depends on besides its control points."""
+    # Without modifiers the text is that of version 1, so that its digests remain valid.
+    words = repr(asked).replace(WITHOUT_MODIFIERS, "")
     found = hashlib.blake2b(words.encode(), digest_size=16)
     found.update(surface.solved.tobytes())
     found.update(surface.faces.tobytes())
@@ -169,19 +191,19 @@ def _fingerprint(surface) -> str:
 
 
 def is_current(curve_object, now: str) -> bool:
-    """Whether a curve was designed with this digest."""
+    """Whether a curve was designed with the digest `now`."""
     return curve_object.data.get(DESIGNED_ON) == now
 
 
 def _readable(curve_object):
-    """The record of a curve, if its version is supported and its points fit together."""
+    """The record of a curve; an error if its version, settings or points cannot be used."""
     record = _with_settings(curve_object)
     _refuse(curve_object, record_check.problem_of(record))
     return record
 
 
 def _with_settings(curve_object):
-    """The record of a curve, if its version is supported and its settings can be used."""
+    """The record of a curve; an error if its version or settings cannot be used."""
     record = curve_object[KEY]
     version = record.get("version", 0)
     if not isinstance(version, int):
@@ -196,6 +218,7 @@ def _with_settings(curve_object):
 
 
 def _refuse(curve_object, problem: str) -> None:
+    """Raise an error if there is a problem with the record."""
     if problem:
         raise InputError(
             f'The record of "{curve_object.name}" is damaged: {problem}. Undo, or delete the curve '
@@ -222,7 +245,7 @@ def mesh_of(curve_object):
 
 
 def present_mesh(context, curve_object):
-    """The mesh object that a curve was designed on, or an error if it is not in the scene."""
+    """The mesh object that a curve was designed on; an error if it is not in the view layer."""
     found = mesh_of(curve_object)
     if found is None or not is_in(context.view_layer, found):
         raise _absent(curve_object)
@@ -230,7 +253,7 @@ def present_mesh(context, curve_object):
 
 
 def existing_mesh(curve_object):
-    """The mesh object that a curve was designed on, or an error if it is in no scene."""
+    """The mesh object that a curve was designed on; an error if it is in no scene."""
     found = mesh_of(curve_object)
     if found is None or not found.users_scene:
         raise _absent(curve_object)
@@ -253,7 +276,7 @@ def mesh_of_context(context):
 
 
 def curves_on(context, mesh_object) -> list:
-    """Visible objects of the view layer that were designed on a mesh."""
+    """Visible curve objects of the view layer that were designed on a mesh."""
     return [
         found
         for found in context.view_layer.objects
@@ -290,7 +313,7 @@ def lies_on(curve_object, surface) -> bool:
 
 
 def designed_on(mesh_object) -> list:
-    """The curve objects designed on a mesh object, by name."""
+    """All curve objects designed on a mesh object, sorted by name."""
     found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
     return sorted(found, key=lambda each: each.name)
 
@@ -299,9 +322,9 @@ def asked_of(curve_object) -> Asked:
     """The settings of a curve."""
     record = _with_settings(curve_object)
     stored = record.get("asked")
-    if stored is None:  # from a version that did not record them
+    if stored is None:  # an early record without settings
         return Asked(closed=bool(record["closed"][0]), use_modifiers=False)
-    before = {"use_modifiers": False}  # what versions did that did not record a setting
+    before = {"use_modifiers": False}  # how versions behaved that did not record a setting
     return Asked(
         **{
             field.name: field.type(stored.get(field.name, before.get(field.name, field.default)))
@@ -311,27 +334,27 @@ def asked_of(curve_object) -> Asked:
 
 
 def drawn_as(curve_object) -> dict | None:
-    """How a curve is drawn; None if a version made it that drew all points."""
+    """How a curve is drawn; None if an earlier version made it, which drew all points."""
     found = _with_settings(curve_object).get("drawn")
     return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
 
 
 def without_curve(curve_object) -> str:
-    """What to do about a drawing that has too few points for a curve."""
+    """The message for a drawing that has too few points for a curve."""
     count = len(_readable(curve_object)["control_corners"]) // 3
     return (
         f'"{curve_object.name}" has {count} control point{"" if count == 1 else "s"} and no curve '
-        "yet. Add points with the tool Surface Curve, or delete it"
+        "yet. Add points with the Surface Curve tool, or delete it"
     )
 
 
 def surface_of(curve_object, mesh_object):
-    """The surface that a curve lies on, as it is now."""
+    """The current surface that a curve lies on."""
     return read(mesh_object, asked_of(curve_object).use_modifiers)
 
 
 def recall(curve_object, surface) -> list:
-    """The recorded curves as curves of the core, on the present mesh."""
+    """The recorded curves as curves of the core, on the current surface."""
     from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
@@ -342,7 +365,8 @@ def recall(curve_object, surface) -> list:
         raise InputError(
             f'The mesh has changed since "{curve_object.name}" was designed: '
             f"the triangles of {(faces < 0).sum()} of its {len(faces)} points no longer exist. "
-            "Draw the curve again, or edit it, which moves its control points to the present mesh"
+            "Run Update Curves to move its control points to the current mesh, or draw the curve "
+            "again"
         )
     curves, start, control = [], 0, 0
     for count, closed, controls in zip(
@@ -358,15 +382,15 @@ def recall(curve_object, surface) -> list:
 
 
 def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
-    """The control points of a curve as SurfacePoints, and the positions at its design.
+    """The control points of a curve as SurfacePoints, and their positions when it was designed.
 
-    The face is -1 where the triangle no longer exists. The positions, (k, 3), are in the object's
-    local space.
+    The face of a point is -1 if its triangle no longer exists. Positions, (k, 3), are in the local
+    space of the mesh object.
     """
     from ... import nicmm_core as nicmm
 
     record = _readable(curve_object)
-    if "control_corners" not in record:  # from a version that did not record them
+    if "control_corners" not in record:  # an early record without control points
         (curve,) = recall(curve_object, surface)
         index = curve.control_index
         found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
@@ -377,10 +401,10 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
 
 
 def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
-    """The control points of a curve on the present surface, and how many of them were moved.
+    """The control points of a curve on the current surface, and how many of them were moved.
 
-    A point whose triangle no longer exists is found by the face of the mesh that it came from, or
-    else moves to the nearest point of the surface.
+    A point whose triangle no longer exists is located by the face of the cage that it came from. If
+    that fails too, it is moved to the nearest point of the surface.
     """
     from ... import nicmm_core as nicmm
     from ...nicmm_core.geometry.surface_points import nearest_points
@@ -405,9 +429,9 @@ def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
 
 
 def _cage_places(curve_object, mesh_object, sizes: tuple) -> CagePlaces | None:
-    """The control points of a curve in faces of the mesh without modifiers; None if unknown.
+    """The control points of a curve in faces of the cage; None if unknown.
 
-    `sizes` are the present ones of that mesh.
+    `sizes` are the current numbers of vertices, faces and corners of the cage.
     """
     record = curve_object[KEY]
     if record.get("cage"):
@@ -429,21 +453,32 @@ def _cage_places(curve_object, mesh_object, sizes: tuple) -> CagePlaces | None:
 
 
 def _recalled(record, corners_name: str, weights_name: str, surface):
-    """Faces, (n,), -1 if they no longer exist, and barycentrics, (n, 3), of recorded points."""
+    """Triangles (n,) and barycentric coordinates (n, 3) of recorded points.
+
+    The triangle is -1 if it no longer exists.
+    """
     corners = np.array(record[corners_name], dtype=np.int64).reshape(-1, 3)
     barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
     faces, order = _find_triangles(surface.faces, corners)
     generated = bool(record.get("cage")) or surface.cage is not None
     changed = record["vertices"] > len(surface.local)
     if changed or (generated and record.get("faces") != _fingerprint(surface)):
-        # The indices of vertices may have changed.
+        # Vertices may have been renumbered, so equal indices prove nothing.
         faces = np.full(len(corners), -1, dtype=np.int64)
     return faces, np.take_along_axis(barycentric, order, axis=1)
 
 
 def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The triangle with the given vertices, or -1, and which of them each of its corners is."""
-    # Only a few of the triangles have no other vertices than these.
+    """Find triangles by their vertices.
+
+    Returns
+    -------
+    found : (n,) int array
+        Triangle with the vertices of each row of `corners`; -1 if there is none.
+    order : (n, 3) int array
+        For each corner of that triangle, its index in the row of `corners`.
+    """
+    # Few triangles have only vertices from `corners`, and only these need to be compared.
     wanted = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
     wanted[corners[corners < len(wanted)]] = True
     candidates = np.flatnonzero(wanted[faces].all(axis=1))

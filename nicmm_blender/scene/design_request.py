@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A request for a curve as plain arrays: read from Blender, then answered by the core.
+"""A request for a curve as plain arrays: read from Blender's data, then answered by the core.
 
-Blender's thread reads the data. `answer` accesses no Blender data, so it can run in time slices
-(`operators.turns`).
+The main thread reads the data. `answer` does not access Blender's data, so it can run in time
+slices (`operators.turns`).
 """
 
 import contextlib
@@ -22,8 +22,8 @@ from .surface import Surface, group_weights, read
 class DesignRequest:
     """Everything that a curve depends on.
 
-    `points`, `options` and `start` are arguments of the core; `moved` counts the points that are no
-    longer at their positions of the previous design.
+    `points`, `options` and `start` are arguments for the core. `moved` counts the control points
+    that were moved to the nearest point of the surface because their triangles no longer exist.
     """
 
     mesh_name: str
@@ -54,18 +54,33 @@ class DesignRequest:
             and np.array_equal(now.faces, self.surface.faces)
         ):
             raise InputError(
-                f'"{self.mesh_name}" has changed while the curve was computed. Draw the curve again'
+                f'"{self.mesh_name}" changed while the curve was being computed. Draw the curve '
+                "again"
             )
 
     def in_world(self, solved: np.ndarray) -> np.ndarray:
-        """World positions of points in the space that the core works in."""
+        """World positions of points (n, 3) that are given in the space of the core."""
         local = solved @ np.linalg.inv(self.surface.linear).T
         placement = self.surface.placement
         return local @ placement[:3, :3].T + placement[:3, 3]
 
 
 def for_points(mesh_object, surface, points, order: str, asked: Asked) -> DesignRequest:
-    """A request for a curve through points on the triangles of a mesh."""
+    """A request for a curve through points on a surface.
+
+    Parameters
+    ----------
+    mesh_object : bpy.types.Object
+        The mesh object.
+    surface : Surface
+        Its surface.
+    points : int array or SurfacePoints
+        Control points as the core takes them.
+    order : {"given", "shortest"}
+        Order of the control points, by the core's name.
+    asked : Asked
+        Settings of the curve.
+    """
     return DesignRequest(
         mesh_name=mesh_object.name,
         mesh_uid=mesh_object.session_uid,
@@ -80,14 +95,14 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
 
 
 def for_drawing(mesh_object, surface, points, asked: Asked) -> DesignRequest:
-    """A request for a curve that is drawn point by point: two points are joined by an open one."""
+    """A request for a curve that is drawn point by point; with two points it is always open."""
     request = for_points(mesh_object, surface, points, "given", asked)
     closed = asked.closed and len(points) >= FEWEST_CLOSED
     return replace(request, options={**request.options, "closed": closed})
 
 
 def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
-    """A request to design a curve again on the present surface, along the same course."""
+    """A request to design a curve again on the current surface, along the same course."""
     points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
     if len(points) < FEWEST_OPEN:
         raise InputError(curve_record.without_curve(curve_object))
@@ -100,7 +115,7 @@ def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest
 
 
 def answer(request: DesignRequest, progress):
-    """Design the curve with the core, without access to Blender data."""
+    """Design the curve with the core, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 
     asked = request.asked
@@ -108,7 +123,7 @@ def answer(request: DesignRequest, progress):
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
             if request.start is not None:
-                # A course that cannot be followed any more is sought again.
+                # If the curve cannot keep its course, the core searches for a new one below.
                 with contextlib.suppress(nicmm.CurveError):
                     return designer.design(request.points, start=request.start, **arguments)
             return designer.design(request.points, **arguments)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cache of the core's designers, with their factorisations, for the last meshes.
+"""Caches the core's designers, with their factorisations, for the most recently used meshes.
 
-The redo panel runs the operator again on the same mesh for every change of a setting.
+The cache pays off because the redo panel runs the operator again, on the same mesh, whenever a
+setting changes.
 """
 
 import hashlib
@@ -14,14 +15,14 @@ from .. import preferences
 
 _designers: dict = {}
 _in_use: dict = {}
-"""Those of work in time slices; only their meshes may be used."""
+"""Designers that are working in time slices; meanwhile others may use only their meshes."""
 
 _fingerprints: dict = {}
-"""Of the arrays that were asked for before, by their addresses."""
+"""Fingerprints computed before, by the identity of the arrays."""
 
 
 def designer_for(vertices: np.ndarray, faces: np.ndarray):
-    """The core's designer for a mesh, created only if the mesh has changed."""
+    """The core's designer for a mesh; a new one only if no designer is kept for these arrays."""
     fingerprint = _fingerprint(vertices, faces)
     designer = _taken(fingerprint, vertices, faces)
     _keep(fingerprint, designer)
@@ -30,10 +31,10 @@ def designer_for(vertices: np.ndarray, faces: np.ndarray):
 
 @contextmanager
 def exclusive(vertices: np.ndarray, faces: np.ndarray):
-    """Yield the designer for a mesh, without sharing it meanwhile; for work in time slices.
+    """Yield the designer for a mesh and do not share it meanwhile; for work in time slices.
 
-    A designer works on one curve at a time: a caller that waited for one whose thread is blocked
-    would wait for ever.
+    A designer computes one curve at a time, so a caller that waited for a designer whose thread is
+    blocked would wait forever.
     """
     fingerprint = _fingerprint(vertices, faces)
     designer = _taken(fingerprint, vertices, faces)
@@ -46,7 +47,7 @@ def exclusive(vertices: np.ndarray, faces: np.ndarray):
 
 
 def mesh_for(vertices: np.ndarray, faces: np.ndarray):
-    """The core's mesh of these arrays, also while a designer works on it."""
+    """The core's mesh of these arrays, even while a designer is working on it."""
     fingerprint = _fingerprint(vertices, faces)
     if fingerprint in _in_use:
         return _in_use[fingerprint].mesh
@@ -54,14 +55,14 @@ def mesh_for(vertices: np.ndarray, faces: np.ndarray):
 
 
 def is_prepared(vertices: np.ndarray, faces: np.ndarray) -> bool:
-    """Whether a ray can be cast at a mesh at once."""
+    """Whether a ray can be cast at a mesh without building its search trees first."""
     fingerprint = _fingerprint(vertices, faces)
     designer = _in_use.get(fingerprint) or _designers.get(fingerprint)
     return designer is not None and "face_trees" in vars(designer.mesh)
 
 
 def prepare(vertices: np.ndarray, faces: np.ndarray, progress) -> bool:
-    """Compute what a ray needs; False if the progress function has cancelled it."""
+    """Build the search trees for ray casts; return False if the progress function cancelled it."""
     from ...nicmm_core.progress import CancelledError, watched
 
     try:
@@ -73,13 +74,13 @@ def prepare(vertices: np.ndarray, faces: np.ndarray, progress) -> bool:
 
 
 def forget() -> None:
-    """Free the memory."""
+    """Drop all designers and free their memory."""
     _designers.clear()
     _fingerprints.clear()
 
 
 def _fingerprint(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    """A hash of the arrays of a surface, which nobody changes."""
+    """A hash of the arrays of a surface, which must never be modified in place."""
     address = id(vertices), id(faces)
     known = _fingerprints.get(address)
     if known is not None and known[0]() is vertices and known[1]() is faces:
@@ -93,7 +94,7 @@ def _fingerprint(vertices: np.ndarray, faces: np.ndarray) -> bytes:
 
 
 def _taken(fingerprint: bytes, vertices: np.ndarray, faces: np.ndarray):
-    """Remove the designer for a mesh from the cache, or create one."""
+    """Take the designer for a mesh out of the cache, or create one."""
     from ... import nicmm_core as nicmm
 
     designer = _designers.pop(fingerprint, None)
@@ -101,7 +102,7 @@ def _taken(fingerprint: bytes, vertices: np.ndarray, faces: np.ndarray):
 
 
 def _keep(fingerprint: bytes, designer) -> None:
-    """Store a designer as the most recently used, and drop the oldest ones."""
+    """Store a designer as the most recently used one, and drop the oldest beyond the limit."""
     _designers[fingerprint] = designer
     while len(_designers) > preferences.kept_meshes():
         del _designers[next(iter(_designers))]

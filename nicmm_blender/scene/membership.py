@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an object is in a view layer."""
+"""Tests whether an object is in a view layer."""
 
 
 def is_in(view_layer, candidate) -> bool:
-    """Whether a view layer contains an object; one of a library may have the same name."""
+    """Whether a view layer contains an object.
+
+    The name alone does not tell: an object linked from a library may have the same name.
+    """
     objects = view_layer.objects
     return candidate.name in objects and any(each == candidate for each in objects)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh object to work on, and marks of its edges.
+"""Finds the mesh object to work on and reads its edge marks.
 
-Blender keeps a separate copy of a mesh that is being edited: operators call `synchronise` first.
+Blender keeps a separate copy of a mesh in Edit Mode, so operators call `synchronise` first.
 """
 
 import numpy as np
@@ -10,10 +10,10 @@ from .messages import InputError
 
 
 def mesh_object(context):
-    """The mesh to design on: the active object, or the mesh of the active curve.
+    """The mesh to design on: the active object, or the parent of the active curve object.
 
-    Blender shows the redo panel only while the operator can run again, and then the new curve is
-    the active object.
+    The parent is needed for the redo panel: Blender shows it only while the operator can run again,
+    and by then the new curve is the active object.
     """
     active = context.active_object
     if active is not None and active.type in {"CURVE", "CURVES"}:
@@ -22,13 +22,13 @@ def mesh_object(context):
 
 
 def synchronise(mesh_object) -> None:
-    """Update the mesh from Edit Mode."""
+    """Copy the changes of Edit Mode to the mesh."""
     if mesh_object.mode == "EDIT":
         mesh_object.update_from_editmode()
 
 
 def marked_edges(mesh_object, mark: str) -> np.ndarray:
-    """Vertices, (n, 2), of the edges with a mark, such as "use_seam"."""
+    """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
     edges = mesh_object.data.edges
     marked = np.empty(len(edges), dtype=bool)
     edges.foreach_get(mark, marked)
@@ -38,7 +38,7 @@ def marked_edges(mesh_object, mark: str) -> np.ndarray:
 
 
 def check_local(mesh_object, consequence: str) -> None:
-    """Refuse a mesh whose data belongs to another file."""
+    """Raise an error if the data of the mesh belongs to another file."""
     library = mesh_object.data.library or mesh_object.library
     if library is not None:
         raise InputError(

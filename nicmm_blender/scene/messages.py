@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors for the user, and the core's messages in words that fit Blender."""
+"""Errors for the user, with the core's messages reworded for Blender."""
 
 
 class InputError(Exception):
-    """The Blender data cannot be used; the message says what to change."""
+    """Blender's data cannot be used; the message says what to change."""
 
 
 def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
-    """The core's message for the user: points are counted from one, and the map is named.
+    """Reword a message of the core: points are counted from one, and the obstacle map is named.
 
-    `vertices` are the vertices of the control points, or None if they are not at vertices.
+    `vertices` are the vertex indices of the control points, or None if they are not at vertices.
     """
     text = str(error)
     for point in getattr(error, "points", ()):

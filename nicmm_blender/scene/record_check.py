@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks the record of a curve before it is used: a file or a script may hold anything."""
+"""Checks the record of a curve before it is used, since files and scripts may contain anything."""
 
 from dataclasses import fields
 
 import numpy as np
 
 LARGEST = 2**31 - 1
-"""Of an index in Blender."""
+"""Largest index in Blender."""
 
 SPLINES = ("EVEN", "EXACT", "BEZIER")
-"""Ways to draw a curve."""
+"""Spline types of a drawing."""
 
 
 def is_group(value) -> bool:
-    """Whether a custom property has properties of its own."""
+    """Whether a custom property is a group of properties."""
     return hasattr(value, "keys") and hasattr(value, "get")
 
 
 def problem_of(record) -> str:
-    """What is wrong with the points of a record; empty if they can be used."""
+    """The problem with the points of a record; empty if they can be used."""
     return _problem(_check_points, record)
 
 
 def problem_of_settings(record, asked_type) -> str:
-    """What is wrong with the settings of a record; `asked_type` is their class."""
+    """The problem with the settings of a record, whose class is `asked_type`; empty if none."""
     return _problem(_check_settings, record, asked_type)
 
 
@@ -36,7 +36,7 @@ def _problem(check, *arguments) -> str:
 
 
 class _DamagedError(Exception):
-    """What is wrong with a record."""
+    """A problem with a record."""
 
 
 def _check_points(record) -> None:
@@ -53,7 +53,7 @@ def _check_points(record) -> None:
     vertices = record.get("vertices")
     if not isinstance(vertices, int) or vertices < 0:
         raise _DamagedError(f"its number of vertices is {vertices!r}")
-    if "control_corners" not in record:  # from a version that did not record them
+    if "control_corners" not in record:  # an early record without control points
         if len(counts) != 1:
             raise _DamagedError(f"it has no control points and {len(counts)} curves")
         return
@@ -63,7 +63,7 @@ def _check_points(record) -> None:
     _numbers(record, "control_barycentric", len(controls))
     _numbers(record, "control_positions", len(controls))
     if not len(counts) and (len(closed) or len(control_counts)):
-        raise _DamagedError("it has no curve and settings of one")
+        raise _DamagedError("it has settings of a curve but no curve")
     if len(record.get("cage", ())):
         count = len(controls) // 3
         _whole(record, "cage", 3, least=0)
@@ -78,7 +78,7 @@ def _check_settings(record, asked_type) -> None:
         if not len(_whole(record, "closed")):
             raise _DamagedError("it has neither settings nor a curve")
     elif not is_group(asked):
-        raise _DamagedError("asked is no group of properties")
+        raise _DamagedError("asked is not a group of properties")
     else:
         for field in fields(asked_type):
             value = asked.get(field.name, field.default)
@@ -87,7 +87,7 @@ def _check_settings(record, asked_type) -> None:
     if drawn is not None and not (
         is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))
     ):
-        raise _DamagedError("drawn does not say how the curve is drawn")
+        raise _DamagedError("drawn does not describe how the curve is drawn")
 
 
 def _is_finite(value) -> bool:
@@ -95,26 +95,27 @@ def _is_finite(value) -> bool:
 
 
 def _ranges(counts: np.ndarray):
+    """Start and end of each part of an array that is divided into parts of these lengths."""
     ends = np.cumsum(counts)
     return zip((ends - counts).tolist(), ends.tolist(), strict=True)
 
 
 def _numbers(record, name: str, length: int | None = None) -> np.ndarray:
-    """A list of finite numbers."""
+    """Read a list of finite numbers of a given length, or of any length."""
     try:
         values = np.array(record[name], dtype=np.float64)
     except (KeyError, TypeError, ValueError) as error:
-        raise _DamagedError(f"{name} is missing or holds no numbers") from error
+        raise _DamagedError(f"{name} is missing or does not consist of numbers") from error
     if values.ndim != 1 or not np.isfinite(values).all():
-        raise _DamagedError(f"{name} does not hold finite numbers")
+        raise _DamagedError(f"{name} has values that are not finite numbers")
     if length is not None and len(values) != length:
         raise _DamagedError(f"{name} has {len(values)} values and needs {length}")
     return values
 
 
 def _whole(record, name: str, length: int | None = None, least: int = 0) -> np.ndarray:
-    """A list of whole numbers."""
+    """Read a list of whole numbers from `least` to `LARGEST`."""
     values = _numbers(record, name, length)
     if ((values != np.floor(values)) | (values < least) | (values > LARGEST)).any():
-        raise _DamagedError(f"{name} holds numbers that are no index or count")
+        raise _DamagedError(f"{name} has values that are not valid indices or counts")
     return values.astype(np.int64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Control points from the selection, a vertex group or a script."""
+"""Reads control points from the selection, from a vertex group or from a script."""
 
 import numpy as np
 
@@ -41,14 +41,14 @@ def _history(edited) -> np.ndarray:
 def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     """Return the selected vertices and the core's order for them, "given" or "shortest".
 
-    Box, circle and lasso selection are not recorded and old entries stay in the history, so it is
-    used only if it holds exactly the selected vertices.
+    Blender does not record box, circle and lasso selection, and old entries stay in the selection
+    history. The history is therefore used only if it holds exactly the selected vertices.
     """
     selected = selected_vertices(mesh_object)
     if len(selected) == 0:
         raise InputError(
-            f'No vertex of "{mesh_object.name}" is selected. Select the vertices that the curve '
-            "should pass through in Edit Mode"
+            f'No vertex of "{mesh_object.name}" is selected. In Edit Mode, select the vertices '
+            "that the curve should pass through"
         )
     if order == "SHORTEST":
         return selected, "shortest"
@@ -80,10 +80,10 @@ def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str
 
 
 def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
-    """Return the control points of a script for the core, and their order.
+    """Return the control points that a script gives as text, and the core's order for them.
 
-    The text holds vertex indices of the mesh or positions in the object's local space, "12, 80,
-    0.5 0 1".
+    The text lists vertex indices of the mesh or positions in the object's local space, such as
+    "12, 80, 0.5 0 1".
     """
     core_order = "shortest" if order == "SHORTEST" else "given"
     count = len(surface.local) if surface.cage is None else len(surface.cage.vertices)
@@ -100,9 +100,10 @@ def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
 
 
 def points_at(surface: Surface, vertices: np.ndarray):
-    """Points for the core at vertices of the mesh, (k,): vertices of the surface or places on it.
+    """Points for the core at vertices (k,) of the mesh.
 
-    A vertex that modifiers remove is replaced by the nearest place.
+    Returns vertex indices of the surface. If modifiers have removed any of the vertices, returns
+    SurfacePoints of the core instead, in which the nearest point of the surface replaces it.
     """
     if surface.cage is None:
         return vertices
@@ -111,7 +112,7 @@ def points_at(surface: Surface, vertices: np.ndarray):
 
 
 def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
-    """Positions of vertices of the mesh on the surface, (k, 3), in the core's space."""
+    """Positions (k, 3) on the surface, in the core's space, of vertices (k,) of the mesh."""
     points = points_at(surface, vertices)
     if isinstance(points, np.ndarray):
         return surface.solved[points]
@@ -120,7 +121,7 @@ def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
 
 
 def _nearest(surface: Surface, vertices: np.ndarray):
-    """The places nearest to vertices of the mesh, as SurfacePoints of the core."""
+    """The points of the surface nearest to vertices of the mesh, as SurfacePoints of the core."""
     from ...nicmm_core.geometry.surface_points import nearest_points
 
     found = surface.cage.vertices[vertices]

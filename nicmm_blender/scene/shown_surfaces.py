@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cache of the surfaces of mesh objects, for what happens at every move of the mouse.
+"""Caches the surfaces of mesh objects for code that runs on every mouse move.
 
-Blender reports every change of an object; a surface is dropped when its object has changed.
+Blender reports every change of an object; the surface of a changed object is dropped.
 """
 
 import bpy
@@ -10,14 +10,17 @@ from bpy.app.handlers import persistent
 from .surface import Surface, read
 
 MOST = 4
-"""Surfaces that are kept."""
+"""Maximum number of surfaces in the cache."""
 
 FEW_FACES = 60_000
-"""Faces that are read at once, in some hundredths of a second; more only with a message."""
+"""Faces up to which a mesh is read immediately, in some hundredths of a second.
+
+The tool shows a message before it reads a larger mesh.
+"""
 
 
 class _Cache:
-    """Surfaces by session_uid, mode and modifiers; `changes` counts all reported changes."""
+    """Surfaces by session_uid, mode and use of modifiers, and the count of reported changes."""
 
     def __init__(self) -> None:
         self.surfaces: dict = {}
@@ -28,26 +31,26 @@ _cache = _Cache()
 
 
 def changes() -> int:
-    """A number that grows when a mesh or a designed curve may have changed."""
+    """A counter that increases whenever a mesh or a designed curve may have changed."""
     return _cache.changes
 
 
 def note_change() -> None:
-    """Note that a designed curve has changed."""
+    """Record that a designed curve has changed."""
     _cache.changes += 1
 
 
 def known(mesh_object, use_modifiers: bool) -> Surface | None:
-    """The surface of an object if it has been read since the last change."""
+    """The surface of an object if it has been read since the object's last change, or None."""
     return _cache.surfaces.get(_key(mesh_object, use_modifiers))
 
 
 def shown(mesh_object, use_modifiers: bool) -> Surface:
-    """The surface of an object, read only if it has changed."""
+    """The surface of an object, read again only if the object has changed."""
     found = known(mesh_object, use_modifiers)
     if found is None:
         found = read(mesh_object, use_modifiers)
-        bpy.context.view_layer.update()  # reports what reading has made and removed
+        bpy.context.view_layer.update()  # handles the reports caused by reading itself
         while len(_cache.surfaces) >= MOST:
             del _cache.surfaces[next(iter(_cache.surfaces))]
         _cache.surfaces[_key(mesh_object, use_modifiers)] = found
@@ -55,7 +58,7 @@ def shown(mesh_object, use_modifiers: bool) -> Surface:
 
 
 def has_few_faces(mesh_object) -> bool:
-    """Whether reading the surface takes no longer than a frame or two."""
+    """Whether reading the surface of an object takes no longer than about two frames."""
     evaluated = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return len(evaluated.data.polygons) <= FEW_FACES and not any(
         modifier.show_viewport and modifier.type in {"SUBSURF", "MULTIRES"} and modifier.levels > 2
@@ -79,7 +82,7 @@ def note_updates(_scene, depsgraph) -> None:
             _cache.changes += 1
         if changed.type != "MESH":
             continue
-        # Strokes in Sculpt Mode are reported as changes of the shading only.
+        # Blender reports strokes in Sculpt Mode as changes of the shading only.
         sculpted = update.is_updated_shading and changed.mode == "SCULPT"
         if update.is_updated_geometry or update.is_updated_transform or sculpted:
             _drop(changed.session_uid)
@@ -93,7 +96,7 @@ def _drop(uid: int) -> None:
 
 @persistent
 def forget(*_arguments) -> None:
-    """Drop all surfaces, after undo, a change of the frame or opening a file."""
+    """Drop all surfaces: after undo or redo, a frame change, or opening a file."""
     _cache.surfaces.clear()
     _cache.changes += 1
 

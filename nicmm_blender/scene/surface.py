@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface that curves lie on, as arrays: the shown one with modifiers, or the mesh itself.
+"""Reads the surface that curves lie on as arrays, with or without modifiers.
 
-The mesh without its modifiers is called the cage, also in Edit Mode, where Blender keeps a separate
-copy of it.
+The mesh without its modifiers is called the cage. In Edit Mode the cage is Blender's separate copy
+that is being edited.
 """
 
 from contextlib import contextmanager
@@ -21,10 +21,13 @@ from .messages import InputError
 from .vertex_weights import weights_on
 
 FLAT = 1e-6
-"""Least scale along an axis relative to the largest one, limited by single precision."""
+"""Scales along an axis up to this fraction of the largest one are refused.
+
+The limit is due to single precision.
+"""
 
 MODES_THAT_HIDE = {"EDIT", "SCULPT", "WEIGHT_PAINT"}
-"""Modes of the object in which hidden faces are not shown."""
+"""Modes of the object in which Blender does not show hidden faces."""
 
 
 @dataclass(frozen=True)
@@ -34,23 +37,25 @@ class Surface:
     Attributes
     ----------
     local, solved : (V, 3) float array
-        Positions in the object's local space, and in a space with the lengths of the scene.
+        Positions of the vertices in the object's local space, and in the space of the core, where
+        lengths are proportional to those in the scene.
     faces : (F, 3) int array
-        Vertex indices.
+        Vertices of each triangle.
     loops : (F, 3) int array
-        Indices of the corners of the mesh.
+        Corners of the Blender mesh at the corners of each triangle.
     polygons : (F,) int array
-        The face of the mesh that each triangle is a part of.
+        Face of the Blender mesh that each triangle belongs to.
     hidden : (F,) bool array
-        Which triangles the user has hidden; in Object Mode all are shown.
+        Whether the user has hidden the triangle; always False in Object Mode.
     linear : (3, 3) float array
-        The map from the local space to the other.
+        Linear map from local space to the space of the core.
     placement : (4, 4) float array
-        The map from the local space to the world.
+        Transform from local space to world space.
     with_modifiers : bool
+        Whether the surface includes the effect of modifiers and shape keys.
     cage : CageTrace or None
-        Where the cage is in a surface that modifiers generate; None if vertices and faces are those
-        of the cage.
+        How the surface is related to its cage; None if both have the same vertices and faces, or if
+        the cage was not traced.
     """
 
     local: np.ndarray
@@ -65,32 +70,32 @@ class Surface:
     cage: CageTrace | None
 
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Positions in the object's local space of points given by face and barycentrics."""
+        """Positions in local space of points given by triangle and barycentric coordinates."""
         return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
 
     @cached_property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal in the object's local space."""
+        """Length of the diagonal of the bounding box in local space."""
         return float(np.linalg.norm(np.ptp(self.local, axis=0)))
 
     @property
     def scale(self) -> float:
-        """Length in the scene of a unit of the object's local space, on average."""
+        """Length in the scene of one unit of local space, as a geometric mean over the axes."""
         return float(np.cbrt(abs(np.linalg.det(self.placement[:3, :3]))))
 
     @property
     def unit(self) -> float:
-        """Length in the scene of a unit of the core's space."""
+        """Length in the scene of one unit of the core's space."""
         return self.scale if self.keeps_proportions else 1.0
 
     @property
     def keeps_proportions(self) -> bool:
-        """Whether the object is not scaled differently along its axes."""
+        """Whether the object is scaled uniformly, so that the core works in local space."""
         return bool((self.linear == np.eye(3)).all())
 
 
 def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
-    """Read the surface of a mesh object, without `cage` unless it is `traced`.
+    """Read the surface of a mesh object; its cage is traced only if `traced` is set.
 
     Quads and larger faces are triangulated as Blender draws them.
     """
@@ -107,7 +112,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
     stretches = np.linalg.svd(linear, compute_uv=False)
     if stretches[-1] <= FLAT * stretches[0]:
         raise InputError(
-            f'The scale of "{mesh_object.name}" is zero along an axis, or nearly. Reset it '
+            f'The scale of "{mesh_object.name}" is zero or nearly zero along an axis. Reset it '
             "(Object > Clear > Scale)"
         )
     if _keeps_proportions(linear):
@@ -129,7 +134,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
 
 @contextmanager
 def shown_mesh(mesh_object, use_modifiers: bool):
-    """Yield the mesh with its modifiers and shape keys, or the cage, and the matrix to the world.
+    """Yield the mesh with its modifiers and shape keys, or the cage, and the world matrix.
 
     The mesh is valid inside the block only.
     """
@@ -147,9 +152,10 @@ def shown_mesh(mesh_object, use_modifiers: bool):
 
 @contextmanager
 def cage_mesh(mesh_object):
-    """Yield the mesh without modifiers, valid inside the block only.
+    """Yield the mesh without modifiers; it is valid inside the block only.
 
-    In Edit Mode it is a copy: writing the edited mesh back would report a change of it.
+    In Edit Mode it is a copy, since Blender would report it as a change if the edited mesh were
+    written back.
     """
     if mesh_object.mode != "EDIT":
         yield mesh_object.data
@@ -163,7 +169,7 @@ def cage_mesh(mesh_object):
 
 
 def shown_beyond_the_cage(mesh_object) -> str:
-    """Name the modifiers and shape keys that the viewport shows; may be empty."""
+    """Words for what the viewport shows besides the cage: modifiers, shape keys, both or empty."""
     shown = []
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
         shown.append("modifiers")
@@ -175,7 +181,7 @@ def shown_beyond_the_cage(mesh_object) -> str:
 
 
 def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | None:
-    """Weight of every vertex of the surface in a vertex group; None for an empty name."""
+    """Weights (V,) of the surface's vertices in a vertex group; None for an empty name."""
     if not name:
         return None
     vertex_group(mesh_object, name)
@@ -184,7 +190,7 @@ def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | N
 
 
 def vertex_group(mesh_object, name: str):
-    """Return the vertex group with this name."""
+    """Return the vertex group with a name, or raise an error if there is none."""
     group = mesh_object.vertex_groups.get(name)
     if group is None:
         groups = ", ".join(f'"{group.name}"' for group in mesh_object.vertex_groups)
@@ -197,19 +203,23 @@ def vertex_group(mesh_object, name: str):
 
 
 def _is_sculpted_without_modifiers(mesh_object) -> bool:
-    """Whether strokes change the mesh only: Blender evaluates it again when the mode is left."""
+    """Whether the mesh is sculpted without modifiers, so that the evaluated mesh is outdated.
+
+    Strokes then change only the mesh itself, and Blender does not evaluate it again before the mode
+    is left.
+    """
     if mesh_object.mode != "SCULPT":
         return False
     if mesh_object.use_dynamic_topology_sculpting:
         raise InputError(
-            f'"{mesh_object.name}" is sculpted with dynamic topology, whose faces Blender does not '
-            "show to extensions. Turn Dyntopo off, or leave Sculpt Mode"
+            f'"{mesh_object.name}" is sculpted with dynamic topology, whose faces extensions '
+            "cannot read. Turn Dyntopo off, or leave Sculpt Mode"
         )
     return not shown_beyond_the_cage(mesh_object)
 
 
 def _depsgraph_of(mesh_object):
-    """The dependency graph in which the object is evaluated: that of the window, if it is there."""
+    """A dependency graph that evaluates the object: preferably that of the current view layer."""
     context = bpy.context
     if is_in(context.view_layer, mesh_object):
         return context.evaluated_depsgraph_get()
@@ -225,10 +235,10 @@ def _depsgraph_of(mesh_object):
 
 
 def _keeps_proportions(linear: np.ndarray) -> bool:
-    """Whether a transform is a rotation, mirror image or uniform scale, up to rounding.
+    """Whether a linear map is a uniform scale with a rotation or reflection, up to rounding.
 
-    Then the core works in the object's local space, so that rotating the object does not change the
-    curve by rounding.
+    In that case the core works in the object's local space, so that rotating the object does not
+    change the curve through rounding errors.
     """
     gram = linear.T @ linear
     return bool(np.allclose(gram, np.eye(3) * np.trace(gram) / 3, rtol=0, atol=1e-5 * gram.max()))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weights of a vertex group as an array.
+"""Reads the weights of a vertex group as an array.
 
-Blender's Python gives them one vertex at a time. Geometry Nodes see a vertex group as an attribute,
-so a node stores it as one that can be read at once.
+Blender's Python interface gives weights only one vertex at a time. Geometry Nodes, however, see a
+vertex group as an attribute, so a temporary node group copies it to an attribute that can be read
+in one call.
 """
 
 import bpy
@@ -14,7 +15,7 @@ STORED = "nicmm_weights"
 
 
 def weights_on(mesh, group: str) -> np.ndarray:
-    """Weight of every vertex of a mesh in a vertex group, (V,); 0 outside the group.
+    """Weights (V,) of all vertices of a mesh in a vertex group; 0 outside the group.
 
     `mesh` may be the evaluated mesh of an object. It is not changed.
     """
@@ -31,7 +32,7 @@ def weights_on(mesh, group: str) -> np.ndarray:
 
 
 def _storing(group: str):
-    """A node group that stores a vertex group as an attribute."""
+    """A new node group that stores a vertex group as an attribute."""
     made = bpy.data.node_groups.new("NICMM weights", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         made.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")

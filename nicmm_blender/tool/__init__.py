@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool that draws and edits a curve with the mouse."""
+"""The tool that draws and edits curves with the mouse."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a click of the tool does: it starts the operator for what is under the mouse."""
+"""The operator that each click of the tool runs: it calls the one for what is under the mouse."""
 
 import bpy
 
@@ -16,7 +16,7 @@ PASS = {"PASS_THROUGH"}
 class NICMM_OT_draw_on_surface(bpy.types.Operator):
     """Add a point to the designed curve, move or insert one, or activate the curve under the mouse
 
-    On a mesh that has not been drawn on, it first prepares the mesh, in time slices.
+    The first click on a large mesh prepares the mesh in time slices before it acts.
     """
 
     bl_idname = "nicmm.draw_on_surface"
@@ -67,19 +67,19 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         return PASS if event.type in PASSED_ON else {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Also called by Blender when it opens another file or quits."""
+        """Stop the preparation; also called by Blender when it opens another file or quits."""
         if self._work is not None:
             self._work.cancel()
         self._tidy(context)
 
     def _prepare(self, context):
-        """Work for one turn; at the end do what the click was for."""
+        """Work for one turn; after the last turn, do what the click was for."""
         mesh_object, curve = picking.mesh_and_curve(context)
         if mesh_object is None:
             return {"CANCELLED"}
         self._turns += 1
         if self._turns == 1:
-            return PASS  # the message is drawn first
+            return PASS  # so that the message is drawn before the mesh is read
         if self._surface is None:
             self._surface = surface = picking.surface_for(context, mesh_object, curve)
             self._work = turns.Work(
@@ -115,14 +115,14 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
             arguments["from_mouse"] = self._is_down
         try:
             operator("INVOKE_DEFAULT", True, **arguments)
-        except RuntimeError as error:  # what the operator has reported
+        except RuntimeError as error:  # Blender raises what the operator has reported
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
         return {"FINISHED"}
 
 
 def _call_of(hit, remove: bool) -> tuple | None:
-    """The operator for what is under the mouse, and its arguments; None for no operator."""
+    """The operator for what is under the mouse, with its arguments; None if there is none."""
     calls = bpy.ops.nicmm
     if remove:
         if hit.kind is not Kind.POINT:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that sets all control points of a curve in a script, and chooses the tool."""
+"""The operator that sets all control points of a curve in scripts, and chooses the tool."""
 
 from dataclasses import replace
 
@@ -16,9 +16,9 @@ from ..scene.messages import InputError
 from . import modes
 
 DRAWN = ("spline", "radius", "thickness", "offset")
-"""Properties of a drawing that the tool shares with the sidebar."""
+"""Properties of a new curve object, shown in the redo panel."""
 
-FEWEST = "A curve needs at least two points, a closed one three. Click on the surface"
+FEWEST = "A curve needs at least two points, a closed curve at least three. Add more points"
 
 _OUTPUT = settings.OutputProperties.__annotations__
 
@@ -34,7 +34,7 @@ class NICMM_PG_control_point(bpy.types.PropertyGroup):
 
 
 class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
-    """Choose the tool that draws curves on the surface, or edits the designed curve"""
+    """Choose the tool that draws curves on the surface and edits designed curves"""
 
     bl_idname = "nicmm.edit_curve"
     bl_label = "Draw Curve on Surface"
@@ -44,7 +44,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         name="Output",
         description="Type of a new curve object",
         items=(
-            ("CURVE", "Curve", "A curve object of polylines"),
+            ("CURVE", "Curve", "A curve object on the surface"),
             ("STICKY", "Sticky Curves", "A hair curves object that follows the mesh"),
         ),
         default="CURVE",
@@ -90,7 +90,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
                 layout.prop(self, "tube")
 
     def invoke(self, context, _event):
-        """Choose the tool in a window; with points, as in a script."""
+        """Choose the tool in a 3D viewport; with points given, or elsewhere, execute instead."""
         settings.choose_tube(self)
         in_view = context.space_data is not None and context.space_data.type == "VIEW_3D"
         if len(self.points) or not in_view:
@@ -119,7 +119,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         elif edited is None:
             raise InputError(
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
-                "z)}, …], or draw with the tool Surface Curve in the 3D viewport"
+                "z)}, …], or draw with the Surface Curve tool in the 3D viewport"
             )
         curves = [opened.curve]
         if len(self.points) or opened.curve is None:
@@ -130,7 +130,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         return {"FINISHED"}
 
     def _asked_for(self, context, edited):
-        """The settings of the curve or the panel, with those set for this call."""
+        """The settings of the curve, or of the sidebar, replaced by those given in this call."""
         if edited is None:
             asked = curve_record.asked_by(context.scene.nicmm_curves)
         else:
@@ -152,7 +152,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
 
 def _designed(context, opened: Opened, points) -> list:
-    """The curve through points, in a list."""
+    """The curve through points, as a list; an error if there is none."""
     requests = edited_curve.request(opened, points)
     if not requests:
         raise InputError(FEWEST)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Follows the mouse while the tool is chosen, by a gizmo that is never selected.
+"""Follows the mouse while the tool is active, through a gizmo that is never selected.
 
-Blender asks a gizmo about every move of the mouse in a viewport; no operator has to run.
+Blender asks gizmos about every mouse move in a viewport, so no operator has to run.
 """
 
 import bpy
@@ -15,7 +15,7 @@ class NICMM_GT_hover(bpy.types.Gizmo):
     bl_idname = "NICMM_GT_hover"
 
     def draw(self, _context):
-        """The overlay draws."""
+        """Draw nothing, since the overlay draws the mark."""
 
     def test_select(self, context, location):
         overlay.show_hover(_under(context, location))
@@ -23,7 +23,7 @@ class NICMM_GT_hover(bpy.types.Gizmo):
 
 
 def _under(context, location):
-    """What is under the mouse, if that is known without a long computation."""
+    """What is under the mouse, or None if that would need a long computation."""
     from ...nicmm_core import NicmmError
 
     if not picking.is_view(context):
@@ -34,7 +34,7 @@ def _under(context, location):
             return None
         return picking.under_mouse(context, np.array(location, dtype=np.float64))
     except (InputError, NicmmError):
-        return None  # a click reports it
+        return None  # a click reports the error
 
 
 class NICMM_GGT_hover(bpy.types.GizmoGroup):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A curve while one of its points is dragged: a bounded amount of work for each move.
+"""Updates a curve while one of its points is dragged, with a bounded amount of work for each move.
 
 Each move starts from the last curve. If that is impossible, for example after a jump, the curve has
-to be designed from scratch, which takes longer: `waiting` is set.
+to be designed from scratch, which takes longer; `waiting` is then set.
 """
 
 from dataclasses import replace
@@ -12,26 +12,26 @@ from ..scene.design_request import DesignRequest
 from ..scene.messages import in_words
 
 ITERATIONS = 3
-"""Iterations for a move at most, which take one or two frames."""
+"""Maximum number of iterations for each move; they take one or two frames."""
 
 POINTS = 2000
-"""Points of the curve times iterations for a move: an iteration takes time for every point."""
+"""Points of the curve times iterations per move; an iteration takes time for every point."""
 
 MOST_STEPS = 60
 """Steps after a move before the curve is designed from scratch; most need fewer than five."""
 
 
 class LiveCurve:
-    """A curve whose points move.
+    """A curve whose control points move.
 
     Attributes
     ----------
     request : DesignRequest
-        With the present points, and the last curve as its start.
+        Request with the current points and the last curve as its start.
     waiting : bool
         Whether the curve has to be designed from scratch.
     steps_left : int
-        How often `step` may go on.
+        Number of steps that may still follow; 0 if the curve has converged.
     problem : str
         Why there is no curve through the points; empty if there is one.
     """
@@ -48,14 +48,14 @@ class LiveCurve:
         return found.curves[0] if hasattr(found, "curves") else found
 
     def move(self, points) -> None:
-        """Move the points."""
+        """Move the control points and take a first step."""
         self.request = replace(self.request, points=points)
         self.waiting, self.steps_left = self.request.start is None, MOST_STEPS
         if not self.waiting:
             self.step()
 
     def take(self, design) -> None:
-        """Store a design from scratch, or the error."""
+        """Store the result of a design from scratch, which may be an exception."""
         self.waiting, self.steps_left = False, 0
         if isinstance(design, Exception):
             self.problem = str(design)
@@ -63,7 +63,7 @@ class LiveCurve:
             self.request, self.problem = replace(self.request, start=design), ""
 
     def step(self) -> None:
-        """Go on for a few iterations."""
+        """Continue for a few iterations."""
         from ... import nicmm_core as nicmm
 
         if not self.steps_left:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The modes that the tool draws in, and which curve is active in them.
+"""The modes that the tool works in, and the choice of the active curve in each of them.
 
-In mesh Edit Mode Blender's undo does not restore other objects, so that a click there could not be
-undone; points are selected vertices there.
+The tool does not work in mesh Edit Mode, where Blender's undo does not restore other objects, so a
+click could not be undone. There, control points are selected vertices.
 """
 
 import bpy
@@ -16,16 +16,16 @@ TOOLS = {
     "SCULPT": "nicmm.surface_curve_sculpt",
     "PAINT_WEIGHT": "nicmm.surface_curve_weights",
 }
-"""The tool's name in each mode of the context."""
+"""The identifier of the tool in each mode of the context."""
 
 DRAWS_IN = (
-    "The tool Surface Curve draws in Object Mode, Sculpt Mode and Weight Paint. In Edit Mode, "
+    "The Surface Curve tool works in Object Mode, Sculpt Mode and Weight Paint. In Edit Mode, "
     "select vertices and run Design Curve on Surface"
 )
 
 
 def is_tool_active(context) -> bool:
-    """Whether the tool is chosen in the present mode."""
+    """Whether the tool is active in the current mode."""
     if context.mode not in TOOLS or context.workspace is None:
         return False
     tool = context.workspace.tools.from_space_view3d_mode(context.mode, create=False)
@@ -33,10 +33,10 @@ def is_tool_active(context) -> bool:
 
 
 def make_active(context, curve) -> None:
-    """Make a designed curve the one that is drawn; None ends drawing.
+    """Make a designed curve the active one, which is drawn; None ends drawing.
 
     In Object Mode it becomes the active object. In other modes the mesh stays active, and the
-    selection shows which of its curves is drawn.
+    selection determines which of its curves is drawn.
     """
     mesh_object = context.active_object if curve is None else curve_record.mesh_of(curve)
     if curve_record.has_record(mesh_object):

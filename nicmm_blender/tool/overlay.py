@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws the active curve and its control points over the 3D viewports while the tool is chosen.
+"""Draws the active curve and its control points over the 3D viewports while the tool is active.
 
-Parts hidden by the mesh are dimmed. The mark under the mouse shows what a click would do.
+Parts hidden by the mesh are dimmed. A mark under the mouse shows what a click would do.
 """
 
 from dataclasses import dataclass
@@ -24,13 +24,13 @@ HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
 
 LINE_WIDTH, POINT_RADIUS, OUTLINE_WIDTH = 3.0, 5.5, 1.5
-"""In pixels at a resolution scale of 1."""
+"""Sizes in pixels at a resolution scale of 1."""
 
 CORNERS = 20
 """Number of corners of the disc that shows a point."""
 
 OUTLINE = (0.05, 0.05, 0.05)
-"""Dark, under every line and point: readable over any colour of the theme."""
+"""Dark colour under every line and point, so that they stand out from any theme colour."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class _Drawn:
 
 
 class _State:
-    """What is drawn; holds no Blender objects, since undo replaces them."""
+    """What is drawn. Holds no Blender objects, since undo replaces them."""
 
     def __init__(self) -> None:
         self.handlers: list = []
@@ -60,7 +60,7 @@ _state = _State()
 
 
 def show_dragged(opened, points=None, curve=None, problem: str = "") -> None:
-    """Draw a curve while it is being changed instead of the active one; None ends that."""
+    """Draw a curve that is being changed instead of the active one; `opened=None` ends that."""
     _state.dragged, _state.hover = None, None
     if opened is not None:
         surface = opened.surface
@@ -87,7 +87,7 @@ def hovered():
 
 
 def _drawn_now(context) -> _Drawn | None:
-    """What to draw; None if the tool is not chosen or the mesh would have to be read first."""
+    """What to draw; None if the tool is not active or the mesh would have to be read first."""
     if _state.dragged is not None:
         return _state.dragged
     if not modes.is_tool_active(context) or not context.space_data.overlay.show_overlays:
@@ -100,7 +100,7 @@ def _drawn_now(context) -> _Drawn | None:
             return None
         opened = picking.opened_now(context)
     except InputError:
-        return None  # a click reports it
+        return None  # a click reports the error
     points, line = opened.positions(), opened.polyline()
     return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
 
@@ -152,7 +152,7 @@ def _draw_line(context, matrix, batch, colour) -> None:
 
 
 def _line_batch(line: np.ndarray):
-    """The batch of the active line, made again only if it has changed."""
+    """The batch of the active line, rebuilt only if the line has changed."""
     if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
         _state.batch, _state.batch_of = _batch(line), line
     return _state.batch
@@ -189,7 +189,7 @@ def _draw_points() -> None:
     shown = np.flatnonzero(np.isfinite(centres).all(axis=1))
     for number in shown[np.argsort(visible[shown], kind="stable")].tolist():
         opacity = 1.0 if visible[number] else HIDDEN
-        size = 0.6 if number == marked else 1.0  # not a point yet
+        size = 0.6 if number == marked else 1.0  # smaller where a click would add a point
         for radius, colour in (
             (POINT_RADIUS + OUTLINE_WIDTH, OUTLINE),
             (POINT_RADIUS, fills[number]),
@@ -214,7 +214,7 @@ def _draw_points() -> None:
 
 
 def _visible(view, positions: np.ndarray) -> np.ndarray:
-    """Which points are visible, cast again only if the view or the points have changed."""
+    """Which points are visible; rays are cast only if the view or the points have changed."""
     key = view.perspective.tobytes(), view.xray, id(view.mesh), positions.tobytes()
     if _state.visible[0] != key:
         _state.visible = key, view.visible(positions)
@@ -222,7 +222,7 @@ def _visible(view, positions: np.ndarray) -> np.ndarray:
 
 
 class _Colours:
-    """Colours of the theme: those of gizmos, which differ from those of selections."""
+    """Gizmo colours of the theme, which differ from its selection colours."""
 
     def __init__(self, context) -> None:
         theme = context.preferences.themes[0].user_interface
@@ -241,9 +241,10 @@ _DISC = _disc()
 
 
 def _towards_the_eye(region_3d, mesh_object, surface, radius: float):
-    """The model-view matrix, moved slightly towards the eye: lines lie in front of mesh and tube.
+    """The model-view matrix, moved slightly towards the eye so that lines lie in front of the mesh.
 
-    In perspective it scales about the eye, so that no point moves on the screen.
+    The shift includes the radius of the tube. In perspective the matrix is scaled about the eye, so
+    that no point moves on the screen.
     """
     world = mesh_object.matrix_world
     step = (OFFSET * surface.diagonal + radius) * max(world.to_scale(), key=abs)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is under the mouse: a point or the line of the active curve, another curve, the surface."""
+"""Finds what is under the mouse: part of the active curve, another curve, or the surface."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -17,14 +17,14 @@ from ..scene.messages import InputError
 from .view import View, view_of
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
-"""Greatest distance of the mouse from a point and from the curve, in pixels at a scale of 1."""
+"""Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
 
 SOLID = {"SOLID", "TEXTURED", "WIRE"}
-"""Ways to display an object; one that shows its bounds only hides nothing."""
+"""Display types in which an object can hide the surface, unlike one shown by its bounds only."""
 
 
 class Kind(Enum):
-    """What a click meets."""
+    """Kinds of things that a click can meet."""
 
     POINT = auto()
     LINE = auto()
@@ -36,9 +36,17 @@ class Kind(Enum):
 class Hit:
     """What is under the mouse.
 
-    `index` is that of the point, or of the one before which a point on the line is inserted;
-    `name` is that of the curve object, empty for a new curve; `position` is in the local space of
-    the mesh object.
+    Attributes
+    ----------
+    kind : Kind
+        What the click meets.
+    name : str
+        Name of the curve object; empty for a new curve.
+    index : int
+        Index of the control point; on the line, index of the control point before which a new one
+        is inserted; on the surface, number of control points; 0 for another curve.
+    position : tuple
+        Position in the local space of the mesh object.
     """
 
     kind: Kind
@@ -49,7 +57,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class Line:
-    """A designed curve on the surface that is not the active one."""
+    """A designed curve on the mesh that is not the active one."""
 
     name: str
     positions: np.ndarray
@@ -57,7 +65,7 @@ class Line:
 
 
 class _Places:
-    """What the viewport shows, read again after changes only."""
+    """The curves that the viewport shows, read again only after changes."""
 
     def __init__(self) -> None:
         self.key: tuple = ()
@@ -97,22 +105,22 @@ def surface_for(context, mesh_object, curve):
 
 
 def opened_now(context) -> Opened:
-    """The active curve, or the mesh for a new one; read again only after changes."""
+    """The active curve, or the mesh for a new curve, as `Opened`; read again after changes only."""
     return _read(context).opened
 
 
 def other_lines(context) -> list:
-    """The other designed curves on the mesh, as `Line`."""
+    """The other designed curves on the mesh, each a `Line`."""
     return _read(context).lines
 
 
 def pixel_of(event) -> np.ndarray:
-    """The mouse in the region of the event."""
+    """Position of the mouse in the region of an event, in pixels, (2,)."""
     return np.array([event.mouse_region_x, event.mouse_region_y], dtype=np.float64)
 
 
 def view_on(context, mesh_object, surface) -> View:
-    """The view of the region of the context."""
+    """The view of the context's region on a mesh."""
     mesh = designers.mesh_for(surface.solved, surface.faces)
     region = context.region
     return view_of(region, region.data, mesh_object, surface, mesh, is_xray(context.space_data))
@@ -127,7 +135,7 @@ def is_xray(space) -> bool:
 
 
 def under_mouse(context, pixel) -> Hit | None:
-    """What a click at a pixel meets; None off the mesh."""
+    """What a click at a pixel meets; None if nothing, or if another mesh is in front."""
     mesh_object, curve = mesh_and_curve(context)
     if mesh_object is None:
         return None
@@ -195,7 +203,7 @@ def _other_lines(context, mesh_object, active, surface) -> list:
                 on = shown_surfaces.shown(mesh_object, asked.use_modifiers)
             _, line = curve_record.places(curve, on)
         except InputError:
-            continue  # shown where the curve is used
+            continue  # the error is reported where the curve is used
         lines.append(Line(curve.name, line, radius_of(curve, surface)))
     return lines
 
@@ -226,13 +234,13 @@ def _is_shown(context, candidate) -> bool:
         return False
     if space is None or space.type != "VIEW_3D":
         return True
-    # Before Blender 5 only the evaluated object knows of the local view.
+    # Before Blender 5 only the evaluated object tells whether it is in the local view.
     shown = candidate.evaluated_get(context.evaluated_depsgraph_get())
     return shown.visible_in_viewport_get(space)
 
 
 def _is_behind_another(context, mesh_object, view: View, pixel, position) -> bool:
-    """Whether another mesh is in front of a position on the line of sight of a pixel."""
+    """Whether another mesh hides a position on the line of sight through a pixel."""
     if view.xray:
         return False
     near, direction = view.ray(pixel)
@@ -269,7 +277,7 @@ def _meets_box(candidate, start, along) -> bool:
 
 
 def forget() -> None:
-    """Drop what was read."""
+    """Drop all curves that were read."""
     _places.key, _places.opened, _places.lines = (), None, []
 
 

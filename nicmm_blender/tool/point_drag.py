@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A control point under the pressed mouse button, with the curve live.
+"""Drags a control point with the mouse button pressed, while the curve follows.
 
 The operator is modal only until the button is released. Esc or a right click leaves everything as
 it was.
@@ -29,7 +29,7 @@ HINT = "Release: Confirm   |   Esc, Right Mouse: Cancel"
 class PointDrag:
     """A mixin for operators with `opened(context)` and `changed(opened)`.
 
-    `dragged` is the present place of the point, as a point of the core, or None in a script.
+    `dragged` is the current position of the point, as a point of the core, or None in a script.
     """
 
     FROM_MOUSE = bpy.props.BoolProperty(
@@ -83,7 +83,7 @@ class PointDrag:
             raise
 
     def cancel(self, context):
-        """Called by Blender if it ends the operator, for example when it quits."""
+        """Stop the drag; called by Blender when it ends the operator, for example when it quits."""
         if getattr(self, "_is_dragging", False):
             self._let_go(context)
         else:
@@ -107,7 +107,7 @@ class PointDrag:
         pixel = picking.pixel_of(event)
         if (pixel == self._pressed).all():
             return
-        self._pressed = np.full(2, np.nan)  # from now on every move counts
+        self._pressed = np.full(2, np.nan)  # from now on every move counts, even back to the start
         self._last_move = time.monotonic()
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
         place = self._view.place_at(pixel + self._grip)
@@ -120,7 +120,7 @@ class PointDrag:
         self._show_drag()
 
     def _work_on(self) -> None:
-        """Go on with the curve, from scratch only while the mouse stays still."""
+        """Continue with the curve; from scratch only while the mouse stays still."""
         live = self._live
         if live is None:
             return
@@ -162,7 +162,7 @@ class PointDrag:
         requests = edited_curve.request(opened, self._points)
         design = None
         if live is not None and not live.waiting and not live.problem:
-            # What is seen is kept: the curve goes on from there.
+            # Keep the curve that the user sees: go on from it, or take it if it has converged.
             requests = [live.request]
             if not live.steps_left and hasattr(live.request.start, "curves"):
                 design = live.request.start
@@ -172,7 +172,7 @@ class PointDrag:
     def _keep(self, context, requests: list, design):
         if design is not None:
             return self.finish(context, requests, [design])
-        # The points stay visible while a long computation goes on.
+        # The points stay visible during a long computation.
         overlay.show_dragged(self._opened, self._points, self._opened.curve)
         result = set()
         try:
@@ -192,7 +192,7 @@ class PointDrag:
             self._scratch = None
 
     def _let_go(self, context) -> None:
-        """Restore the window and the object."""
+        """End the drag: restore the window and the object."""
         self._is_dragging = False
         self._stop_scratch()
         self._preview.restore()
@@ -203,7 +203,7 @@ class PointDrag:
 
 
 class _Preview:
-    """Shows the dragged curve in its object, in a copy of the data that is removed afterwards."""
+    """Shows the dragged curve in its object, through a copy of its data that is removed later."""
 
     def __init__(self, opened) -> None:
         self._opened = opened
@@ -221,7 +221,7 @@ class _Preview:
         writing.show_unfinished(shown, self._opened.surface, curve)
 
     def restore(self) -> None:
-        """Give the object its own data again."""
+        """Give the object its original data back."""
         shown = self._opened.curve_object
         if not self._copy or shown is None:
             return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators of single control points: add, insert, move, remove, and those of whole curves.
+"""The operators that change single control points, and those that activate or end a curve.
 
-Each has a full `execute` and is one undo step. The state is the curve object with its record.
+Each has a full `execute` and is one undo step. The only state is the curve object with its record.
 """
 
 import bpy
@@ -40,7 +40,7 @@ INDEX = bpy.props.IntProperty(
 
 
 class _ChangesPoints(LongSolves):
-    """Designs a curve through other points; a mixin with `changed(opened)`."""
+    """A mixin for operators with `changed(opened)`: designs the curve through these points."""
 
     @classmethod
     def poll(cls, context):
@@ -53,7 +53,7 @@ class _ChangesPoints(LongSolves):
         return edited_curve.request(self._opened, self._points)
 
     def opened(self, context):
-        """The curve to change."""
+        """Open the curve to change."""
         edited = edited_curve.chosen(context, self.curve)
         if edited is None:
             raise InputError(polls.NO_CURVE)
@@ -70,7 +70,7 @@ class _ChangesPoints(LongSolves):
         return {"FINISHED"}
 
     def checked_index(self, opened) -> int:
-        """The index of a point, or an error if there is no such point."""
+        """The index of the control point; an error if there is no such point."""
         count = len(opened.points)
         if not 0 <= self.index < count:
             raise InputError(
@@ -79,14 +79,14 @@ class _ChangesPoints(LongSolves):
         return self.index
 
     def place(self, opened):
-        """The position on the surface, as a point of the core."""
+        """The position of the new or moved point on the surface, as a point of the core."""
         if self.dragged is not None:
             return self.dragged
         return edited_curve.located(opened, np.array([self.position[:]], dtype=float), "position")
 
 
 class _Output:
-    """The settings of the panel for a new object, as far as the tool makes it."""
+    """The output settings of the sidebar for a new object, limited to outputs of the tool."""
 
     def __init__(self, panel) -> None:
         self.output = panel.output if panel.output in SEPARATE else "CURVE"
@@ -95,7 +95,7 @@ class _Output:
 
 
 class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
-    """Add a control point after the last one of the active curve, or begin a curve on the mesh"""
+    """Add a control point at the end of the active curve, or begin a new curve on the mesh"""
 
     bl_idname = "nicmm.add_point"
     bl_label = "Add Point on Surface"
@@ -113,10 +113,10 @@ class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
 
 
 class NICMM_OT_insert_point(PointDrag, _ChangesPoints, bpy.types.Operator):
-    """Insert a control point between two others of a curve"""
+    """Insert a control point between two control points of a curve"""
 
     bl_idname = "nicmm.insert_point"
-    bl_label = "Insert Point in Curve"
+    bl_label = "Insert Point into Curve"
     bl_options = {"REGISTER", "UNDO"}
 
     curve: CURVE
@@ -154,10 +154,10 @@ class NICMM_OT_move_point(PointDrag, _ChangesPoints, bpy.types.Operator):
 
 
 class NICMM_OT_remove_point(_ChangesPoints, bpy.types.Operator):
-    """Remove a control point of a curve"""
+    """Remove a control point from a curve"""
 
     bl_idname = "nicmm.remove_point"
-    bl_label = "Remove Point of Curve"
+    bl_label = "Remove Point from Curve"
     bl_options = {"REGISTER", "UNDO"}
 
     curve: CURVE
@@ -168,7 +168,7 @@ class NICMM_OT_remove_point(_ChangesPoints, bpy.types.Operator):
 
 
 class NICMM_OT_activate_curve(bpy.types.Operator):
-    """Make a designed curve the active one, whose points can be edited"""
+    """Make a designed curve active, so that its points can be edited"""
 
     bl_idname = "nicmm.activate_curve"
     bl_label = "Activate Designed Curve"
@@ -194,7 +194,7 @@ class NICMM_OT_activate_curve(bpy.types.Operator):
 
 
 class NICMM_OT_end_curve(bpy.types.Operator):
-    """End drawing the active curve: its mesh becomes active, and the next click begins a curve"""
+    """End the active curve. Its mesh becomes active, and the next click begins a new curve"""
 
     bl_idname = "nicmm.end_curve"
     bl_label = "End Curve"

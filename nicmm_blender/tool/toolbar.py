@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool in the toolbar of the 3D viewport, in the modes that it draws in."""
+"""Registers the tool in the toolbar of the 3D viewport, in the modes that it works in."""
 
 import bpy
 
@@ -24,7 +24,10 @@ KEYMAP = (
     (NICMM_OT_end_curve.bl_idname, {"type": "RET", "value": "PRESS"}, None),
     (NICMM_OT_end_curve.bl_idname, {"type": "NUMPAD_ENTER", "value": "PRESS"}, None),
 )
-"""No letters: Blender uses them. Items without Alt leave Emulate 3 Button Mouse alone."""
+"""Mouse buttons and keys of the tool.
+
+Letters are left to Blender, and Alt to *Emulate 3 Button Mouse*.
+"""
 
 HINTS = (
     (("MOUSE_LMB",), "Add or Insert Point"),
@@ -38,7 +41,7 @@ class _SurfaceCurve:
     bl_space_type = "VIEW_3D"
     bl_label = LABEL
     bl_description = (
-        "Draw a curve on the surface of the active mesh point by point.\n"
+        "Draw a curve point by point on the surface of the active mesh.\n"
         "Click on a designed curve to edit it"
     )
     bl_icon = ICON
@@ -47,7 +50,7 @@ class _SurfaceCurve:
 
     @staticmethod
     def draw_settings(context, layout, _tool):
-        """Draw the settings of the active curve in the header, or those of a new one."""
+        """Draw the settings of the active curve, or of a new one, in the header."""
         curve = edited_curve.active(context)
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps between the pixels of a viewport and points of a mesh.
 
-Positions of the mesh are in the object's local space, pixels in the region.
+Positions are in the object's local space, and pixels are coordinates in the viewport's region.
 """
 
 from dataclasses import dataclass
@@ -9,19 +9,28 @@ from dataclasses import dataclass
 import numpy as np
 
 OFFSET = 2e-3
-"""Offset towards the eye in drawing and in tests of visibility, in mesh diagonals."""
+"""Offset towards the eye for drawing and visibility tests, relative to the mesh diagonal."""
 
 BEHIND = 1e-7
-"""Step past a hidden face, relative to the visible depth."""
+"""Step past a hidden face, relative to the rest of the line of sight."""
 
 
 @dataclass(frozen=True)
 class View:
     """A mesh in a viewport's region.
 
-    `perspective` is the (4, 4) matrix from the object's local space to clip space, `size` the
-    region's width and height in pixels; `surface` is the `surface.Surface` and `mesh` the
-    core's mesh of them. With `xray` nothing hides anything.
+    Attributes
+    ----------
+    perspective : (4, 4) float array
+        Matrix from the object's local space to clip space.
+    size : (2,) float array
+        Width and height of the region in pixels.
+    surface : Surface
+        Surface of the mesh object.
+    mesh : nicmm_core.Mesh
+        The core's mesh of this surface.
+    xray : bool
+        Whether the mesh hides nothing.
     """
 
     perspective: np.ndarray
@@ -38,7 +47,7 @@ class View:
         return (clip[:, :2] / depth[:, None] + 1.0) * 0.5 * self.size
 
     def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Near ends of the lines of sight of pixels, (n, 2), and vectors to their far ends."""
+        """Lines of sight through pixels (n, 2): near ends, and the vectors to their far ends."""
         inverse = np.linalg.inv(self.perspective)
         flat = 2.0 * np.asarray(pixels, dtype=np.float64) / self.size - 1.0
         ends = []
@@ -50,12 +59,12 @@ class View:
         return near, far - near
 
     def ray(self, pixel) -> tuple[np.ndarray, np.ndarray]:
-        """The near end of a pixel's line of sight in the view, and the vector to its far end."""
+        """Line of sight through a pixel: near end, and the vector to its far end."""
         (near,), (direction,) = self.rays(np.asarray(pixel, dtype=np.float64)[None])
         return near, direction
 
     def place_at(self, pixel):
-        """The surface under a pixel as a point of the core, or None off the mesh."""
+        """The visible point of the surface under a pixel, as a point of the core, or None."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
         origin, direction = (vector[None] @ self.surface.linear.T for vector in self.ray(pixel))
@@ -64,7 +73,7 @@ class View:
             face = int(points.faces[0])
             if face < 0 or not self.surface.hidden[face]:
                 return None if face < 0 else points
-            # Behind the hidden face; each step passes it by more than rounding.
+            # Continue behind the hidden face, by a step that exceeds rounding errors.
             origin = origin + (along[0] + BEHIND) * direction
             direction = direction * max(1.0 - along[0] - BEHIND, 0.0)
 
@@ -87,19 +96,22 @@ class View:
         return seen & (along >= 1.0 - room)
 
     def nearest_point(self, pixel, positions: np.ndarray, reach: float) -> int | None:
-        """The visible position nearest to a pixel, if it is within reach."""
+        """The index of the visible position nearest to a pixel, or None if none is within reach.
+
+        `reach` is in pixels.
+        """
         away = np.linalg.norm(self.project(positions) - pixel, axis=1)
-        near = np.flatnonzero(away <= reach)  # NaN is not
+        near = np.flatnonzero(away <= reach)  # False for NaN
         near = near[self.visible(positions[near])]
         return int(near[away[near].argmin()]) if len(near) else None
 
     def nearest_on_line(
         self, pixel, line: np.ndarray, reach: float, radius: float = 0.0
     ) -> tuple[int, float] | None:
-        """The segment of a polyline, (n, 3), nearest to a pixel, and the fraction along it.
+        """The segment of a polyline (n, 3) nearest to a pixel, and the fraction along the segment.
 
-        None if no visible part is within reach. The line may have a radius: a tube is seen where
-        the surface of the tube is, also if the line is hidden.
+        None if no visible part is within `reach` pixels. A line with a radius is shown as a tube,
+        whose surface may be visible even where the line itself is hidden.
         """
         if len(line) < 2:
             return None
@@ -122,13 +134,16 @@ class View:
         return best, float(share[best])
 
     def _in_pixels(self, positions: np.ndarray, radius: float) -> np.ndarray:
-        """A length across the view at positions, in pixels, (n,)."""
+        """Size in pixels, (n,), of a length parallel to the screen at each position."""
         depth = positions @ self.perspective[3, :3] + self.perspective[3, 3]
         across = 0.5 * self.size[0] * np.linalg.norm(self.perspective[0, :3])
         return radius * across / np.maximum(depth, np.finfo(float).tiny)
 
     def _towards(self, pixel, centres: np.ndarray, radius: float) -> np.ndarray:
-        """Where spheres about centres are nearest to the eye on the line of sight of a pixel."""
+        """Points where the line of sight through a pixel enters spheres about the centres.
+
+        For a sphere that the line of sight misses, the point of its outline nearest to that line.
+        """
         origin, direction = self.ray(pixel)
         direction = direction / np.linalg.norm(direction)
         along = (centres - origin) @ direction

@@ -1,1 +1,1 @@
-"""Maps of obstacles and alignment: weights from a mesh, and φ_fea of Eq. 7."""
+"""Obstacle and alignment maps: weights computed from a mesh, and φ_fea of Eq. 7."""

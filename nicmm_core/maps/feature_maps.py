@@ -1,7 +1,7 @@
-"""Weights for `alignment` and `obstacles` from a mesh or from data on it (section 3.3).
+"""Computes weights for `alignment` and `obstacles` from a mesh or from data on it (section 3.3).
 
-Each function of a map returns one weight in [0, 1] per vertex, (V,), as painting would; see
-`maps.guidance` for their effect.
+Each ``..._map`` function returns one weight in [0, 1] per vertex, shape (V,), like a painted map;
+`maps.guidance` describes the effect of the weights.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from ..geometry.mesh import Mesh, adjacent_sides, check_indices, edge_keys, side
 from ..geometry.normals import unsigned_normals
 
 SHARP_ANGLE = math.radians(30.0)
-"""Angle between the normals of two faces, in radians, from which their edge is sharp."""
+"""Least angle between the normals of two faces, in radians, at which their edge is sharp."""
 
 USUAL, STRIKING = 0.5, 0.95
-"""Quantiles of curvature, by area, with weight 0 and weight 1 by default."""
+"""Quantiles of the curvature over the area that get weight 0 and weight 1 by default."""
 
 LEAST_CONTRAST = 2.0
-"""Least ratio of these two curvatures, so that a ball has no weights."""
+"""Least ratio of the curvatures with weight 1 and weight 0, so that a ball has no weights."""
 
 HUB = 64
-"""Valence above which rings do not extend through a vertex, since they would be too large."""
+"""Valence above which two-rings do not extend through a vertex: they would be too large."""
 
 UNDETERMINED = 1e-8
-"""Relative eigenvalues of a fit below which a direction counts as undetermined."""
+"""Relative eigenvalue of a fit below which its direction counts as undetermined."""
 
 
 def principal_curvatures(mesh: Mesh) -> FloatArray:
     """Principal curvatures at the vertices, shape (V, 2), in 1/length, the larger one first.
 
-    Quadrics are fitted to the heights of two rings of neighbours over the tangent plane, with more
-    weight on nearer ones. Signs are arbitrary, since a mesh need not be oriented. In directions
-    without enough neighbours the surface counts as flat.
+    At each vertex a quadric is fitted to the heights of the two-ring over the tangent plane, with
+    larger weights for nearer neighbours. Signs are arbitrary, since a mesh need not be oriented. In
+    directions without enough neighbours the surface counts as flat.
 
     Parameters
     ----------
     mesh : Mesh
-        It may be open, unoriented or non-manifold.
+        Any mesh; it may be open, unoriented or non-manifold.
     """
     # Not `igl.principal_curvature`, which fails on small meshes and needs an orientation.
     centre, neighbour = _rings(mesh)
@@ -59,7 +59,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     size = np.bincount(centre, distance, len(mesh.vertices)) / np.maximum(count, 1)
     apart = distance > tolerances.COINCIDENT * mesh.diagonal
     centre, offset, distance = centre[apart], offset[apart], distance[apart]
-    # Lengths relative to the neighbourhood, so that all fits are conditioned equally.
+    # Lengths are relative to the size of the neighbourhood, so that all fits are well conditioned.
     u, v, height = (
         (offset * axis[centre]).sum(axis=1) / size[centre] for axis in (first, second, normals)
     )
@@ -67,7 +67,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     height *= size[centre] / distance
     fit = _least_squares(terms, height, centre, len(mesh.vertices))
     a, b, c, d, e = fit.T / np.maximum(size, tolerances.TINY) ** np.array([[1, 1, 1, 0, 0]]).T
-    # From the fundamental forms of the surface (u, v, h) at its origin.
+    # Curvatures from the fundamental forms of the surface (u, v, h) at the origin.
     slope = 1.0 + d * d + e * e
     root = np.sqrt(slope)
     mean = ((1.0 + d * d) * c - 2.0 * d * e * b + (1.0 + e * e) * a) / (2.0 * slope * root)
@@ -77,17 +77,17 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
 
 
 def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = None) -> FloatArray:
-    """Weights where the surface is strongly curved: on ridges, in grooves and along sharp edges.
+    """Weights for strongly curved parts of the surface: ridges, grooves and sharp edges.
 
-    The weight is linear in the greater absolute principal curvature between two limits.
+    Between two limits, the weight is linear in the larger absolute principal curvature.
 
     Parameters
     ----------
     mesh : Mesh
     low, high : float, optional
-        Curvatures with weight 0 and with weight 1, in 1/length. By default the median over the
-        area, and the 95 % quantile but at least twice the median; so a ball, a tube and a plane
-        have no weights.
+        Curvatures with weight 0 and with weight 1, in 1/length. By default these are the median
+        over the area, and the 95 % quantile or twice the median, whichever is larger. So a ball, a
+        tube and a plane have no weights.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     Raises
     ------
     ArgumentError
-        If the limits are not numbers, or are the same.
+        If the limits are not finite numbers, or are equal.
 
     References
     ----------
@@ -120,13 +120,13 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     ----------
     mesh : Mesh
     angle : float
-        Angle between the normals of the two faces of an edge, in radians, from which it is sharp;
-        0 in a plane. The orientation of faces is ignored.
+        Least angle between the normals of the two faces of a sharp edge, in radians; coplanar faces
+        have the angle 0. The orientation of faces is ignored.
 
     Returns
     -------
     (n, 2) int array
-        Vertices of the edges. Boundary edges are not sharp, and faces without area are ignored.
+        Vertices of the sharp edges. Boundary edges are not sharp. Faces without area are ignored.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     solid = np.flatnonzero(mesh.face_areas > 0.0)
     faces, normals = mesh.faces[solid], mesh.face_normals[solid]
     start, end = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
-    # At an edge with more than two faces, pairs of consecutive faces.
+    # At an edge with more than two faces, consecutive faces are compared.
     one, other = adjacent_sides(faces)
     turned = np.where(start[one] == start[other], -1.0, 1.0)
     normal, beyond = normals[one // 3], normals[other // 3]
@@ -151,7 +151,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
 
 
 def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
-    """1 at the ends of sharp edges and 0 elsewhere, shape (V,); see `sharp_edges`.
+    """Weights of 1 at the ends of sharp edges and 0 elsewhere, shape (V,); see `sharp_edges`.
 
     A map has weights at vertices only. If all corners of a face lie on sharp edges, as on a box of
     twelve triangles, the whole face has weight 1; subdivide such a mesh.
@@ -160,18 +160,18 @@ def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
 
 
 def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
-    """1 at the ends of some edges, such as marked seams, and 0 elsewhere, shape (V,).
+    """Weights of 1 at the ends of given edges, such as seams, and 0 elsewhere, shape (V,).
 
     Parameters
     ----------
     mesh : Mesh
     edges : (n, 2) array_like of int
-        Vertices of edges of the mesh; may be empty.
+        Vertices of edges of the mesh; the array may be empty.
 
     Raises
     ------
     ArgumentError
-        If they have another shape, or are not edges of the mesh.
+        If the array has another shape, or a pair is not an edge of the mesh.
     """
     pairs = _checked_pairs(edges, len(mesh.vertices))
     size = len(mesh.vertices)
@@ -196,20 +196,21 @@ def value_map(
     ----------
     mesh : Mesh
     values : (V,) array_like of float
-        In any unit.
+        Values at the vertices, in any unit.
     low, high : float, optional
-        Values with weight 0 and with weight 1, linear between and constant beyond; ``low`` may be
-        the larger one. By default the least and the greatest value at vertices of faces.
+        Values with weight 0 and with weight 1. The weight is linear between them and constant
+        beyond; ``low`` may be the larger value. By default the least and the greatest value at
+        vertices of faces.
 
     Returns
     -------
     (V,) float array
-        All zero if the limits are omitted and all values are equal.
+        The weights. All are zero if the limits are omitted and all values are equal.
 
     Raises
     ------
     ArgumentError
-        If values are missing or not finite, or the limits are equal.
+        If there is not one finite value per vertex, or the limits are equal.
     """
     checked = checked_vertex_values("values", values, mesh, "value")
     bad = ~np.isfinite(checked)
@@ -225,14 +226,14 @@ def value_map(
         raise ArgumentError(
             f"low and high are both {start:g}; pass the values with weight 0 and with weight 1"
         )
-    # Halves, since the difference of two large numbers may overflow.
+    # Numbers are halved, since the difference of two large ones may overflow.
     return np.clip((0.5 * checked - 0.5 * start) / (0.5 * end - 0.5 * start), 0.0, 1.0)
 
 
 def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Pairs of a vertex and one in its two rings, both (p,), sorted by the first.
+    """Pairs of a vertex and a vertex of its two-ring, both (p,), sorted by the first vertex.
 
-    One ring does not overdetermine a quadric; more would smooth out the features.
+    A one-ring does not overdetermine a quadric; more than two rings would smooth out features.
     """
     start, end = unique_edges(mesh.faces)[0].T
     size = len(mesh.vertices)
@@ -247,15 +248,16 @@ def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
 
 
 def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: int) -> FloatArray:
-    """Solutions of many small least-squares problems, of least norm if not unique.
+    """Minimum-norm solutions of many small least-squares problems.
 
     Parameters
     ----------
     terms : (k, p) float array
         Coefficients of each equation for the k unknowns of its problem.
     right : (p,) float array
+        Right-hand sides of the equations.
     row : (p,) int array
-        Index of the problem of each equation.
+        Index of the problem to which each equation belongs.
     count : int
         Number of problems.
 
@@ -274,7 +276,7 @@ def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: i
 
 
 def _quantiles_by_area(mesh: Mesh, values: FloatArray, shares: list[float]) -> list[float]:
-    """Quantiles of values at vertices, weighted by area."""
+    """Quantiles of values at the vertices, weighted by area."""
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), len(mesh.vertices))
     order = np.argsort(values, kind="stable")
     below = np.cumsum(area[order])

@@ -1,17 +1,17 @@
-"""φ_fea (section 3.3) from weights of obstacles and alignment, for all methods.
+"""Computes φ_fea (section 3.3) from the weights of obstacles and alignment, for all methods.
 
-The paper places a Gaussian at every feature vertex, with its weight as the standard deviation, and
-adds them with signs to a neutral baseline. Eq. 7 then squares that map. Here
+The paper places a Gaussian at every feature vertex, with the weight of the vertex as standard
+deviation, and adds the Gaussians with signs to a neutral baseline. Eq. 7 squares this map. Here
 
-    φ_fea² = 1 + 15 G_obstacles − G_alignment:
+    φ_fea² = 1 + 15 G_obstacles − G_alignment,
 
-the Gaussians belong to the square, which enters the energy. Otherwise the square would have a
-minimum of fourth order along a lane, too flat to hold a curve. The strongest Gaussian of each kind
-counts, not their sum, so the number of vertices in a region does not matter. Widths are relative to
-the surface, so a finer mesh has the same map.
+so the Gaussians are part of the square, which enters the energy. Otherwise the square would have a
+minimum of fourth order along a lane, too flat to hold a curve. G is the strongest Gaussian of its
+kind, not the sum, so the number of vertices in a region does not matter. Widths are relative to the
+size of the surface, so a finer mesh has the same map.
 
-Obstacles repel from every painted vertex. Alignment attracts to the ridge of a painted region, its
-deepest vertices; otherwise a curve would stop at the rim of a broad region.
+Obstacles repel the curve from every painted vertex. Alignment attracts it to the ridge of a painted
+region, its deepest vertices; otherwise a curve would stop at the rim of a broad region.
 """
 
 from __future__ import annotations
@@ -29,41 +29,44 @@ from ..progress import checkpoint
 BASELINE = 1.0
 """φ_fea where nothing is painted.
 
-The square then has the order required by the paper, alignment < neutral < obstacle; the square of
-a map with both signs would make alignment repel too.
+With it the square has the order that the paper requires, alignment < neutral < obstacle. If the map
+had both signs, its square would make alignment repel the curve too.
 """
 
 OBSTACLE = 15.0
-"""Addition to the square by an obstacle of weight 1: a detour of up to 16 times is accepted."""
+"""Addition to φ_fea² at an obstacle of weight 1.
+
+The curve then accepts a detour of up to 16 times the length through the obstacle.
+"""
 
 ALIGNMENT_WIDTH = 0.025
-"""Standard deviation for an alignment weight of 1, in square roots of the component's area.
+"""Standard deviation at an alignment weight of 1, relative to the √area of the component.
 
-A lane attracts a curve within about twice that, some 4 % of a model's diagonal.
+A lane attracts a curve within about twice this distance, some 4 % of a model's diagonal.
 """
 
 OBSTACLE_WIDTH = 0.015
-"""The same for obstacles; narrower, since they need not attract from a distance."""
+"""The same for obstacles. They are narrower, since they need not act from a distance."""
 
 CUT = 3.0
-"""Radius of a Gaussian, in standard deviations."""
+"""Radius at which a Gaussian is cut off, in standard deviations."""
 
 DEPTH = 0.1
-"""Depth inside a painted region, in the same unit, from which vertices count as ridge."""
+"""Depth in a painted region, in the same unit, above which all vertices belong to the ridge."""
 
 RIDGE = 0.5
-"""Slope of the depth towards any neighbour below which a vertex is on the ridge.
+"""A vertex is on the ridge if no edge at it rises in depth with a slope above this.
 
-The slope is 1 between rim and ridge, about 0.87 if no edge points straight inwards, and less where
-two sides of the rim are equally near.
+Between rim and ridge the largest slope is 1, or about 0.87 if no edge points straight inwards. It
+is smaller where two sides of the rim are equally near.
 """
 
 LEVELS = 5
-"""Number of levels to which weights are rounded up; each has its own width."""
+"""Number of levels to which weights are rounded up; each level has one width."""
 
 
 def component_unit(mesh: Mesh, face: int) -> float:
-    """Square root of the area of the component of a face, the unit of widths."""
+    """Square root of the area of the component that contains a face: the unit of widths."""
     component = mesh.face_component == mesh.face_component[face]
     return float(np.sqrt(mesh.face_areas[component].sum()))
 
@@ -77,7 +80,7 @@ def feature_map(
     ----------
     mesh : Mesh
     obstacles, alignment : (V,) float array of weights in [0, 1], or None
-        A weight scales the height and the width of its Gaussian.
+        Weights of the vertices. A weight scales both the height and the width of its Gaussian.
     unit : float
         Unit of the widths, in mesh units; see `component_unit`.
     """
@@ -95,12 +98,12 @@ def feature_map(
 
 
 def _levels(weights: FloatArray) -> IntArray:
-    """Levels of weights: 0 where nothing is painted, `LEVELS` for a weight of 1, (V,)."""
+    """Levels of the weights, (V,): 0 where nothing is painted, `LEVELS` at a weight of 1."""
     return np.ceil(LEVELS * weights - tolerances.SNAP).astype(np.int64)
 
 
 def _response(mesh: Mesh, level: IntArray, start: FloatArray, width: float) -> FloatArray:
-    """Strongest Gaussian at every vertex, in [0, 1], by distances along edges.
+    """Strongest Gaussian at every vertex, in [0, 1], with distances measured along edges.
 
     Parameters
     ----------
@@ -115,7 +118,7 @@ def _response(mesh: Mesh, level: IntArray, start: FloatArray, width: float) -> F
     response = np.zeros(len(level))
     edges = mesh.edges
     length = edge_lengths(mesh.vertices, edges)
-    # From the highest level down: vertices below a stronger Gaussian need none of their own.
+    # From the highest level down: a vertex that lies below a stronger Gaussian needs no Gaussian.
     for step in np.unique(level[level > 0])[::-1].tolist():
         checkpoint()
         weight = step / LEVELS
@@ -136,11 +139,11 @@ def _distances(
     limit: float,
     size: int,
 ) -> FloatArray:
-    """Distances along edges, (size,), from sources with start distances; inf beyond a limit."""
-    # One additional vertex, joined to each source by an arc of its start distance.
+    """Distances along edges, (size,), from sources with initial distances; inf beyond a limit."""
+    # An additional vertex is joined to each source by an arc whose length is the initial distance.
     rows = np.concatenate([edges[:, 0], np.full(len(sources), size)])
     columns = np.concatenate([edges[:, 1], sources])
-    # A length of zero would not be stored as an arc.
+    # The sparse graph would drop an arc of length zero.
     lengths = np.maximum(np.concatenate([length, start]), tolerances.TINY)
     graph = sparse.csr_array((lengths, (rows, columns)), shape=(size + 1, size + 1))
     return csgraph.dijkstra(graph, directed=False, indices=size, limit=limit)[:size]
@@ -159,11 +162,11 @@ def _off_ridge(mesh: Mesh, level: IntArray, width: float, depth: float) -> Float
     width : float
         Standard deviation at a weight of 1.
     depth : float
-        Depth from which vertices count as ridge.
+        Depth above which all vertices belong to the ridge.
     """
     inside = _depths(mesh, level, depth)
     upwards = _steepest(mesh, level, inside)
-    # Follow the steepest ascent to its end; every round doubles the number of steps.
+    # Follow the steepest ascent to its end. Each round doubles the number of steps taken.
     top = upwards
     while (top[top] != top).any():
         top = top[top]
@@ -172,7 +175,7 @@ def _off_ridge(mesh: Mesh, level: IntArray, width: float, depth: float) -> Float
 
 
 def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
-    """Distance of painted vertices to the nearest one of a lower level, or to the boundary."""
+    """Distance of painted vertices to the nearest vertex of a lower level or on the boundary."""
     result = np.zeros(len(level))
     rim = np.zeros(len(level), dtype=bool)
     rim[mesh.unpaired_edges[0]] = True
@@ -194,9 +197,9 @@ def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
 
 
 def _steepest(mesh: Mesh, level: IntArray, inside: FloatArray) -> IntArray:
-    """The neighbour of steepest ascent in depth; the vertex itself on a ridge.
+    """For each vertex, the neighbour of steepest ascent in depth, or the vertex itself on a ridge.
 
-    Only neighbours of the same level count.
+    Only neighbours of the same level are considered.
     """
     start, end = np.concatenate([mesh.edges, mesh.edges[:, ::-1]]).T
     alike: BoolArray = (level[start] > 0) & (level[end] == level[start])
@@ -207,5 +210,5 @@ def _steepest(mesh: Mesh, level: IntArray, inside: FloatArray) -> IntArray:
     start, end, slope = start[rising], end[rising], slope[rising]
     order = np.argsort(slope, kind="stable")
     result = np.arange(len(level))
-    result[start[order]] = end[order]  # the steepest is written last
+    result[start[order]] = end[order]  # the steepest edge is written last
     return result

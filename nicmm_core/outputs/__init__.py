@@ -1,4 +1,4 @@
-"""Uses of a curve: cut the mesh along it, take its region, separate the surface there.
+"""Outputs of a curve for the caller: the mesh cut along it, its region, and separate parts.
 
 No module of the design imports this package.
 """

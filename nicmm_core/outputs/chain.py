@@ -1,7 +1,8 @@
-"""The points of a curve as places where a mesh is cut: at vertices, on edges or inside faces.
+"""The places where a curve cuts a mesh: at vertices, on edges or inside faces.
 
-Points close to a vertex or an edge are snapped to it, to avoid thin faces, and points close to each
-other are merged. Where that would make the curve touch itself, its points are kept.
+Points of the curve close to a vertex or an edge are snapped to it, to avoid thin faces, and
+neighbouring points close to each other are merged. Where that would make the curve touch itself,
+`cut` keeps its points.
 """
 
 from __future__ import annotations
@@ -20,21 +21,22 @@ from ..geometry.tolerances import TINY
 
 @dataclass(frozen=True)
 class Chain:
-    """Distinct places on a mesh that a curve passes.
+    """The distinct places on a mesh through which a curve passes, in its order.
 
     Attributes
     ----------
     closed : bool
     faces : (m,) int array
-        An input face that contains each place.
+        A face of the mesh that contains each place.
     barycentric : (m, 3) float array
-        Coordinates there, exactly zero off the supporting vertices.
+        Coordinates in that face, exactly zero at corners that do not support the place.
     first_point : (m,) int array
         Index of the first point of the curve that is merged into each place.
     point : (m,) int array
-        Index of the point of the curve whose coordinates the place has.
+        Index of the point of the curve from which each place has its coordinates.
     segment_faces : (m,) int array
-        A face that contains a place and the next one; meaningless at an open end.
+        A face that contains each place and the next one; without meaning at the end of an open
+        curve.
     """
 
     closed: bool
@@ -57,18 +59,19 @@ def build_chain(
     margin: FloatArray,
     wanted: BoolArray,
 ) -> Chain:
-    """Snap points to near vertices and edges, and merge neighbours at the same place.
+    """Snap the points of a curve to nearby vertices and edges, and merge neighbouring points.
 
     Parameters
     ----------
     mesh : Mesh
     closed : bool
     faces, barycentric, segment_faces : arrays
-        As from `checked_curve`.
+        The n points of the curve and the faces of its segments, as from `checked_curve`.
     margin : (n,) float array
-        Coordinates below it become zero, and neighbours that differ by less are merged.
+        Barycentric coordinates up to this become zero, and neighbours whose coordinates differ by
+        less are merged.
     wanted : (n,) bool array
-        Points whose coordinates a merged place takes, such as control points.
+        Points, such as control points, whose coordinates a merged place takes.
     """
     barycentric = without_small_weights(barycentric, margin)
     corners = mesh.faces[faces]
@@ -78,11 +81,11 @@ def build_chain(
     theirs = weights_at(corners[following], barycentric[following], corners)
     near = np.abs(theirs - barycentric).max(axis=1) < np.minimum(margin, margin[following])
     at_vertex = (barycentric > 0.0).sum(axis=1) == 1
-    joins = same & (near | at_vertex)  # with the next one
+    joins = same & (near | at_vertex)  # with the next point
     if not closed:
         joins[-1] = False
     begins = np.array([0]) if joins.all() else np.flatnonzero(~np.roll(joins, 1))
-    # A run of near points may be long: it is split where it leaves its first point.
+    # A long run of close points is split where a point is no longer close to the first one.
     begins = _broken_runs(begins, joins, faces, barycentric, corners, margin)
     ends = np.roll(begins, -1)
     count = (ends - begins - 1) % n + 1
@@ -105,6 +108,7 @@ def _broken_runs(
     corners: IntArray,
     margin: FloatArray,
 ) -> IntArray:
+    """Split runs of joined points where a point is farther than the margin from the first one."""
     n = len(joins)
     found = []
     bounds = [*begins.tolist(), int(begins[0]) + n]
@@ -133,7 +137,7 @@ def superfluous_points(
     wanted: BoolArray,
     deviation: float,
 ) -> BoolArray:
-    """Points inside faces that can be omitted with a limited deviation of the curve.
+    """Points inside faces that can be omitted without moving the curve by more than a deviation.
 
     Parameters
     ----------
@@ -144,11 +148,12 @@ def superfluous_points(
     wanted : (n,) bool array
         Points to keep.
     deviation : float
-        In mesh units.
+        Largest distance by which the curve may move, in mesh units.
 
     Returns
     -------
     (n,) bool array
+        True for points that can be omitted.
     """
     n = len(faces)
     free = (barycentric > 0.0).all(axis=1) & ~wanted
@@ -178,15 +183,16 @@ def superfluous_points(
 
 
 def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int) -> IntArray:
-    """The points of the curve that are merged into some places and their neighbours.
+    """Indices of the points of a curve that are merged into some places or their neighbours.
 
     Parameters
     ----------
     chain : Chain
-        Built from some of the points of a curve.
+        Chain built from some of the points of the curve.
     places : sequence of int
+        Indices of the places in the chain.
     kept : (k,) int array
-        Indices of these points.
+        Indices of the points of the curve from which the chain was built.
     n_points : int
         Number of points of the curve.
     """
@@ -198,6 +204,6 @@ def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int
 
 
 def _same_support(corners: IntArray, barycentric: FloatArray, following: IntArray) -> BoolArray:
-    """Whether points lie at one vertex, on one edge or inside one face with the next ones."""
+    """Whether each point and the next have the same support: a vertex, an edge or a face."""
     support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
     return (support == support[following]).all(axis=1)

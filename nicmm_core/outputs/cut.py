@@ -1,8 +1,8 @@
-"""A mesh cut along a curve: the same surface, with the curve as a chain of its edges.
+"""Cuts a mesh along a curve: the result is the same surface, with the curve as a chain of edges.
 
-Every face that the curve crosses or touches is triangulated. Faces at a cut edge share its new
-vertices, so the result is as conforming as the mesh was. New vertices have barycentric coordinates
-in input faces, so that attributes can be interpolated.
+Every face that the curve crosses or touches is triangulated. The faces at a cut edge share its new
+vertices, so a conforming mesh stays conforming. New vertices have barycentric coordinates in input
+faces, so that attributes can be interpolated.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from .chain import Chain, build_chain, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 
 SNAP_CUT = 1e-3
-"""Default barycentric coordinate below which points snap to the edge or vertex."""
+"""Default barycentric coordinate up to which a point snaps to the edge or vertex."""
 
 LARGEST_SNAP = 0.25
-"""Largest snap; with a third or more, all coordinates of a point could vanish."""
+"""Largest snap. With a third or more, all coordinates of a point could become zero."""
 
 FLAT = 1e-9
-"""Height of a face, relative to its longest side, from which its angles are measured."""
+"""Height of a face, relative to its longest side, up to which it counts as without height."""
 
 
 @dataclass(frozen=True)
 class CutMesh:
-    """A mesh with a curve among its edges.
+    """A mesh that has a curve as a chain of its edges.
 
     Attributes
     ----------
     vertices : (V + n, 3) float array
-        Those of the input mesh, then the new ones.
+        Vertices of the input mesh, followed by the new vertices.
     faces : (F', 3) int array
-        Unchanged faces, in the old order, then the parts of the others, with the orientation of the
-        input faces.
+        Unchanged faces in the old order, followed by the parts of cut faces, all with the
+        orientation of the input faces.
     source_face : (F',) int array
-        The input face of each face.
+        The input face of which each face is a part.
     new_face : (n,) int array
         An input face that contains each new vertex.
     new_barycentric : (n, 3) float array
-        Their coordinates in it.
+        Barycentric coordinates of each new vertex in that face.
     chain : (m,) int array
         Distinct vertices along the curve, each joined to the next by an edge.
     closed : bool
@@ -73,22 +73,22 @@ class CutMesh:
 
     @property
     def chain_edges(self) -> IntArray:
-        """Edges along the curve, (m, 2), or (m - 1, 2) where it is open."""
+        """Edges along the curve, (m, 2), or (m - 1, 2) if the curve is open."""
         edges = np.stack([self.chain, np.roll(self.chain, -1)], axis=1)
         return edges if self.closed else edges[:-1]
 
     @cached_property
     def adjacent_faces(self) -> tuple[IntArray, BoolArray]:
-        """Pairs of faces at the same edge, (p, 2), and whether it is one of the curve, (p,).
+        """Pairs of faces with a common edge, (p, 2), and whether the curve runs along it, (p,).
 
-        There are k - 1 pairs at an edge with k faces.
+        An edge with k faces has k - 1 pairs.
         """
         one, other = adjacent_sides(self.faces)
         return np.stack([one, other], axis=1) // 3, sides_among(self.faces, self.chain_edges)[one]
 
     @cached_property
     def directed_chain_edges(self) -> frozenset[tuple[int, int]]:
-        """Edges along the curve in both directions, for lookups."""
+        """Edges along the curve in both directions, for fast lookup."""
         edges = self.chain_edges.tolist()
         return frozenset((a, b) for a, b in edges) | frozenset((b, a) for a, b in edges)
 
@@ -110,7 +110,7 @@ class CutMesh:
         return weights
 
     def at_corners(self, mesh: Mesh, values: FloatArray) -> FloatArray:
-        """Interpolate values at the corners of faces, such as UVs, which have seams.
+        """Interpolate values at the corners of faces, such as UV coordinates with seams.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class CutMesh:
         return np.einsum("fij,fj...->fi...", self.corner_weights(mesh), values[self.source_face])
 
     def at_vertices(self, mesh: Mesh, values: FloatArray) -> FloatArray:
-        """Interpolate values at vertices, such as weights.
+        """Interpolate values at the vertices, such as weights.
 
         Parameters
         ----------
@@ -151,12 +151,13 @@ def cut_mesh(
     mesh : Mesh
         The mesh that the curve was designed on. It may have boundaries and need not be oriented.
     curve : SurfaceCurve
-        Closed or open, simple.
+        A simple curve, closed or open.
     snap : float, default 0.001
-        Points with a barycentric coordinate below this snap to the edge or vertex, to avoid
-        needles, except where the curve would then touch itself.
+        Barycentric coordinate up to which a point snaps to the edge or vertex, to avoid needles,
+        except where the curve would then touch itself.
     deviation : float, default 0
-        Points inside faces are omitted where the curve then moves by at most this, in mesh units.
+        Largest distance, in mesh units, by which the curve may move where points inside faces are
+        omitted.
 
     Returns
     -------
@@ -228,15 +229,15 @@ class _ContactError(Exception):
 
 @dataclass(frozen=True)
 class _Places:
-    """The places of a chain by location: at a vertex, on an edge or inside a face."""
+    """Indices of the places of a chain, by the vertex, edge or face that contains them."""
 
-    at_vertex: dict[int, int]  # place by vertex
-    on_edge: dict[tuple[int, int], list[int]]  # places in order along an edge, smaller vertex first
+    at_vertex: dict[int, int]  # the place at each vertex
+    on_edge: dict[tuple[int, int], list[int]]  # in order from the smaller vertex
     in_face: dict[int, list[int]]
 
 
 def _cut(mesh: Mesh, chain: Chain) -> CutMesh:
-    """The mesh cut along a chain, or a _ContactError."""
+    """Cut a mesh along a chain, or raise _ContactError."""
     if len(chain) < (3 if chain.closed else 2):
         raise _ContactError(list(range(len(chain))))
     corners = mesh.faces[chain.faces]
@@ -275,6 +276,7 @@ def _cut(mesh: Mesh, chain: Chain) -> CutMesh:
 
 
 def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
+    """Sort places by their location; raise _ContactError if two of them coincide."""
     at_vertex: dict[int, int] = {}
     on_edge: dict[tuple[int, int], list[int]] = defaultdict(list)
     in_face: dict[int, list[int]] = defaultdict(list)
@@ -291,7 +293,7 @@ def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
             at_vertex[vertex] = place
             continue
         first, second = sorted(here, key=lambda corner: row[corner])
-        # The share of the second end: rounding cannot make it 0 or 1.
+        # Computed from both weights, so that rounding cannot make the share 0 or 1.
         share[place] = weights[second] / (weights[first] + weights[second])
         on_edge[int(row[first]), int(row[second])].append(place)
     for along in on_edge.values():
@@ -305,9 +307,9 @@ def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
 def _segments_inside(
     chain: Chain, corners: IntArray, places: _Places
 ) -> dict[int, list[tuple[int, int]]]:
-    """Segments through the interior of a face, by face.
+    """Segments through the interior of faces, as pairs of places, by face.
 
-    Segments along an edge need no cut, but must not pass over a place.
+    A segment along an edge needs no cut. If it passes over another place, _ContactError is raised.
     """
     inside: dict[int, list[tuple[int, int]]] = defaultdict(list)
     support = [
@@ -334,7 +336,7 @@ def _segments_inside(
 
 
 def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
-    """Faces with places on one of their edges."""
+    """Faces that have a place on one of their edges."""
     edges = np.array(list(places.on_edge), dtype=np.int64).reshape(-1, 2)
     candidates = mesh.faces_at(np.unique(edges))
     cut = sides_among(mesh.faces[candidates], edges).reshape(-1, 3)
@@ -349,7 +351,7 @@ def _face_parts(
     vertex: IntArray,
     segments: list[tuple[int, int]],
 ) -> list[tuple[int, int, int]]:
-    """The triangles of one face, by vertices of the cut mesh.
+    """Triangles that replace one face, as triples of vertices of the cut mesh.
 
     Parameters
     ----------
@@ -358,9 +360,9 @@ def _face_parts(
     chain : Chain
     places : _Places
     vertex : (m,) int array
-        The vertex of each place.
-    segments : list of (place, place)
-        Those through the interior of the face.
+        The vertex of the cut mesh at each place.
+    segments : list of (int, int)
+        Segments through the interior of the face, as pairs of places.
     """
     corners = mesh.faces[face].tolist()
     sides = []
@@ -391,7 +393,7 @@ def _face_parts(
 
 
 def _flattened(corners: FloatArray, weights: FloatArray) -> FloatArray:
-    """Points of a face in its plane; a face without height is replaced by an equilateral one."""
+    """Points of a face in its plane, (n, 2); a face without height counts as equilateral."""
     one, other = corners[1] - corners[0], corners[2] - corners[0]
     length = np.linalg.norm(one)
     x, y = one @ other, float(np.linalg.norm(np.cross(one, other)))

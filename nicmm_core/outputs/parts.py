@@ -1,4 +1,4 @@
-"""A surface separated along a curve: each side gets its own vertices."""
+"""Separates a surface along a curve: the two sides of the curve get separate vertices."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .cut import CutMesh
 
 @dataclass(frozen=True)
 class PartedMesh:
-    """A cut mesh in which both sides of the curve are disconnected.
+    """A cut mesh that is disconnected along its curve.
 
     Attributes
     ----------
     vertices : (V', 3) float array
-        Those of the cut mesh, then their copies along the curve.
+        Vertices of the cut mesh, followed by duplicates of those along the curve.
     faces : (F', 3) int array
         Faces of the cut mesh, in the same order.
     source_vertex : (V',) int array
-        The vertex of the cut mesh of each vertex.
+        The vertex of the cut mesh from which each vertex is copied.
     part : (F',) int array
-        The connected component of each face, from 0.
+        Index of the connected component of each face.
     """
 
     vertices: FloatArray
@@ -37,8 +37,9 @@ class PartedMesh:
 def part_mesh(cut: CutMesh) -> PartedMesh:
     """Separate a cut mesh along its curve.
 
-    Ends of an open curve inside the surface are not duplicated, so it opens a slit. A curve that
-    bounds no region leaves the surface connected, with one or two more boundaries.
+    End points of an open curve are not duplicated inside the surface, so the curve becomes a slit.
+    A curve that bounds no region leaves the surface connected, with one or two additional boundary
+    loops.
 
     Parameters
     ----------
@@ -50,18 +51,18 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
     PartedMesh
     """
     n_vertices, vertex = len(cut.vertices), cut.faces.ravel()
-    # Corners at a vertex stay joined if their faces share an uncut edge there.
+    # Two corners at a vertex stay joined if their faces share an uncut edge at the vertex.
     ends = side_corners(cut.faces)
     one, other = adjacent_sides(cut.faces)
     uncut = ~sides_among(cut.faces, cut.chain_edges)[one]
-    # Off the curve, all corners of a vertex stay joined, even at non-manifold vertices.
+    # At a vertex off the curve all corners stay joined, even if the vertex is non-manifold.
     order = np.argsort(vertex, kind="stable")
     off = ~np.isin(vertex[order[1:]], cut.chain)
     beside = np.flatnonzero((np.diff(vertex[order]) == 0) & off)
     rows = np.concatenate([ends[one[uncut]].ravel(), order[beside]])
     columns = np.concatenate([ends[other[uncut]].ravel(), order[beside + 1]])
     group, owner = joined_corners(cut.faces, rows, columns)
-    # The first group of each vertex keeps its number.
+    # The first group of each vertex keeps the index of the vertex.
     by_vertex = np.argsort(owner, kind="stable")
     again = np.concatenate([[False], np.diff(owner[by_vertex]) == 0])
     number = owner.copy()
@@ -72,7 +73,7 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
 
 
 def _parts(faces: IntArray) -> IntArray:
-    """Connected components of faces by shared vertices, (F,)."""
+    """Index of the component of each face, (F,); faces with a common vertex are connected."""
     one, other = faces[:, :2].ravel(), faces[:, 1:].ravel()
     _, label = components(int(faces.max()) + 1, one, other)
     return np.unique(label[faces[:, 0]], return_inverse=True)[1]

@@ -1,7 +1,7 @@
-"""Polygons of a cut mesh, for meshes whose triangles come from quads and polygons.
+"""Polygons of a cut mesh, for meshes whose triangles come from quads and other polygons.
 
-The parts of a polygon on each side of the curve become polygons again, as after a knife cut.
-Polygons that the curve does not cross are unchanged.
+The triangles of a cut polygon are merged into polygons on each side of the curve, as after a knife
+cut. Polygons that the curve does not cross are unchanged.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from ..geometry.array_types import FloatArray, IntArray
 from .cut import CutMesh
 
 BENT = 0.9
-"""Least cosine between the normal of a triangle and that of the polygon that it joins."""
+"""Least cosine between the normals of a merged polygon and of each of its triangles."""
 
 
 @dataclass(frozen=True)
 class CutPolygons:
-    """Polygons that replace those that were cut.
+    """Polygons that replace the polygons that were cut.
 
     Attributes
     ----------
     corners : list of (k,) lists of int
         Vertices of the cut mesh, with the orientation of its faces.
     triangles : list of (k,) lists of int
-        A face of the cut mesh in the polygon, for each corner.
+        For each corner, a face of the cut mesh that has this corner and lies in the polygon.
     source : (p,) int array
-        The input polygon of each.
+        The input polygon of which each polygon is a part.
     """
 
     corners: list[list[int]]
@@ -38,27 +38,27 @@ class CutPolygons:
 
 
 def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) -> CutPolygons:
-    """Merge the triangles of cut polygons, but not across the curve.
+    """Merge the triangles of every cut polygon, except across the curve.
 
     Parameters
     ----------
     cut : CutMesh
     source_polygon : (F,) int array
-        The polygon of each face of the mesh that was cut.
+        The polygon to which each face of the input mesh belongs.
     joined : bool, default True
         If False, cut polygons stay triangles.
 
     Returns
     -------
     CutPolygons
-        Without polygons that were not cut.
+        The parts of polygons that were cut; other polygons are not included.
     """
     polygon = source_polygon[cut.source_face]
     is_cut = np.zeros(len(source_polygon), dtype=bool)
     is_cut[cut.source_face[np.flatnonzero(np.diff(cut.source_face, append=-1) == 0)]] = True
     pairs, on_chain = cut.adjacent_faces
     one, other = pairs.T
-    # The curve may follow a diagonal and cut no triangle.
+    # The curve may also cut a polygon along a diagonal without cutting a triangle.
     along = polygon[one][on_chain & (polygon[one] == polygon[other])]
     touched = np.isin(polygon, np.concatenate([source_polygon[is_cut], along]))
     joins = (
@@ -88,9 +88,10 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
 
 
 def _outline(cut: CutMesh, faces: list[int]) -> list[tuple[int, int]] | None:
-    """Corners around some triangles, each with one of its triangles; None if they stay triangles.
+    """Corners around the union of some triangles, each with one of the triangles at it.
 
-    They do if they are bent too much, or do not form a disc with all corners on its rim.
+    None if the triangles cannot be merged, because they are bent too much or do not form a disc
+    with all corners on its rim.
     """
     if not _is_flat(cut.vertices, cut.faces[faces]):
         return None
@@ -121,7 +122,7 @@ def _sides_of(cut: CutMesh, face: int) -> list[tuple[int, int]]:
 
 
 def _is_flat(vertices: FloatArray, faces: IntArray) -> bool:
-    """Whether triangles are a graph of limited slope over their mean plane."""
+    """Whether triangles form a graph of limited slope over their mean plane."""
     corner = vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(normal, axis=1)

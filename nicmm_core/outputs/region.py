@@ -1,7 +1,8 @@
-"""The region that a curve encloses: faces and vertices on one side of it.
+"""The region that a curve encloses: the faces and vertices on one side of it.
 
-By the rule of `geometry.sides`, as for the sign of a design's level set (`relaxation.curve_field`).
-Here faces of the cut mesh have sides, even if no input vertex lies inside.
+The sides are determined by the rule of `geometry.sides`, like the sign of a design's level set
+(`relaxation.curve_field`). That sign is found for vertices; here the sides are found for faces of
+the cut mesh, so a region that contains no input vertex is found as well.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ class Region:
     Attributes
     ----------
     cut_faces : (F',) bool array
-        Faces of the cut mesh that are inside.
+        Whether each face of the cut mesh is inside.
     cut_vertices : (V + n,) bool array
-        Vertices of the cut mesh that are inside or on the curve.
+        Whether each vertex of the cut mesh is inside or on the curve.
     share : (F,) float array
-        Share of the area of each input face that is inside, in [0, 1].
+        Fraction of the area of each input face that is inside, in [0, 1].
     area : float
-        Of the region, in square mesh units.
+        Area of the region, in square mesh units.
     """
 
     cut_faces: BoolArray
@@ -42,7 +43,7 @@ class Region:
 
     @property
     def faces(self) -> BoolArray:
-        """Input faces with more than half of their area inside, (F,)."""
+        """Whether more than half of the area of each input face is inside, (F,)."""
         return self.share > 0.5
 
     def complement(self, mesh: Mesh, cut: CutMesh) -> Region:
@@ -53,13 +54,13 @@ class Region:
         mesh : Mesh
             The mesh that was cut.
         cut : CutMesh
-            The cut of this region.
+            The cut mesh from which this region was computed.
         """
         side = _sides(cut)
         return _region(mesh, cut, (side != 0) & ~self.cut_faces)
 
     def vertices(self, mesh: Mesh) -> BoolArray:
-        """Input vertices that are inside or on the curve, (V,).
+        """Whether each input vertex is inside or on the curve, (V,).
 
         Parameters
         ----------
@@ -81,20 +82,20 @@ def enclosed_region(
     cut : CutMesh
         From `cut_mesh`.
     side_of : (1,) int array_like, (1, 3) float array_like or SurfacePoints, optional
-        A point of the region: a vertex, a point on the surface, or a face with coordinates. By
-        default the region is the side with the smaller area.
+        A point in the region: a vertex index, a point on the surface, or a face with barycentric
+        coordinates. By default the region is the side with the smaller area.
 
     Returns
     -------
     Region
-        Without components of the mesh that are not connected to the curve.
+        The region, without components of the mesh that are not connected to the curve.
 
     Raises
     ------
     CurveError
         If the curve bounds no region.
     ControlPointError
-        If ``side_of`` is not a single point off the curve, on its component of the mesh.
+        If ``side_of`` is not a single point, lies on the curve, or is not connected to the curve.
     """
     side = _sides(cut)
     areas = cut.mesh.face_areas
@@ -102,27 +103,27 @@ def enclosed_region(
         inside = side == _side_at(mesh, cut, side, side_of)
     else:
         one, other = areas[side == 1].sum(), areas[side == -1].sum()
-        # If all faces are on one side, the curve follows the boundary.
+        # All faces may be on one side: the curve then follows the boundary.
         inside = side == (1 if other == 0.0 or 0.0 < one < other else -1)
     return _region(mesh, cut, inside)
 
 
 def _region(mesh: Mesh, cut: CutMesh, inside: BoolArray) -> Region:
-    """The region of some faces of the cut mesh."""
+    """The region that consists of some faces of the cut mesh."""
     areas = cut.mesh.face_areas
     vertices = np.zeros(len(cut.vertices), dtype=bool)
     vertices[cut.faces[inside]] = True
     n_faces = len(mesh.faces)
     within = np.bincount(cut.source_face, areas * inside, n_faces)
     whole = np.bincount(cut.source_face, areas, n_faces)
-    # For faces without area, the number of parts is used instead.
+    # For faces without area, the fraction of their parts is used instead.
     number = np.bincount(cut.source_face, inside, n_faces) / np.bincount(cut.source_face)
     share = np.where(whole > 0.0, within / np.where(whole > 0.0, whole, 1.0), number)
     return Region(inside, vertices, share, float(areas[inside].sum()))
 
 
 def _sides(cut: CutMesh) -> IntArray:
-    """1 or -1 for faces that are connected to the curve, 0 for others, (F',)."""
+    """1 or -1 for faces that are connected to the curve, 0 for other faces, (F',)."""
     n_faces = len(cut.faces)
     part, side = two_sides(n_faces, *cut.adjacent_faces)
     beside = sides_among(cut.faces, cut.chain_edges).reshape(-1, 3).any(axis=1)
@@ -146,7 +147,7 @@ def _side_at(mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | Surf
     source, target = int(point.faces[0]), point.barycentric[0]
     among = np.flatnonzero(cut.source_face == source)
     weights = cut.corner_weights(mesh)[among]
-    # Coordinates in each part of the face; the point lies where the least one is greatest.
+    # Coordinates in each part of the face. The point lies in the part with the greatest minimum.
     right = np.tile(target[:, None], (len(among), 1, 1))
     inside = np.linalg.solve(weights.transpose(0, 2, 1), right)
     least = inside.min(axis=1).ravel()

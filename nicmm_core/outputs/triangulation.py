@@ -1,8 +1,8 @@
-"""One triangle cut into triangles along segments: a constrained Delaunay triangulation.
+"""Cuts a triangle along segments: a constrained Delaunay triangulation.
 
-Points are barycentric coordinates, so points on a side of the triangle share an exact zero and are
-exactly collinear. Signs of areas are exact; only the choice among valid triangulations depends on
-rounding.
+Points are given by barycentric coordinates, so points on a side of the triangle share an exact zero
+and are exactly collinear. Signs of areas are computed exactly; only the choice among valid
+triangulations depends on rounding.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from fractions import Fraction
 from ..geometry.array_types import FloatArray
 
 SURE = 1e-13
-"""Determinants of barycentric coordinates above this have exact signs in double precision."""
+"""Magnitude of a determinant of barycentric coordinates above which rounding keeps its sign."""
 
 ANGLE_MARGIN = 1e-9
-"""Excess of the sum of opposite angles over π from which an edge is flipped."""
+"""Excess over π of the sum of the angles opposite an edge above which the edge is flipped."""
 
 Weights = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
 
 class ConstraintError(Exception):
-    """Segments cross, or a segment passes through a point; `points` are those involved."""
+    """Segments cross, or a segment passes through a point; `points` lists the points involved."""
 
     def __init__(self, points: tuple[int, ...]) -> None:
         super().__init__(points)
@@ -32,7 +32,7 @@ class ConstraintError(Exception):
 
 
 def orientation(a: Weights, b: Weights, c: Weights) -> int:
-    """1 if a, b, c turn to the left, -1 to the right, 0 if they are collinear; exact."""
+    """1 if a, b, c turn left, -1 if they turn right, 0 if they are collinear; always exact."""
     value = _determinant(*a, *b, *c)
     if abs(value) <= SURE:
         exact = _determinant(*map(Fraction, (*a, *b, *c)))
@@ -46,14 +46,14 @@ def _determinant(a, b, c, d, e, f, g, h, i):  # type: ignore[no-untyped-def]
 
 
 class FaceTriangulation:
-    """Triangles of one face, built point by point and segment by segment.
+    """Triangulation of one face, built point by point and segment by segment.
 
     Parameters
     ----------
     weights : list of (float, float, float)
-        Barycentric coordinates of the points; the first three are the corners.
+        Barycentric coordinates of the points; the first three points are the corners.
     flat : (n, 2) float array
-        The points in the plane of the face, for angles.
+        Positions of the points in the plane of the face, from which angles are computed.
     """
 
     def __init__(self, weights: FloatArray | list[Weights], flat: FloatArray) -> None:
@@ -69,7 +69,7 @@ class FaceTriangulation:
         return [(a, b, c) for (a, b), c in self._third.items() if a < b and a < c]
 
     def add_on_side(self, corner: int, points: list[int]) -> None:
-        """Insert points on the side that starts at a corner, in order."""
+        """Insert points, in order, on the side that starts at a corner."""
         before, end = corner, (corner + 1) % 3
         for point in points:
             third = self._third[before, end]
@@ -123,7 +123,7 @@ class FaceTriangulation:
     def improve(self) -> None:
         """Flip edges that are not segments until the triangulation is Delaunay."""
         waiting = list(self._third)
-        # Lawson's flips end after O(n²) steps; the cap prevents cycles by rounding.
+        # Lawson's flips end after O(n²) steps; the cap ends cycles caused by rounding.
         for _ in range(8 * len(self.weights) ** 2 + len(waiting)):
             if not waiting:
                 return
@@ -137,7 +137,7 @@ class FaceTriangulation:
                 waiting += [(a, d), (d, b), (b, c), (c, a)]
 
     def _edges_between(self, start: int, end: int) -> Iterator[tuple[int, int]]:
-        """Edges that a segment crosses, in order, each with its right end first."""
+        """Edges that a segment crosses, in order, each with its end on the right first."""
         if (start, end) in self._third or (end, start) in self._third:
             return
         for (corner, right), left in list(self._third.items()):
@@ -165,13 +165,16 @@ class FaceTriangulation:
             right, left = (right, beyond) if turn > 0 else (beyond, left)
 
     def _is_ahead(self, start: int, between: int, end: int) -> bool:
-        """Whether a point collinear with a segment lies on its ray, by its largest coordinate."""
+        """Whether a point collinear with a segment lies on the ray from its start to its end.
+
+        The coordinate that changes most along the segment decides.
+        """
         a, b, c = (self.weights[point] for point in (start, between, end))
         axis = max(range(3), key=lambda k: abs(c[k] - a[k]))
         return (b[axis] - a[axis]) * (c[axis] - a[axis]) > 0.0
 
     def _is_convex(self, a: int, b: int, c: int, d: int) -> bool:
-        """Whether the two triangles beside edge ab, with corners c and d, can swap it for cd."""
+        """Whether edge ab can be flipped to cd, where c and d are the corners opposite to it."""
         return self._turn(a, d, c) > 0 and self._turn(d, b, c) > 0
 
     def _turn(self, a: int, b: int, c: int) -> int:

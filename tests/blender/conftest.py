@@ -1,6 +1,7 @@
-"""Blender with the extension installed from the zip, never from the source tree.
+"""Fixtures: Blender with the extension installed from the zip, never from the source tree.
 
-By default this is the bpy module. A Blender runs the same tests with a zip that was built for it:
+By default Blender is the bpy module. A Blender application runs the same tests with a zip that was
+built for it:
 
     NICMM_TEST_ZIP=nicmm_curves.zip BLENDER_USER_RESOURCES=$(mktemp -d) blender -b \\
         --python-exit-code 1 --python-expr "import sys, pytest; sys.path.insert(0, '.'); \\
@@ -20,7 +21,7 @@ import build
 
 IN_BLENDER = "bpy" in sys.modules
 if not IN_BLENDER:
-    # Blender reads this when bpy is first imported: the tests keep off the user's own settings.
+    # Blender reads this when bpy is first imported, so the tests do not touch the user's settings.
     _user_folder = tempfile.TemporaryDirectory(prefix="nicmm-blender-")
     os.environ["BLENDER_USER_RESOURCES"] = _user_folder.name
 
@@ -33,14 +34,14 @@ MODULE = "bl_ext.user_default.nicmm_curves"
 
 @pytest.fixture
 def bpy_module():
-    """For tests that start another Python with the bpy module in it, or build zips."""
+    """For tests that start another Python process with the bpy module, or build zips."""
     if IN_BLENDER:
         pytest.skip("this Python has no bpy module that another process could import")
 
 
 @pytest.fixture(scope="session")
 def archive(tmp_path_factory):
-    """The zip of this platform, as users get it."""
+    """The zip for this platform, as users install it."""
     if "NICMM_TEST_ZIP" in os.environ:
         return Path(os.environ["NICMM_TEST_ZIP"])
     return build.package(build.this_platform(), output=tmp_path_factory.mktemp("package"))
@@ -48,7 +49,7 @@ def archive(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def extension(archive):
-    """The installed extension: its `module`, its `core` and its `folder`."""
+    """The installed extension: its `name`, `module`, `core` and `folder`."""
     bpy.ops.extensions.package_install_files(
         filepath=str(archive), repo="user_default", enable_on_install=False
     )
@@ -61,13 +62,13 @@ def extension(archive):
         core=import_module(f"{MODULE}.nicmm_core"),
         folder=os.path.dirname(module.__file__),
     )
-    # Blender hangs at exit when classes of a script are left.
+    # Blender hangs at exit if classes of a script are still registered.
     addon_utils.disable(MODULE, default_set=True)
 
 
 @pytest.fixture
 def empty_scene(extension):
-    """A new file without objects, at the start of the undo history."""
+    """The extension, with a new file without objects and a new undo history."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.ed.undo_push(message="Start")
     return extension

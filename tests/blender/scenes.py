@@ -1,4 +1,4 @@
-"""Objects and selections that the tests of the extension share."""
+"""Helpers that the tests of the extension share: objects, selections and positions."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ def sphere(subdivisions=3):
 
 
 def monkey():
-    """Suzanne, of quads and triangles, with a closed curve's vertices selected round the crown."""
+    """Suzanne, of quads and triangles, with four vertices around the crown selected."""
     bpy.ops.mesh.primitive_monkey_add()
     made = bpy.context.active_object
     select(made, [73, 365, 74, 366])
@@ -20,20 +20,20 @@ def monkey():
 
 
 def activate(chosen):
-    """Make an object the active and the only selected one, as a click on it does."""
+    """Make an object the active and the only selected object, like a click on it."""
     bpy.ops.object.select_all(action="DESELECT")
     chosen.select_set(True)
     bpy.context.view_layer.objects.active = chosen
 
 
 def nearest_vertices(mesh_object, points):
-    """The vertices nearest to points in the object's local space."""
+    """Indices of the vertices nearest to points in the object's local space."""
     vertices = positions(mesh_object)
     return [int(np.argmin(np.linalg.norm(vertices - point, axis=1))) for point in points]
 
 
 def ring(mesh_object, count, height=0.0):
-    """Vertices of a unit sphere at equal angles round the z axis, in that order."""
+    """Indices of vertices of a unit sphere at equal angles around the z axis, in order."""
     radius = np.sqrt(1 - height**2)
     angles = 2 * np.pi * np.arange(count) / count
     return nearest_vertices(
@@ -42,15 +42,16 @@ def ring(mesh_object, count, height=0.0):
 
 
 def five_places(heights=(0.1, -0.2, 0.1, 0.2, -0.1)):
-    """Positions round the z axis near a unit sphere, (5, 3)."""
+    """Positions around the z axis near a unit sphere, (5, 3)."""
     angles = np.array([0.2, 1.4, 2.6, 3.7, 5.1])[: len(heights)]
     return np.stack([np.cos(angles), np.sin(angles), np.asarray(heights)], axis=1)
 
 
 def select(mesh_object, vertices, history=None):
-    """Select exactly these vertices in Object Mode, as if clicked one by one in their order.
+    """Select exactly the given vertices in Object Mode, as if they were clicked one after another.
 
-    With `history`, the selection history holds those vertices instead, as after a box selection.
+    With `history`, the selection history contains only the vertices in `history`: a box selection,
+    for example, leaves no history.
     """
     edited = bmesh.new()
     edited.from_mesh(mesh_object.data)
@@ -81,7 +82,7 @@ def curves():
 
 
 def points(curve_object, spline=0):
-    """Positions of a curve's points in the local space of its parent."""
+    """Positions of the points of a spline in the local space of the curve's parent."""
     points = curve_object.data.splines[spline].points
     own = get(points, "co", 4).astype(float)[:, :3]
     inverse = np.array(curve_object.matrix_parent_inverse)
@@ -89,7 +90,7 @@ def points(curve_object, spline=0):
 
 
 def distances_to(targets, polyline):
-    """Distance of each target to the nearest point of a polyline."""
+    """Distance from each target to the nearest point of a polyline."""
     return np.linalg.norm(targets[:, None] - polyline[None], axis=2).min(axis=1)
 
 
@@ -100,7 +101,7 @@ def get(sequence, name, width=1, dtype=np.float32):
 
 
 def evaluated_points(curves_object):
-    """Positions of the points of a hair curves object after its modifiers."""
+    """Positions of the points of a hair curves object after its modifiers are applied."""
     bpy.context.view_layer.update()
     data = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     return get(data.points, "position", 3).astype(float)

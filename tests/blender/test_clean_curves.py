@@ -1,4 +1,4 @@
-"""What objects show of a curve: even, exact and Bézier splines, radius and offset."""
+"""How objects show a curve: even, exact and Bézier splines, radius and offset."""
 
 import bpy
 import igl
@@ -14,7 +14,10 @@ SINGLE = 1e-6
 """Rounding of single precision, in diagonals."""
 
 CLEAN = 1.05e-4
-"""Distance of a clean curve from the exact one, in diagonals; the check has a resolution."""
+"""Largest distance of a clean curve from the exact curve, in diagonals.
+
+It is slightly above the tolerance, since the check samples the curves.
+"""
 
 
 def draw(mesh_object, **settings):
@@ -25,7 +28,7 @@ def draw(mesh_object, **settings):
 
 
 def on_segments(points, line):
-    """Distances of points from a closed polyline."""
+    """Distances from points to a closed polyline."""
     start, step = line, np.roll(line, -1, axis=0) - line
     to = points[:, None] - start[None]
     squared = np.maximum((step * step).sum(axis=1), 1e-30)
@@ -34,7 +37,7 @@ def on_segments(points, line):
 
 
 def outline(curve, steps=24):
-    """World positions along a curve object's first spline, densely."""
+    """World positions of dense samples along the first spline of a curve object."""
     spline = curve.data.splines[0]
     if spline.type == "POLY":
         return in_world(curve)
@@ -104,7 +107,7 @@ def test_even_points_are_on_the_surface_and_evenly_spaced(monkey):
 
 @pytest.mark.slow
 def test_the_tube_has_the_radius_in_the_scene_whatever_the_scale(monkey):
-    """All rings of the tube are circles of the radius, also on a sheared object."""
+    """All rings of the tube are circles with the given radius, even on a sheared object."""
     bpy.ops.object.empty_add(rotation=(0.4, 0.2, 0.9))
     monkey.parent = bpy.context.object
     monkey.scale = (1.0, 0.3, 2.0)
@@ -119,15 +122,18 @@ def test_the_tube_has_the_radius_in_the_scene_whatever_the_scale(monkey):
 
 
 def most_are(distances, radius):
-    """Nine of ten; inside of sharp bends the tube overlaps itself, and outside it has corners."""
+    """Whether nine of ten distances are close to a radius.
+
+    On the inside of sharp bends the tube overlaps itself, and on the outside it has corners.
+    """
     return np.abs(np.percentile(distances, [5.0, 50.0, 95.0]) / radius - 1.0).max() < 0.05
 
 
 def shown_tube(curve):
-    """World positions of the mesh that an object shows."""
+    """World positions of the vertices of the mesh that an object shows."""
     evaluated = curve.evaluated_get(bpy.context.evaluated_depsgraph_get())
     if curve.type == "CURVES":
-        geometry = evaluated.evaluated_geometry()  # owns its mesh
+        geometry = evaluated.evaluated_geometry()  # keeps a reference: it owns the mesh
         local = scenes.get(geometry.mesh.vertices, "co", 3).astype(float)
     else:
         mesh = evaluated.to_mesh()
@@ -191,12 +197,12 @@ def test_an_update_keeps_spline_and_offset(monkey, spline):
     curve = draw(monkey, spline=spline, offset=0.03)
     before = outline(curve)
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
-    assert on_segments(outline(curve), before).max() < 3e-3  # it has converged a little further
+    assert on_segments(outline(curve), before).max() < 3e-3  # the update converges a little further
     assert curve.data.splines[0].type == ("BEZIER" if spline == "BEZIER" else "POLY")
 
 
 def test_a_converted_curve_is_cut_exactly(empty_scene):
-    """The record holds the exact curve, whatever is drawn."""
+    """The record contains the exact curve, whatever spline is shown."""
     monkey = scenes.monkey()
     exact = in_world(draw(monkey, spline="EXACT"))
     draw(monkey, spline="BEZIER", offset=0.1)

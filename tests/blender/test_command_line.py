@@ -19,7 +19,7 @@ def command(empty_scene):
 
 @pytest.fixture
 def file(empty_scene, tmp_path):
-    """A file with a sphere and a group on it; the path, the group's vertices and the mesh."""
+    """A file with a sphere and vertex groups: its path, the vertices of "Cut" and the mesh."""
     scenes.sphere().name = "Körper"
     body = bpy.data.objects["Körper"]
     vertices = scenes.ring(body, 4, height=0.3)
@@ -121,11 +121,11 @@ def test_file_is_not_overwritten(command, file, capfd):
     path, _vertices, _mesh = file
     before = path.read_bytes()
     assert command(["--file", str(path), "--output-file", str(path), "--group", "Cut"]) == 2
-    assert "is the file that is read" in capfd.readouterr().err
+    assert "is the same file as --file" in capfd.readouterr().err
     assert path.read_bytes() == before
 
 
-# What `blender -c nicmm ...` does, for the bpy module, which has no command line of its own.
+# Does what `blender -c nicmm ...` does, since the bpy module has no command line.
 RUNNER = """
 import os
 import sys

@@ -10,7 +10,10 @@ import pytest
 from tests.blender import scenes
 
 CONVERGED = 3e-3
-"""An update goes on from the present curve, and stops where another step gains little."""
+"""Largest distance between two results of one request.
+
+An update starts from the current curve and stops when another step gains little.
+"""
 
 
 def module(extension, name):
@@ -23,11 +26,11 @@ def sphere(empty_scene):
 
 
 VERTICES = (42, 120, 123, 128)
-"""Vertices of the sphere, once round it."""
+"""Vertices of the sphere on a loop around it."""
 
 
 def draw(mesh_object, **settings):
-    """A designed curve on the mesh, which stays active."""
+    """A designed curve on the mesh; the mesh stays active."""
     scenes.activate(mesh_object)
     scenes.select(mesh_object, VERTICES)
     bpy.ops.nicmm.design_curve(**settings)
@@ -37,7 +40,7 @@ def draw(mesh_object, **settings):
 
 
 def places(curve):
-    """Positions of the curve's points, for either type of object, in its local space."""
+    """Positions of the points of a curve or hair curves object, in its local space."""
     if curve.type == "CURVE":
         return scenes.points(curve)
     values = np.empty(3 * len(curve.data.points), dtype=np.float32)
@@ -46,7 +49,7 @@ def places(curve):
 
 
 def pull(mesh_object, share=0.2):
-    """Deform the mesh unevenly, as a user does."""
+    """Deform the mesh unevenly, as in sculpting."""
     place = scenes.positions(mesh_object)
     place[:, 2] += share * place[:, 0] ** 2
     mesh_object.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
@@ -56,7 +59,7 @@ def pull(mesh_object, share=0.2):
 
 @pytest.mark.slow
 def assert_same_curve(one, other):
-    """Points of either polyline lie on the other."""
+    """Assert that the points of each polyline lie on the other polyline."""
     for points, line in ((one, other), (other, one)):
         start, step = line[:-1], np.diff(line, axis=0)
         share = np.einsum("psd,sd->ps", points[:, None] - start, step) / (step**2).sum(axis=1)
@@ -200,7 +203,7 @@ def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
     assert bpy.context.selected_objects == [mine[0]]
 
 
-# Live update. Timers do not run in a test, so the tests call the timer function.
+# Live update. Timers do not run in tests, so the tests call the timer function.
 
 
 @pytest.fixture

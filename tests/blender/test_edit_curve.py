@@ -1,4 +1,4 @@
-"""All control points of a curve set by a script, the record of curves, and the toolbar."""
+"""Setting all control points of a curve in a script, the record of a curve, and the toolbar."""
 
 from importlib import import_module
 
@@ -12,7 +12,7 @@ ROUNDING = 2e-6
 
 
 def on_surface(mesh_object, positions):
-    """The points of the object nearest to positions."""
+    """The points on the object nearest to some positions."""
     return [list(mesh_object.closest_point_on_mesh(place)[1]) for place in positions]
 
 
@@ -68,7 +68,7 @@ def test_settings_reach_the_core(empty_scene, sphere, places, settings):
     curve = edit(points=as_points(places), **settings)
     expected = expected_curve(empty_scene.core, sphere, places, **settings)
     np.testing.assert_allclose(scenes.points(curve), expected.points, atol=ROUNDING)
-    # An existing curve gets other settings.
+    # The settings of an existing curve are changed.
     bpy.context.view_layer.objects.active = sphere
     other = edit(points=as_points(places))
     assert edit(**settings) == other
@@ -156,7 +156,7 @@ def controls(curve):
 
 @pytest.mark.slow
 def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
-    """The same object, with its points, its settings, its material and its thickness."""
+    """The object keeps its points, settings, material and thickness."""
     curve = edit(points=as_points(places), closed=False, smoothness=2.0)
     material = bpy.data.materials.new("Gold")
     curve.data.materials.append(material)
@@ -278,17 +278,17 @@ def test_a_deleted_mesh_is_named(sphere, places):
 
 
 def test_the_redo_panel_runs_it_again(sphere, places):
-    """As in Blender: with the properties of the last call, on the state before it."""
+    """Like Blender, use the properties of the last call on the state before it."""
     bpy.ops.ed.undo_push(message="Before")
     bpy.ops.nicmm.edit_curve("EXEC_DEFAULT", True, points=as_points(places), closed=False)
     last = bpy.context.window_manager.operators
-    if last:  # kept in a window only
+    if last:  # Blender keeps the list in a window only
         assert len(last[-1].points) == len(places)
     bpy.ops.ed.undo()
     assert not scenes.curves()
 
 
-# Its places in the interface.
+# The tool in the interface.
 
 
 def test_the_tool_is_in_the_toolbar(empty_scene):

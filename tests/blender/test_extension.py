@@ -1,4 +1,4 @@
-"""Installing, enabling and disabling."""
+"""Installing, enabling and disabling the extension."""
 
 import os
 import subprocess
@@ -87,7 +87,7 @@ def test_menus_and_panel(extension):
 
 
 class Layout:
-    """Records how menu entries call their operators; Blender's own menus often `execute`."""
+    """Records the operator context of menu entries; it starts with one that skips `invoke`."""
 
     def __init__(self):
         self.operator_context, self.entries = "EXEC_REGION_WIN", []
@@ -163,7 +163,7 @@ def test_works_after_enabling_again(empty_scene, location):
 
 
 def test_properties_follow_the_options_of_the_core(empty_scene):
-    """Every option in the table is a property of the operators."""
+    """Every option in the table is a property of the operators, and so is an added option."""
     table = import_module(f"{empty_scene.name}.nicmm_core.options")
     settings = import_module(f"{empty_scene.name}.nicmm_blender.settings")
     record = import_module(f"{empty_scene.name}.nicmm_blender.scene.curve_record")

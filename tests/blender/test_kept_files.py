@@ -1,4 +1,4 @@
-"""Files saved by earlier versions: their curves can be converted, edited and updated."""
+"""Files saved by earlier versions: their curves can still be converted, edited and updated."""
 
 from importlib import import_module
 from pathlib import Path
@@ -26,7 +26,7 @@ def kept(request, extension):
 
 
 def drawn(curve):
-    """Positions of the points of either type of object, in its local space."""
+    """Positions of the points of a curve or hair curves object, in its local space."""
     if curve.type == "CURVE":
         return scenes.points(curve)
     return scenes.get(curve.data.points, "position", 3).astype(float)

@@ -1,4 +1,4 @@
-"""Maps made and painted from the panel, in the installed extension."""
+"""Maps that are created and painted from the panel, in the installed extension."""
 
 from importlib import import_module
 
@@ -15,7 +15,7 @@ ROLES = pytest.mark.parametrize(
 
 @pytest.fixture
 def cube(empty_scene):
-    """A cube with sharp edges, each side of 64 quads."""
+    """A cube with sharp edges; each side consists of 64 quads."""
     bpy.ops.mesh.primitive_cube_add()
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")

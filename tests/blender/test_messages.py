@@ -9,7 +9,7 @@ import build
 
 DOCUMENT = build.ROOT / "docs" / "troubleshooting.md"
 SHORTEST, WORDS = 12, 6
-"""Shortest part of a message to search for, in letters, and its words that are compared."""
+"""Fewest letters of a part of a message to compare, and the number of its words compared."""
 
 # Modules of the core with messages about a request, a start or an argument.
 CORE = (
@@ -33,7 +33,7 @@ KINDS = {
 
 
 def pieces(node):
-    """The fixed parts of a message, without inserted values."""
+    """The first words of the fixed parts of a message, without inserted values."""
     found = [
         part.value
         for part in ast.walk(node)
@@ -46,7 +46,7 @@ def pieces(node):
 
 
 def plain(text):
-    """Text in lower case without punctuation."""
+    """A text in lower case, without punctuation."""
     return " ".join(re.sub(r"[\W_]+", " ", text).split()).lower()
 
 
@@ -69,7 +69,7 @@ def of_core():
 
 
 def polls():
-    """Messages of disabled buttons: the constants of polls.py, and those in other modules."""
+    """Messages of disabled buttons: constants in polls.py, and literals in other modules."""
     for path in sorted((build.ROOT / "nicmm_blender").rglob("*.py")):
         text = path.read_text("utf-8")
         for message in re.findall(r'poll_message_set\("([^"]+)"\)', text):

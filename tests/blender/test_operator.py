@@ -9,7 +9,7 @@ import pytest
 
 from tests.blender import scenes
 
-# Blender keeps positions in single precision.
+# Blender stores positions in single precision.
 ROUNDING = 1e-6
 
 
@@ -191,7 +191,7 @@ def test_curve_object_belongs_to_the_mesh(empty_scene):
 
 
 def test_runs_again_while_the_new_curve_is_active(empty_scene):
-    """As Blender's redo panel needs it."""
+    """Blender's redo panel needs this."""
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 3))
     bpy.ops.nicmm.design_curve(spline="EXACT")
@@ -278,7 +278,7 @@ def test_unfinished_editing_is_used(empty_scene):
     bpy.ops.object.mode_set(mode="OBJECT")
     scenes.select(sphere, vertices)
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.transform.translate(value=(0, 0, 0.1))  # not yet in the mesh outside Edit Mode
+    bpy.ops.transform.translate(value=(0, 0, 0.1))  # not yet written to the mesh of Object Mode
     bpy.ops.nicmm.design_curve(spline="EXACT")
     bpy.ops.object.mode_set(mode="OBJECT")
     points = scenes.points(scenes.curves()[0])
@@ -298,7 +298,7 @@ def test_poll_gives_reasons(empty_scene):
     bpy.ops.object.mode_set(mode="OBJECT")
     scenes.select(sphere, [])
     bpy.ops.object.mode_set(mode="EDIT")
-    assert "Select the vertices" in refusal()
+    assert "select the vertices" in refusal()
 
 
 @pytest.mark.parametrize("field", ["obstacle_group", "alignment_group"])
@@ -336,7 +336,7 @@ def test_separate_parts_are_reported(empty_scene):
 
 @pytest.mark.slow
 def test_open_curve_is_not_cyclic(empty_scene):
-    """From the first selected vertex to the last; two are enough."""
+    """It runs from the first selected vertex to the last; two vertices are enough."""
     sphere = scenes.sphere()
     for count in (2, 4):
         vertices = scenes.ring(sphere, 4)[:count]
@@ -361,7 +361,7 @@ def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, 
     import_module(f"{empty_scene.name}.nicmm_blender.scene.designers").forget()
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
-    # As in a new session, where the core has not been loaded yet.
+    # Simulate a new session, in which the core has not been loaded yet.
     for name in list(sys.modules):
         if name.startswith(f"{empty_scene.name}.nicmm_core"):
             monkeypatch.delitem(sys.modules, name)

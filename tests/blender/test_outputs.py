@@ -28,7 +28,7 @@ def design(mode, **settings):
 
 
 def drawn(mesh_object):
-    """A designed curve object on the mesh, active."""
+    """A new curve object on the mesh; it is the active object."""
     assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
     curve = bpy.context.active_object
     assert curve is not mesh_object
@@ -52,7 +52,7 @@ def euler(mesh_object):
 
 
 def assert_sound(mesh_object):
-    """Blender finds nothing to repair, and edges keep their faces."""
+    """Assert that Blender finds nothing to repair and that every edge has one or two faces."""
     assert not mesh_object.data.validate(verbose=True)
     edited = bmesh.new()
     edited.from_mesh(mesh_object.data)
@@ -62,7 +62,7 @@ def assert_sound(mesh_object):
 
 
 def distances(points, mesh_edges, place):
-    """Distances of points to the nearest of some edges."""
+    """Distances from points to the nearest of some edges."""
     start, end = place[mesh_edges.T]
     along = end - start
     offset = points[:, None] - start
@@ -114,7 +114,7 @@ def test_open_curve_is_cut(monkey):
 
 
 def with_everything(mesh_object):
-    """Add layers of every type whose values identify their source; return the maps of faces."""
+    """Add layers of all types whose values identify their source; return the UV maps of faces."""
     data = mesh_object.data
     generator = np.random.default_rng(0)
     n_faces = len(data.polygons)
@@ -179,7 +179,7 @@ def test_everything_on_the_mesh_comes_along(monkey, mode, cut_faces):
     np.testing.assert_array_equal(get(data.polygons, "material_index", dtype=np.int32), face_id % 3)
     key = get(data.shape_keys.key_blocks["Stretched"].data, "co", 3)
     np.testing.assert_allclose(key, place * [1, 1, 3], atol=5 * ROUNDING)
-    # Parts of old edges keep their crease, and those across old faces have none.
+    # Parts of old edges keep their crease; new edges across old faces have none.
     crease = get(data.attributes["crease_edge"].data, "value")
     assert set(np.unique(crease)) == {np.float32(0.0), np.float32(0.25)}
     assert (crease == 0.25).sum() > n_edges
@@ -202,7 +202,7 @@ def test_custom_normals_come_along(monkey):
     normals = get(data.corner_normals, "vector", 3)
     loop_vertex = get(data.loops, "vertex_index", dtype=np.int32)
     cosine = (normals * wanted[loop_vertex]).sum(axis=1)
-    assert cosine.min() > 0.995  # normals are interpolated along chords
+    assert cosine.min() > 0.995  # normals are interpolated linearly
 
 
 @pytest.mark.slow
@@ -223,7 +223,7 @@ def test_region_is_selected(monkey, mode):
 
 
 def inside_faces(monkey):
-    """Faces inside by more than half, by the core."""
+    """Polygons with more than half of their area inside, computed by the core."""
     import nicmm_core as nicmm
 
     mesh = nicmm.Mesh(scenes.positions(monkey), triangles(monkey))
@@ -357,7 +357,7 @@ def test_parts_of_a_tube_need_no_region(empty_scene):
 
 
 def n_rim_edges(mesh_object):
-    """Edges of one face only."""
+    """Number of edges with exactly one face."""
     edited = bmesh.new()
     edited.from_mesh(mesh_object.data)
     count = sum(len(edge.link_faces) == 1 for edge in edited.edges)
@@ -399,7 +399,7 @@ def test_converting_is_designing_with_that_output(monkey, settings):
 
 
 def summary():
-    """Everything in the scene as numbers, by the kind of object."""
+    """The contents of the scene as arrays, by the type of object."""
     found = {}
     for candidate in bpy.data.objects:
         if candidate.type == "MESH":
@@ -497,7 +497,7 @@ def test_undo_of_converting_brings_the_curve_back(monkey):
 
 
 def refused(operator, **settings):
-    """Run an operator that must fail and leave the mesh unchanged."""
+    """Run an operator, which must fail and leave all meshes unchanged; return its report."""
     mesh_objects = [found for found in bpy.data.objects if found.type == "MESH"]
     before = [scenes.positions(found) for found in mesh_objects]
     names = [found.name for found in bpy.data.objects]
@@ -551,7 +551,7 @@ def test_changed_mesh_is_said(monkey):
     bpy.ops.nicmm.convert_curve(output="EDGES", keep_original=True)
     bpy.context.view_layer.objects.active = scenes.curves()[0]
     report = refused(bpy.ops.nicmm.convert_curve, output="CURVE")
-    assert "mesh has changed" in report and "Draw the curve again" in report
+    assert "mesh has changed" in report and "draw the curve again" in report
 
 
 def test_missing_mesh_is_said(monkey):

@@ -1,4 +1,4 @@
-"""The build script and what it puts into a zip."""
+"""The build script and the contents of its zips."""
 
 import re
 import subprocess

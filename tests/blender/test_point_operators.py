@@ -1,4 +1,4 @@
-"""The operators of single points: execution, undo in every mode, drafts, settings and errors."""
+"""Operators on single points: execution, undo in every mode, drafts, settings and errors."""
 
 from importlib import import_module
 
@@ -33,7 +33,7 @@ def the_curve():
 
 
 def content():
-    """Everything that the designed curves of the file consist of, by their names."""
+    """All data of the designed curves in the file, by the names of their objects."""
     found = {}
     for each in bpy.data.objects:
         if "nicmm_curve" in each:
@@ -189,7 +189,7 @@ def test_points_on_another_part_are_refused(empty_scene, sphere, places):
 
 
 def test_drafts_are_explained(sphere, places):
-    """A drawing of one point: every reader of records has a message, and it can go on."""
+    """A curve with one point: operators that need more points say so, and it can be continued."""
     call("add_point", position=places[0])
     draft = the_curve()
     words = "has 1 control point and no curve yet"
@@ -269,7 +269,7 @@ def test_settings_of_what_is_no_curve(sphere):
 
 
 def test_live_has_nothing_to_do_after_a_point(empty_scene, curve, places):
-    """What the operators write is up to date."""
+    """The operators write curves that are up to date."""
     live = module(empty_scene, "operators.live_update")
     bpy.context.scene.nicmm_live_update = True
     call("move_point", index=0, position=np.add(places[0], 0.0))
@@ -282,12 +282,12 @@ def test_live_has_nothing_to_do_after_a_point(empty_scene, curve, places):
 
 
 ANOTHER_MESH = 2
-"""The damage whose triangles are those of another mesh: the points are still known."""
+"""Index of the damage that makes the triangles those of another mesh but keeps the points."""
 
 
 @pytest.mark.parametrize("number", [n for n in range(len(DAMAGES)) if n != ANOTHER_MESH])
 def test_a_damaged_record_gets_a_message(empty_scene, curve, places, number):
-    """Every operator and every reader explains it and changes nothing."""
+    """Every operator explains the damage and changes nothing; reading settings raises no error."""
     DAMAGES[number](curve["nicmm_curve"])
     before = repr(curve["nicmm_curve"].to_dict())
     splines = [scenes.get(spline.points, "co", 4).tobytes() for spline in curve.data.splines]
@@ -337,11 +337,11 @@ def test_another_property_of_that_name_is_no_record(curve, value, sphere):
     assert "No curve was designed" in refusal("update_curves")
 
 
-# A drag, by the methods of the operator.
+# Dragging a point, tested through the methods of the operator.
 
 
 def live_of(extension, curve, number):
-    """A `LiveCurve` of an opened curve, and what gives its points with one moved."""
+    """A `LiveCurve`, a function that returns its points with one moved, and the opened curve."""
     edited_curve = module(extension, "outputs.edited_curve")
     opened = edited_curve.opened(bpy.context, curve)
 
@@ -354,7 +354,7 @@ def live_of(extension, curve, number):
 
 
 def test_every_move_of_a_drag_is_bounded(empty_scene, curve, sphere, places, monkeypatch):
-    """A move takes a few iterations of the core and never a design from scratch."""
+    """A move takes a few iterations of the relaxation and never a design from scratch."""
     live, moved, opened = live_of(empty_scene, curve, 1)
     designers = module(empty_scene, "scene.designers")
     designer = designers.designer_for(opened.surface.solved, opened.surface.faces)

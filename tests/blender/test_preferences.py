@@ -1,4 +1,4 @@
-"""Preferences, and properties common to all operators and panels."""
+"""Preferences, and rules that all operators and panels follow."""
 
 import importlib.metadata
 import importlib.util
@@ -89,12 +89,12 @@ def test_torch_is_reported_and_not_loaded(preferences, monkeypatch):
     assert scipy == f"SciPy {importlib.metadata.version('scipy')}"
     assert igl == f"libigl {importlib.metadata.version('libigl')}"
     assert torch.startswith("PyTorch 2") and "NICMM (Paper) can be used" in torch
-    assert "network" in network
+    assert "internet" in network
     preferences.library_report.cache_clear()
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name in ("torch", "igl") else found(name)
     )
     (_, igl, torch, _) = preferences.library_report()
-    assert igl.startswith("libigl is missing: install the zip")
+    assert igl.startswith("libigl is missing. Install the zip")
     assert torch.startswith("PyTorch was not found. Only the method")

@@ -1,4 +1,4 @@
-"""Difficult scenes: each gives a curve on the surface, or a message with the remedy."""
+"""Difficult scenes: each results in a curve on the surface, or in a message with the remedy."""
 
 from importlib import import_module
 
@@ -15,7 +15,7 @@ OUTPUTS = ("CURVE", "STICKY", "EDGES", "REGION", "PARTS")
 
 
 def refusal(**arguments):
-    """The report of the operator, which must leave the file unchanged."""
+    """Run the operator, which must fail and leave the file unchanged; return its report."""
     before = [(found.name, found.data) for found in bpy.data.objects], bpy.context.mode
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.nicmm.design_curve(spline="EXACT", **arguments)
@@ -24,7 +24,7 @@ def refusal(**arguments):
 
 
 def assert_on_surface(core, curve, mesh_object):
-    """A curve object's points are on the mesh, in its local space."""
+    """Assert that the points of a curve object lie on the mesh, in its local space."""
     mesh = core.Mesh(scenes.positions(mesh_object), scenes.triangles(mesh_object))
     surface_points = import_module(f"{core.__name__}.geometry.surface_points")
     _, distance = surface_points.nearest_points(mesh, scenes.points(curve))
@@ -65,7 +65,7 @@ def test_nothing_selected_in_edit_mode(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, [])
     bpy.ops.object.mode_set(mode="EDIT")
-    assert "Select the vertices" in refusal()
+    assert "select the vertices" in refusal()
 
 
 @pytest.mark.parametrize("hide", ["hide_set", "hide_viewport", "collection"])
@@ -265,7 +265,7 @@ def test_flat_scale_is_said(empty_scene):
 @pytest.mark.slow
 @pytest.mark.parametrize("output", OUTPUTS)
 def test_large_and_bent_faces(empty_scene, output):
-    """A prism with each end one face of sixteen corners, a star that is not flat."""
+    """A star-shaped prism, each end of which is a single non-planar face with sixteen corners."""
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     radius = np.where(np.arange(16) % 2, 0.6, 1.0)
     rings = [

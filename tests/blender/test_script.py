@@ -1,4 +1,4 @@
-"""The documented script, run as the documentation shows it, through the bpy module."""
+"""The script in the documentation, run with the documented arguments through the bpy module."""
 
 import os
 import re
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 SCRIPT = build.ROOT / "docs" / "examples" / "design_curve.py"
 
-# What `blender -b FILE --python SCRIPT -- ARGUMENTS` does, for the bpy module.
+# Does what `blender -b FILE --python SCRIPT -- ARGUMENTS` does, for the bpy module.
 RUNNER = """
 import runpy, sys
 import bpy, addon_utils
@@ -43,7 +43,7 @@ def test_documented_script(empty_scene, tmp_path):
     source, output = tmp_path / "head.blend", tmp_path / "out.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source))
 
-    # A user folder of its own: disabling the extension removes its wheels from the folder.
+    # The user folder is separate: disabling the extension removes its wheels from the folder.
     user_folder = tmp_path / "user"
     build.stage(user_folder / "extensions" / "user_default" / "nicmm_curves")
     arguments = [source, SCRIPT, "--", mesh_name, indices, output]

@@ -1,4 +1,4 @@
-"""Curves lie on the surface that the viewport shows: with modifiers, pose and frame."""
+"""Curves lie on the surface that the viewport shows, with its modifiers, pose and frame."""
 
 from importlib import import_module
 
@@ -12,7 +12,7 @@ from mathutils import Euler
 from tests.blender import scenes
 
 EXACT = 1e-6
-"""Distance from the shown surface, in diagonals."""
+"""Largest distance from the shown surface, in diagonals."""
 
 
 def module(extension, name):
@@ -32,7 +32,7 @@ def shown(mesh_object):
 
 
 def in_world(curve):
-    """World positions of the points of either type of object, after its modifiers."""
+    """World positions of the points of a curve or hair curves object, after its modifiers."""
     bpy.context.view_layer.update()
     if curve.type == "CURVES":
         local = scenes.evaluated_points(curve)
@@ -43,7 +43,7 @@ def in_world(curve):
 
 
 def away(curve, mesh_object):
-    """Greatest distance of a curve's points from the shown surface, in diagonals."""
+    """Largest distance of a curve's points from the shown surface, in diagonals."""
     return points_away(in_world(curve), mesh_object)
 
 
@@ -57,7 +57,7 @@ CHOSEN = (73, 365, 74, 366)
 
 
 def faces_at(faces, vertex):
-    """A triangle with a vertex."""
+    """Index of the first triangle that has a vertex."""
     return int((faces == vertex).any(axis=1).argmax())
 
 
@@ -110,7 +110,7 @@ def multires(mesh_object):
 
 
 def nodes(mesh_object):
-    """Geometry Nodes that subdivide and displace."""
+    """Add Geometry Nodes that subdivide and displace the mesh."""
     group = bpy.data.node_groups.new("Waves", "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -136,7 +136,7 @@ def nodes(mesh_object):
 
 
 def armature(mesh_object):
-    """A bone through the head that an action bends from frame 1 to 20."""
+    """Add an armature of two bones through the head; an action bends it from frame 1 to 20."""
     bpy.ops.object.armature_add()
     rig = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
@@ -228,7 +228,7 @@ def test_points_are_the_selected_vertices_where_they_are_shown(monkey, change):
     change(monkey)
     chosen = list(CHOSEN)
     curve = draw(monkey, chosen)
-    vertices, _ = shown(monkey)  # these modifiers keep vertices in front
+    vertices, _ = shown(monkey)  # these modifiers keep the first vertices
     assert scenes.distances_to(vertices[chosen], in_world(curve)).max() < 1e-6
 
 
@@ -303,7 +303,7 @@ def test_points_survive_a_change_of_level(monkey, levels):
     assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
     diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
     ends = in_world(curve)[[0, -1]]
-    # A level changes the shape itself.
+    # Another level changes the shape of the surface too.
     assert scenes.distances_to(places[[0, -1]], ends).max() < 0.02 * diagonal
     assert away(curve, monkey) < 1e-4
 
@@ -356,7 +356,7 @@ def test_sticky_curves_follow_an_animated_pose(monkey):
 
 @pytest.mark.parametrize("level", [0, 2, 3])
 def test_sticky_curves_follow_another_level(monkey, level):
-    """As a render with more levels shows them."""
+    """A render may use more levels than the viewport."""
     armature_and_subdivision(monkey)
     curve = draw(monkey, output="STICKY")
     before = in_world(curve)
@@ -365,7 +365,7 @@ def test_sticky_curves_follow_another_level(monkey, level):
         bpy.context.scene.frame_set(frame)
         assert away(curve, monkey) < EXACT
     bpy.context.scene.frame_set(20)
-    # Suzanne without the modifier is larger.
+    # Without the modifier Suzanne is larger.
     assert scenes.distances_to(before, in_world(curve)).max() < (0.05 if level else 0.15)
 
 
@@ -380,7 +380,7 @@ def test_cuts_are_exact_where_modifiers_only_deform(monkey, change):
     chain = [edge for edge in monkey.data.edges if edge.use_seam]
     vertices, _ = shown(monkey)
     on = vertices[sorted({v for edge in chain for v in edge.vertices})]
-    if change is armature:  # the weights of new vertices are those of the edges that they divide
+    if change is armature:  # the weights of new vertices are interpolated along edges
         assert scenes.distances_to(line, on).max() < 0.05
     assert len(chain) > 20
 

@@ -1,4 +1,4 @@
-"""Sticky curves: they follow the mesh, as strands or as a tube round them."""
+"""Sticky curves follow the mesh, as strands or as a tube around the strands."""
 
 from importlib import import_module
 
@@ -24,7 +24,7 @@ def module(extension, name):
 
 
 def sticky(mesh_object, **settings):
-    """The sticky curve created in a script."""
+    """A sticky curve, created as in a script."""
     bpy.context.view_layer.objects.active = mesh_object
     assert bpy.ops.nicmm.design_curve(output="STICKY", **settings) == {"FINISHED"}
     return bpy.context.active_object
@@ -37,7 +37,7 @@ def drawn_with(mesh_object, **settings):
 
 
 def on_deformed_mesh(mesh_object, curves_object):
-    """Positions of the stored triangles and coordinates on the mesh after its modifiers."""
+    """Positions of the stored barycentric coordinates on the mesh after its modifiers."""
     bpy.context.view_layer.update()
     deformed = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     place = get(deformed.vertices, "co", 3).astype(float)
@@ -104,7 +104,7 @@ def test_sticky_curve_follows_a_cast_and_an_armature(monkey):
 
 
 def shown_mesh(curves_object):
-    """The mesh that Blender shows for a hair curves object, or None where it shows strands."""
+    """The mesh that Blender shows for a hair curves object, or None if it shows strands."""
     bpy.context.view_layer.update()
     shown = [
         instance.object.data
@@ -115,7 +115,7 @@ def shown_mesh(curves_object):
 
 
 def rings(curves_object):
-    """Vertices of the tube round each point of the curve, (n, SIDES, 3)."""
+    """Positions of the tube's vertices around each point of the curve, (n, SIDES, 3)."""
     mesh = shown_mesh(curves_object)
     return get(mesh.vertices, "co", 3).astype(float).reshape(-1, SIDES, 3)
 
@@ -188,7 +188,7 @@ def test_tube_has_the_material_of_the_curve(monkey):
     assert [found.name for found in shown_mesh(curves).materials] == ["Rubber"]
 
 
-# Its default
+# The default of the tube
 
 
 def test_blender_draws_all_points_since_5(extension):
@@ -200,7 +200,7 @@ def test_blender_draws_all_points_since_5(extension):
 
 @pytest.fixture(params=[True, False], ids=["all points", "few points"])
 def all_points(request, extension, monkeypatch):
-    """Blender with and without all points of hair curves."""
+    """Simulate a Blender that draws all points of hair curves, and one that does not."""
     sticky_curves = module(extension, "outputs.sticky_curves")
     monkeypatch.setattr(sticky_curves, "are_drawn_with_all_points", lambda: request.param)
     return request.param
@@ -208,7 +208,7 @@ def all_points(request, extension, monkeypatch):
 
 @pytest.fixture
 def window(extension, monkeypatch):
-    """Operators begin with `invoke`, which Blender does not call without a window."""
+    """Make operators begin with `invoke`, which Blender does not call without a window."""
     design = module(extension, "operators.design_curve").NICMM_OT_design_curve
     convert = module(extension, "operators.convert_curve").NICMM_OT_convert_curve
     for operator in (design, convert):

@@ -1,4 +1,4 @@
-"""Long work in turns, and the operators that use it, without a window."""
+"""Long work in time slices (turns), and the operators that use it, without a window."""
 
 import threading
 from importlib import import_module
@@ -19,7 +19,7 @@ def turns(extension):
 
 
 def counting(steps, seen, thread=None):
-    """Work that reports each of its steps and records its thread."""
+    """A function that reports a number of steps as progress and records the thread of each."""
 
     def work(progress):
         for step in range(steps):
@@ -61,7 +61,7 @@ def test_cancelled_work_leaves_no_thread(turns):
     assert threading.active_count() == before
     assert work.result() == "stopped"
     assert len(seen) == 1
-    turns.Work(counting(1, seen)).cancel()  # never begun
+    turns.Work(counting(1, seen)).cancel()  # cancelled before its first turn
     assert len(seen) == 1
 
 
@@ -92,7 +92,7 @@ def test_disabling_ends_what_is_parked(empty_scene, turns):
 
 
 class Window:
-    """The parts of Blender's context that an operator in a window uses."""
+    """Stands in for the parts of Blender's context that an operator in a window uses."""
 
     def __init__(self, operators, mesh_object):
         self.events, self.texts, self.timers, self.reports = [], [], [], []
@@ -119,7 +119,7 @@ class Window:
 
 @pytest.fixture
 def window(empty_scene, monkeypatch):
-    """An operator as the window runs it, with no waiting time; background mode has no events."""
+    """An operator as a window runs it, without waiting time: background mode sends no events."""
     design_curve = import_module(f"{empty_scene.name}.nicmm_blender.operators.design_curve")
     long_solves = import_module(f"{empty_scene.name}.nicmm_blender.operators.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
@@ -155,7 +155,7 @@ def window(empty_scene, monkeypatch):
 
 
 def slow(answer_all):
-    """Answers that show a partial curve first."""
+    """Wrap `answer_all` so that it reports a partial curve first."""
 
     def answer(requests, progress):
         for step in range(3):
@@ -183,7 +183,7 @@ def test_long_solve_shows_progress_and_ends(window):
     assert not window.timers
     assert window.texts[-1] is None
     percents = [text.partition(":")[2].split()[0] for text in window.texts[:-1]]
-    assert percents[:3] == ["0", "10", "20"]
+    assert percents[:3] == ["0%", "10%", "20%"]
     assert all("Esc: Cancel" in text for text in window.texts[:-1])
     (stepped,) = scenes.curves()
     bpy.context.view_layer.objects.active = window.sphere
@@ -221,7 +221,7 @@ def test_mesh_that_changes_meanwhile_is_said(window):
         result = operator.modal(context, event("TIMER"))
     assert result == {"CANCELLED"}
     ((kind, message),) = window.reports
-    assert kind == {"ERROR"} and "has changed while the curve was computed" in message
+    assert kind == {"ERROR"} and "changed while the curve was being computed" in message
     assert not scenes.curves()
 
 

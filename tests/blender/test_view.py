@@ -1,4 +1,4 @@
-"""The view: from pixels to points of the mesh and back, and what can be picked there."""
+"""The view: maps pixels to points on the mesh and back, and finds what can be picked."""
 
 from importlib import import_module
 
@@ -16,7 +16,7 @@ def module(extension, name):
 
 
 def matrices(eye, perspective):
-    """A view of 800 × 600 pixels from a point of the y axis towards the origin."""
+    """The matrix of a view of 800 × 600 pixels from a point on the y axis towards the origin."""
     near, far, half = 0.1, 100.0, 0.5
     forward = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, eye], [0, 0, 0, 1.0]])
     ratio = 600 / 800
@@ -32,7 +32,7 @@ def matrices(eye, perspective):
 
 
 def drawn(extension, mesh_object):
-    """A curve through five points round a sphere, opened."""
+    """A curve through five points around a sphere, opened for editing."""
     bpy.context.view_layer.objects.active = mesh_object
     places = [mesh_object.closest_point_on_mesh(place)[1] for place in scenes.five_places()]
     points = [{"name": "", "position": place} for place in places]
@@ -61,7 +61,7 @@ def test_pixels_and_places(empty_scene, perspective, scale):
         found = view.place_at(pixel)
         place = opened.surface.points(found.faces, found.barycentric)
         np.testing.assert_allclose(view.project(place)[0], pixel, atol=1e-3)
-        assert place[0, 1] < 0  # the side that looks at the eye
+        assert place[0, 1] < 0  # on the side that faces the eye
         assert view.visible(place).all()
         assert not view.visible(place * [1, -1, 1]).any()
     assert view.place_at([10.0, 10.0]) is None
@@ -91,7 +91,7 @@ def test_only_what_is_visible_is_picked(empty_scene):
 
 
 def test_a_tube_over_the_horizon_is_picked_where_it_is_seen(empty_scene):
-    """The line is behind the sphere; a tube about it of a tenth of its radius is not."""
+    """The sphere hides the curve, but not a tube around it with a tenth of the sphere's radius."""
     opened = drawn(empty_scene, scenes.sphere(5))
     view = looking(empty_scene, opened, perspective=False)
     angles = np.linspace(0.3, np.pi - 0.3, 60)
@@ -106,5 +106,5 @@ def test_a_tube_over_the_horizon_is_picked_where_it_is_seen(empty_scene):
     assert view.nearest_on_line(over, line, 2.0, radius=0.1) is not None
     assert view.nearest_on_line(over, line, 2.0, radius=0.01) is None
     assert view.nearest_on_line(over + [0, 30.0], line, 2.0, radius=0.1) is None
-    # In the middle of the sphere the front hides the tube.
+    # In the middle of the view the front of the sphere hides the tube.
     assert view.nearest_on_line(CENTRE, line * [1, 1, 0], 2.0, radius=0.1) is None

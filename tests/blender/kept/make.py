@@ -1,8 +1,8 @@
-"""How the file of a version was made: every kind of curve, record, map and output.
+"""Makes the file of a version with every kind of curve, record, map and output.
 
     BLENDER_USER_RESOURCES=FOLDER python tests/blender/kept/make.py FILE.blend
 
-where FOLDER holds the extension of that version. Files of released versions are never made again:
+FOLDER contains the extension of that version. The files of released versions are never made again:
 `test_kept_files.py` opens, edits and updates them.
 """
 
@@ -67,7 +67,7 @@ def make(path):
     draw(body, "Variational", around, method="VARIATIONAL", thickness=0.0)
     draw(body, "Sticky", around, output="STICKY", thickness=0.01)
     draw(body, "Tube", around, output="STICKY", tube=True, closed=False)
-    # Points inside faces, as clicks give them.
+    # Points inside faces, as mouse clicks create them.
     bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = body
     places = [(0.9, 0.1, 0.4), (0.1, 0.9, -0.4), (-0.9, 0.1, 0.4), (-0.1, -0.9, -0.4)]
@@ -75,7 +75,7 @@ def make(path):
     points = [{"name": "", "position": place} for place in places]
     assert bpy.ops.nicmm.edit_curve(points=points) == {"FINISHED"}
     bpy.context.active_object.name = "Placed"
-    # Outputs that change their mesh, each on one of its own.
+    # Outputs that change their mesh, each on a separate mesh.
     for number, (name, settings) in enumerate(
         {
             "Edges": {"output": "EDGES", "mark_seam": True, "mark_sharp": True},
