@@ -1,4 +1,5 @@
 """Level sets whose zero set is the curve: distance, features, energy, topology and contour.
 
-`problem` builds the input and `contour` extracts the curve; `variational` minimises the energy.
+`problem` builds the input of the solvers, `variational` is the solver without a network, and
+`contour` extracts the curve.
 """

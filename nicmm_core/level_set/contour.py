@@ -1,9 +1,10 @@
 """The zero level set of φ as curves on the input mesh.
 
-φ is linear in every working face, so its zero set crosses each face in one straight segment and
+φ is linear in every working face, so its zero set crosses each face in one straight segment, and
 the polyline lies on the surface by construction. Control points are vertices where φ is exactly
 zero. A vertex close to the contour counts as zero too, if that only collapses a few tiny segments
-into one point. At any other vertex a value of 0 counts as positive, or the contour would branch.
+into one point. At all other vertices a value of 0 counts as positive; otherwise the contour would
+branch.
 """
 
 from __future__ import annotations
@@ -19,17 +20,20 @@ from .sign_bundle import SignBundle, local_signs
 from .vertex_links import VertexLinks
 
 PASSING_MARGIN = 0.03
-"""The contour snaps to a vertex if it crosses all edges there within this fraction of them."""
+"""Fraction of an edge's length, from a vertex, within which the contour may snap to the vertex.
+
+Every edge at the vertex that the contour crosses has to be crossed within this fraction.
+"""
 
 CROSSING_MARGIN = 1e-6
-"""Least distance of a crossing from the ends of its edge, as a fraction of the edge.
+"""Least distance of a crossing from the ends of its edge, as a fraction of the edge's length.
 
-Separates neighbouring points of the polyline where φ is almost zero at a vertex.
+It keeps neighbouring points of the polyline apart where φ is almost zero at a vertex.
 """
 
 
 def signs_with_zeros(field: FloatArray, zero_vertices: IntArray) -> IntArray:
-    """Sign of φ at every vertex: 0 at the vertices given, +1 or -1 elsewhere, shape (n,)."""
+    """Sign of φ at every vertex: 0 at ``zero_vertices``, +1 or -1 elsewhere, shape (n,)."""
     sign = np.where(field >= 0.0, 1, -1)
     sign[zero_vertices] = 0
     return sign
@@ -42,13 +46,14 @@ def extract_curves(
     control_vertices: IntArray,
     bundle: SignBundle | None = None,
 ) -> list[SurfaceCurve]:
-    """Zero level set of a field that is linear in each face.
+    """Extract the zero level set of a field that is linear in each face.
 
     Parameters
     ----------
     mesh : Mesh
         The input mesh.
     working : WorkingMesh
+        The working mesh of the input mesh, with n vertices.
     field : (n,) float array
         φ at the working vertices; its values at the control vertices count as zero.
     control_vertices : (k,) int array
@@ -59,19 +64,20 @@ def extract_curves(
     Returns
     -------
     list of SurfaceCurve
-        Those with most control points first, then the longest. A curve that ends at the boundary of
-        the mesh, or at an end of the bundle, is open.
+        Curves sorted by number of control points, then by length, both descending. A curve that
+        ends at the boundary of the mesh, or at an end of the bundle, is open.
     """
     passed = _passed_vertices(working, field, control_vertices, bundle)
     through = np.concatenate([control_vertices, passed])
     segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
-    # A node is an edge on which φ changes sign, smaller vertex first, or a zero vertex twice.
+    # A node is the pair of ends of an edge on which φ changes sign, smaller vertex first, or a zero
+    # vertex twice.
     nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
     for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
         chain, along = _directed(chain, along, closed, nodes, control_vertices)
         parent = working.parent_face[segment_face[along]]
-        # The last point of an open chain has no segment after it and lies on the one before.
+        # No segment starts at the last point of an open chain, so it gets the last segment's face.
         parent = parent if closed else np.append(parent, parent[-1])
         barycentric = _barycentric(mesh, working, field, nodes[chain], parent)
         visited = _positions_in(nodes[chain], control_vertices)
@@ -86,9 +92,9 @@ def _passed_vertices(
     control_vertices: IntArray,
     bundle: SignBundle | None,
 ) -> IntArray:
-    """Vertices to which the contour snaps.
+    """Vertices to which the contour snaps, besides the control vertices.
 
-    They are simple, and neither neighbours of each other nor of control vertices.
+    They are simple vertices, and not neighbours of one another or of control vertices.
     """
     sign = signs_with_zeros(field, control_vertices)
     _, ends = _crossings(working.faces, sign, bundle)
@@ -117,21 +123,25 @@ def segment_ends(
     sign: IntArray,
     bundle: SignBundle | None = None,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Faces that the zero set crosses, with both ends of its segment in each.
+    """Find the faces that the zero set crosses, and the ends of its segment in each.
 
     Parameters
     ----------
     vertices : (n, 3) float array
     faces : (m, 3) int array
     field : (n,) float array
+        φ at the vertices.
     sign : (n,) int array
-        As from `signs_with_zeros`.
+        Signs of φ, from `signs_with_zeros`.
     bundle : SignBundle, optional
+        Signs with which faces read the values of their corners.
 
     Returns
     -------
     crossed : (s,) int array
+        Indices of the crossed faces.
     start, end : (s, 3) float array
+        Positions of the two ends of each segment.
     """
     crossed, ends = _crossings(faces, sign, bundle)
     first, second = ends.transpose(2, 0, 1)
@@ -143,9 +153,9 @@ def segment_ends(
 def _crossings(
     faces: IntArray, sign: IntArray, bundle: SignBundle | None
 ) -> tuple[IntArray, IntArray]:
-    """Faces that the zero set crosses, (s,), and the two ends of each segment, (s, 2, 2).
+    """Faces that the zero set crosses, (s,), and the two ends of its segments, (s, 2, 2).
 
-    An end is the edge on which the sign changes, smaller index first, or a zero vertex twice.
+    An end is an edge on which the sign changes, smaller vertex first, or a zero vertex twice.
     """
     corner_sign = local_signs(sign, faces, bundle)
     crossed = np.flatnonzero((corner_sign == 1).any(axis=1) & (corner_sign == -1).any(axis=1))
@@ -163,17 +173,17 @@ def _crossings(
 
 
 def _crossing_fraction(field: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
-    """Position of the zero of φ on an edge, as a fraction from its first end; 0 at a vertex."""
+    """Position of the zero of φ on each edge, as a fraction from the first end; 0 at a vertex."""
     here, there = np.abs(field[first]), np.abs(field[second])
     fraction = here / np.maximum(here + there, np.finfo(np.float64).tiny)
     return np.where(first == second, 0.0, fraction)
 
 
 def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, bool]]:
-    """Join segments into paths: (nodes, segments in between, closed), each segment used once.
+    """Join segments into chains: (nodes, segments between them, closed), using each segment once.
 
-    A path ends where more than two segments meet; on a manifold that happens only at vertices that
-    two strands pass.
+    A chain ends where more than two segments meet. On a manifold that happens only at a vertex
+    through which two strands pass.
     """
     at_node: list[list[int]] = [[] for _ in range(n_nodes)]
     for segment, (a, b) in enumerate(segments.tolist()):
@@ -209,9 +219,10 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
 def _directed(
     chain: IntArray, along: IntArray, closed: bool, nodes: IntArray, control_vertices: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """A chain, and its segments, from its first control point towards the second.
+    """Direct a chain and its segments so that it passes the control points in their order.
 
-    An open chain keeps its ends, and passes its first control point before its last one.
+    A closed chain starts at its first control point and runs towards the second. An open chain
+    keeps its two ends, and passes its first control point before its last one.
     """
     where = _positions_in(nodes[chain], control_vertices)
     where = where[where >= 0]
@@ -226,7 +237,7 @@ def _directed(
 
 
 def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
-    """Index of each control vertex among the nodes, -1 if it is not one of them, shape (k,)."""
+    """Index of each control vertex among the nodes, or -1 if it is not a node, shape (k,)."""
     at_vertex = np.flatnonzero(nodes[:, 0] == nodes[:, 1])
     found = {int(nodes[i, 0]): int(i) for i in at_vertex}
     return np.array([found.get(int(vertex), -1) for vertex in control_vertices], dtype=np.int64)
@@ -235,7 +246,7 @@ def _positions_in(nodes: IntArray, control_vertices: IntArray) -> IntArray:
 def _barycentric(
     mesh: Mesh, working: WorkingMesh, field: FloatArray, nodes: IntArray, parent: IntArray
 ) -> FloatArray:
-    """Coordinates of contour nodes in the input faces given, shape (p, 3)."""
+    """Barycentric coordinates of contour nodes in the input faces ``parent``, shape (p, 3)."""
     first, second = nodes.T
     fraction = _crossing_fraction(field, first, second)
     fraction = np.clip(fraction, CROSSING_MARGIN, 1.0 - CROSSING_MARGIN)[:, None]

@@ -16,33 +16,34 @@ from .sign_bundle import SignBundle, corner_matrix
 from .sparse_solver import DEGENERATE
 
 MOLLIFICATION = 1e-8
-"""Least excess of two sides of a face over the third, in mean edge lengths.
+"""Least amount by which two sides of a face exceed the third, in mean edge lengths.
 
-It corresponds to angles of about 0.01°; cotangents are computed from lengths, with less rounding
-error.
+It corresponds to angles of about 0.01°. Cotangents are computed from edge lengths, with less
+rounding error.
 """
 
 
 @dataclass(frozen=True)
 class FiniteElements:
-    """Operators for n vertices and m faces; lengths are in the unit of the vertices given.
+    """Operators for n vertices and m faces; lengths are in the unit of the vertex positions.
 
     Attributes
     ----------
     face_areas : (m,) float array
     vertex_areas : (n,) float array
-        Barycentric (a third of the faces around), positive.
+        Barycentric area of each vertex, a third of its adjacent faces; positive.
     gradient : (3 m, n) sparse array
         Gradient of a linear function in each face; all x components, then y, then z.
     stiffness : (n, n) sparse array
-        Cotangent stiffness: positive semidefinite, zero on constants.
+        Cotangent stiffness: positive semidefinite, and zero on constants unless a sign bundle is
+        used.
     laplacian : (n, n) sparse array
-        Pointwise Laplacian, ``-stiffness / vertex_areas``. Rows of some vertices are zero, such as
-        those on the boundary, where the stiffness contains the boundary flux.
+        Pointwise Laplacian, ``-stiffness / vertex_areas``. Rows of selected vertices are zero, such
+        as those on the boundary, where the stiffness contains the boundary flux.
     centroid : (m, n) sparse array
         Value of a linear function at the centroid of each face.
     plain_centroid : (m, n) sparse array
-        The same for ordinary functions, without the signs of a bundle.
+        The same values for ordinary functions, without the signs of a bundle.
     """
 
     face_areas: FloatArray
@@ -57,9 +58,9 @@ class FiniteElements:
 def mollified(lengths: FloatArray) -> FloatArray:
     """Edge lengths of faces, increased so that every face has an area, shape (m, 3).
 
-    The same length is added to all edges: the least with which two sides of every face exceed the
-    third by `MOLLIFICATION` (Sharp and Crane, "A Laplacian for nonmanifold triangle meshes", 2020).
-    On meshes without slivers it is zero.
+    The same length is added to all edges: the least length for which any two sides of every face
+    exceed the third by `MOLLIFICATION` (Sharp and Crane, "A Laplacian for nonmanifold triangle
+    meshes", 2020). On meshes without slivers it is zero.
     """
     slack = lengths.sum(axis=1) - 2.0 * lengths.max(axis=1)
     return lengths + max(0.0, MOLLIFICATION * float(lengths.mean()) - float(slack.min()))
@@ -71,16 +72,25 @@ def build_finite_elements(
     without_laplacian: BoolArray,
     bundle: SignBundle | None = None,
 ) -> FiniteElements:
-    """Assemble the operators of a mesh (in double precision).
+    """Assemble the operators of a mesh, in double precision.
 
     Parameters
     ----------
     vertices : (n, 3) float array
     faces : (m, 3) int array
     without_laplacian : (n,) bool array
-        Vertices whose rows of the Laplacian are zero, such as those on the boundary.
+        Whether a vertex has a zero row in the Laplacian, such as the vertices on the boundary.
     bundle : SignBundle, optional
         Signs with which faces read the values of their corners.
+
+    Returns
+    -------
+    FiniteElements
+
+    Raises
+    ------
+    MeshError
+        If a face has no area.
     """
     n_vertices, n_faces = len(vertices), len(faces)
     face_areas = triangle_areas(vertices, faces)

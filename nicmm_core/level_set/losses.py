@@ -1,11 +1,11 @@
-"""The energy of a curve on the working mesh (Eq. 2–8), one function per term.
+"""The energy of a level set on the working mesh (Eq. 2–8), one function per term.
 
 Lengths are in units of the square root of the surface's area, so that no term depends on the unit
 or the size of the model. The integrals are sums over faces: the Voronoi area of vertex i in
-triangle t is taken as |t|/3 (Eq. 8), so the three corners of a face add up to its area, and every
-integrand is evaluated at the centroid.
+triangle t is taken as |t|/3 (Eq. 8), so the areas at the three corners of a face add up to the
+face's area, and every integrand is evaluated at the centroid.
 
-The functions accept NumPy arrays and tensors.
+The functions accept NumPy arrays and torch tensors.
 """
 
 from __future__ import annotations
@@ -18,29 +18,40 @@ from ..geometry.array_types import Array, FloatArray
 from .problem import Problem
 
 Operator = Callable[[Array], Array]
-"""A linear map of vectors."""
+"""A linear map from vectors to vectors."""
 
 DELTA_WIDTH = 1.0
-"""σ of the Gaussian for the Dirac delta, in mean edge lengths.
+"""σ of the Gaussian that stands for the Dirac delta, in mean edge lengths.
 
-The least width that centroids sample: the delta then covers the band of three edge lengths in
-which the paper tests convergence.
+It is the least width that samples at centroids resolve. The Gaussian then covers the band of three
+edge lengths in which the paper tests convergence.
 """
 
 
 MOST_BENDING = 0.25
-"""Greatest weighted smoothness term at φ₀."""
+"""Upper bound of the weighted smoothness term at φ₀."""
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """The λ of Eq. 2.
+    """The weights λ of Eq. 2.
 
-    The paper gives λ_int = 5000, λ_smooth = 500 and λ_fea without a unit. Here lengths are in
-    square roots of the surface's area. In this unit λ_smooth = 500 would flatten φ to zero, since a
-    smaller slope lowers (Δφ)² and widens the Gaussian. λ_smooth is a length; 0.01 is about the
-    largest value with |∇φ| near 1 beside the curve. λ_fea, an inverse length, also acts as a
-    tension; alignment holds the curve against bending at 0.3, but not at 0.1.
+    The paper gives λ_int = 5000, λ_smooth = 500 and λ_fea without a unit. Here lengths are in units
+    of the square root of the surface's area. In this unit λ_smooth = 500 would flatten φ to zero,
+    since a smaller slope lowers (Δφ)² and widens the Gaussian. λ_smooth is a length; 0.01 is about
+    the largest value for which |∇φ| stays near 1 beside the curve. λ_fea, an inverse length, also
+    acts as a tension. At 0.3 alignment holds the curve against bending, but not at 0.1.
+
+    Attributes
+    ----------
+    sdf : float
+        Weight of the level-set constraint, Eq. 3.
+    interpolation : float
+        λ_int, Eq. 4.
+    smooth : float
+        λ_smooth, Eq. 6.
+    feature : float
+        λ_fea, Eq. 7.
     """
 
     sdf: float = 1.0
@@ -57,13 +68,16 @@ class EnergySurface:
     ----------
     face_areas : (m,) array
     gradient : operator (3 m, n)
+        Gradient in every face; all x components, then y, then z.
     laplacian : operator (n, n)
+        Pointwise Laplacian at the vertices.
     centroid : operator (m, n)
+        Values at the centroids of the faces.
     control_vertices : (k,) array
     delta_width : float
-        σ of the Gaussian that stands for the Dirac delta, in the unit of length.
+        σ of the Gaussian that stands for the Dirac delta, in units of the problem.
     feature_map : (m,) array or None
-        φ_fea at centroids.
+        φ_fea at the centroids of the faces.
     """
 
     face_areas: Array
@@ -76,7 +90,7 @@ class EnergySurface:
 
 
 def energy_surface(problem: Problem) -> EnergySurface:
-    """The surface of a problem as NumPy arrays; see `tensors.surface_tensors` for tensors."""
+    """The surface of a problem as NumPy arrays; `tensors.surface_tensors` returns tensors."""
     elements = problem.elements
     phi_fea = problem.feature_map
     return EnergySurface(
@@ -91,7 +105,7 @@ def energy_surface(problem: Problem) -> EnergySurface:
 
 
 def root_delta(value: Array, width: float) -> Array:
-    """√G_σ(φ), without a square root, whose derivative is infinite where G underflows."""
+    """√G_σ(φ), computed without a square root, whose derivative is infinite if G underflows."""
     return math.e ** (-0.25 * (value / width) ** 2) / math.sqrt(width * math.sqrt(2.0 * math.pi))
 
 
@@ -150,7 +164,7 @@ def feature_loss(surface: EnergySurface, phi: Array) -> Array:
 
 
 def loss_terms(surface: EnergySurface, phi: Array) -> dict[str, Array]:
-    """The four terms of Eq. 2, unweighted."""
+    """The four terms of Eq. 2 by name, unweighted."""
     return {
         "sdf": sdf_loss(surface, phi),
         "int": interpolation_loss(surface, phi),
@@ -160,16 +174,16 @@ def loss_terms(surface: EnergySurface, phi: Array) -> dict[str, Array]:
 
 
 def energy_of(problem: Problem, field: FloatArray) -> dict[str, float]:
-    """The terms of the energy of a level set, unweighted, as numbers."""
+    """The four terms of the energy of a level set by name, unweighted, as floats."""
     terms = loss_terms(energy_surface(problem), field)
     return {name: float(value) for name, value in terms.items()}
 
 
 def balanced(weights: LossWeights, problem: Problem) -> LossWeights:
-    """Lower λ_smooth where bending would outweigh the level-set term at φ₀.
+    """Lower λ_smooth if bending would outweigh the level-set term at φ₀.
 
     A flat φ costs ½ in Eq. 3 and nothing in Eq. 6. If bending costs as much, as with many points or
-    a large smoothness, the minimum would be a flat φ without a curve.
+    a large smoothness, the minimum is a flat φ, which has no curve.
     """
     bending = float(smoothness_loss(energy_surface(problem), problem.initial_distance))
     if weights.smooth * bending <= MOST_BENDING:
@@ -178,7 +192,7 @@ def balanced(weights: LossWeights, problem: Problem) -> LossWeights:
 
 
 def total_loss(terms: dict[str, Array], weights: LossWeights) -> Array:
-    """L_total, Eq. 2."""
+    """L_total of Eq. 2, the weighted sum of the terms."""
     return (
         weights.sdf * terms["sdf"]
         + weights.interpolation * terms["int"]

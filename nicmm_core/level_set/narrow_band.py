@@ -1,9 +1,10 @@
-"""The energy on a narrow band about the curve, with its Gauss–Newton system.
+"""The energy on a narrow band around the curve, and its Gauss–Newton system.
 
-The unknowns are φ at the vertices of the band's faces except control points, where φ is zero. The
-level-set term acts on all faces of the band. The bending and feature terms act only on faces whose
-corners have all their faces in the band: an incomplete Laplacian would treat φ outside as zero and
-attract spurious curves along the rim.
+The unknowns are the values of φ at the vertices of the band's faces, except at control points,
+where φ is zero. The level-set term acts on all faces of the band. The bending and feature terms act
+only on inner faces: every face around each corner of an inner face is in the band. On other faces
+an incomplete Laplacian would treat φ as zero outside the band and attract spurious curves along the
+rim.
 """
 
 from __future__ import annotations
@@ -25,31 +26,33 @@ from .losses import (
 from .problem import Problem
 
 MASS_SHARE = 0.01
-"""Factor of the mass matrix over h² in the damping; it makes the system definite."""
+"""Factor of the mass matrix, divided by h², in the damping; it makes the system definite."""
 
 
 @dataclass(frozen=True)
 class NarrowBand:
-    """Operators of u unknowns on b faces, c of which have complete neighbourhoods.
+    """Operators for u unknowns on the b faces of a band, c of which are inner faces.
 
     Attributes
     ----------
     unknowns : (u,) int array
-        Working vertices.
+        Working vertices at which φ is unknown.
     face_areas : (b,) float array
+        Areas of all faces of the band.
     gradient : (3 b, u) sparse array
-        All x components, then y, then z.
+        ∇φ in every face; all x components, then y, then z.
     inner_areas : (c,) float array
+        Areas of the inner faces.
     laplacian : (c, u) sparse array
-        Δφ at centroids.
+        Δφ at the centroids of the inner faces.
     centroid : (c, u) sparse array
-        φ at centroids.
+        φ at the centroids of the inner faces.
     feature_map : (c,) float array or None
-        φ_fea at centroids.
+        φ_fea at the centroids of the inner faces.
     damping : (u, u) sparse array
-        Stiffness with a small mass term: the norm of the damping.
+        Matrix of the norm in which steps are damped: the stiffness plus a small mass term.
     delta_width : float
-        σ of the Gaussian for the Dirac delta.
+        σ of the Gaussian that stands for the Dirac delta.
     """
 
     unknowns: IntArray
@@ -65,20 +68,20 @@ class NarrowBand:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of the energy at one φ, and the values that its derivatives need.
+    """Residuals of the energy for one φ, and values from which its derivatives are computed.
 
     Attributes
     ----------
     gradient : (3 b,) float array
-        ∇φ, all x components, then y, then z.
+        ∇φ in every face; all x components, then y, then z.
     slope : (b,) float array
         Residual of Eq. 3 in every face.
     centroid : (c,) float array
-        φ at centroids.
+        φ at the centroids of the inner faces.
     bending : (c,) float array
-        Residual of Eq. 6.
+        Residual of Eq. 6 in the inner faces.
     feature : (c,) float array or None
-        Residual of Eq. 7.
+        Residual of Eq. 7 in the inner faces.
     energy : float
         λ-weighted sum of ½ ∫ residual².
     """
@@ -92,14 +95,15 @@ class Residuals:
 
 
 def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) -> NarrowBand:
-    """The faces whose centroids are within the half width of the zero set.
+    """Build the operators on the faces whose centroids lie within the half width of the zero set.
 
     Parameters
     ----------
     problem : Problem
     field : (n,) float array
-        Approximately a signed distance, in units of the problem.
+        φ, approximately a signed distance, in units of the problem.
     half_width : float
+        Half width of the band, in units of the problem.
     """
     elements, faces = problem.elements, problem.working.faces
     n_faces, n_vertices = len(faces), len(field)
@@ -134,7 +138,7 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
 
 
 def evaluate(band: NarrowBand, weights: LossWeights, values: FloatArray) -> Residuals:
-    """Residuals and energy of φ at the unknowns, (u,)."""
+    """Residuals and energy for given values of φ at the unknowns, (u,)."""
     gradient = band.gradient @ values
     slope = slope_residual((gradient.reshape(3, -1) ** 2).sum(axis=0))
     centroid = band.centroid @ values
@@ -153,15 +157,15 @@ def gauss_newton_system(
 ) -> tuple[sparse.csr_array, FloatArray]:
     """Positive semidefinite Hessian (u, u) and gradient (u,) of the energy.
 
-    JᵀJ of all residuals, plus the second derivative of |∇φ|² in faces with a slope above 1;
-    elsewhere it would make the Hessian indefinite.
+    The Hessian is the weighted JᵀJ of all residuals plus the second derivative of |∇φ|² in faces
+    where the slope is above 1. In other faces that derivative would make it indefinite.
     """
     n_faces = len(band.face_areas)
     # Row f holds 2 ∇φ of face f; times the gradient operator it is the derivative of |∇φ|².
     components = (np.tile(np.arange(n_faces), 3), np.arange(3 * n_faces))
     along = sparse.csr_array((2.0 * residuals.gradient, components))
     slope = along @ band.gradient
-    # √G has the derivative -φ / (2 σ²) √G.
+    # The derivative of √G is -φ / (2 σ²) √G.
     decay = -residuals.centroid / (2.0 * band.delta_width**2)
     delta = root_delta(residuals.centroid, band.delta_width)
     bending = _rows(delta, band.laplacian) + _rows(residuals.bending * decay, band.centroid)
@@ -183,5 +187,5 @@ def gauss_newton_system(
 
 
 def _rows(factor: FloatArray, matrix: sparse.csr_array) -> sparse.csr_array:
-    """Multiply each row of a matrix."""
+    """Multiply each row of a matrix by a factor."""
     return sparse.csr_array(sparse.diags_array(factor) @ matrix)

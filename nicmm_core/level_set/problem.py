@@ -1,7 +1,7 @@
-"""One design problem, ready for the network.
+"""The problem of one curve design: the input of the network and of the variational solver.
 
-This is the paper's pipeline up to section 3.1: control points, initial loop, signed distance and
-input features. Pretraining, inference and fine-tuning start from it.
+It is built by the paper's pipeline up to section 3.1: control points, initial loop, signed distance
+and input features. Pretraining, inference, fine-tuning and the variational solver start from it.
 """
 
 from __future__ import annotations
@@ -30,49 +30,51 @@ from .smoothing import Smoother, build_smoother
 from .topology import keep_topology
 
 SMOOTHING_LENGTH = 1.5
-"""ℓ of the smoothing of φ₀ at smoothness 1, in steps of the initial loop.
+"""Smoothing length ℓ of φ₀ at smoothness 1, in steps of the initial loop.
 
-A smaller value leaves the zigzag of the edge path in the curve. With a larger one thin regions
-vanish, and the topology then falls back on the unsmoothed distance.
+A smaller value leaves the zigzag of the edge path in the curve. With a larger value thin regions
+vanish, and φ₀ falls back on the unsmoothed distance there to keep the topology.
 """
 
 
 END_RADIUS = 3.0
 """Distance from an end of an open curve, in edge lengths, within which bending is ignored.
 
-φ is a cone about the end, whose Laplacian is unbounded.
+φ is a cone around the end, and the Laplacian of a cone is unbounded.
 """
 
 
 PATH_SHARE, SMOOTHED_SHARE = 0.6, 0.9
-"""Approximate shares of the time until the path is found, and until φ₀ is."""
+"""Approximate fractions of the time until the path is found, and until the smoother is built."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A curve to be designed, in lengths relative to the square root of the surface's area.
+    """A curve to be designed on a working mesh with n vertices.
 
     Attributes
     ----------
     working : WorkingMesh
-        In the input mesh's units.
+        The working mesh, in units of the input mesh.
     unit : float
-        Square root of the area of the working mesh, the unit of all following lengths.
+        Square root of the area of the working mesh: the unit of all lengths below, except those of
+        the initial loop.
     vertices : (n, 3) float array
-        Positions about the surface's centroid, along its principal axes.
+        Positions relative to the surface's centroid, along its principal axes.
     bundle : SignBundle or None
         Signs with which faces read φ, if the curve is open or bounds no region.
     elements : FiniteElements
     loop : InitialLoop
+        The initial path, in units of the input mesh.
     distance : (n,) float array
-        Signed distance to the initial loop.
+        Signed distance to the initial path.
     smoother : Smoother
     initial_distance : (n,) float array
-        φ₀, the smoothed distance. Its zero set is one simple loop through the control points.
+        φ₀, the smoothed distance. Its zero set is one simple curve through the control points.
     feature_map : (n,) float array or None
-        φ_fea.
+        φ_fea at the working vertices.
     features : (n, 8) or (n, 9) float array
-        The network's input.
+        Input features of the network.
     """
 
     working: WorkingMesh
@@ -104,31 +106,39 @@ def build_problem(
     via_points: ViaPoints | None = None,
     pieces: int = PIECES,
 ) -> Problem:
-    """Build the problem from control points to input features.
+    """Build the problem: insert the control points, find the initial path, compute the features.
 
     Parameters
     ----------
     mesh : Mesh
     points : SurfacePoints
-        As `locate_control_points` gives them.
+        Control points from `locate_control_points`.
     order : {"given", "shortest"}
+        Whether the points are visited as given or in the shortest order.
     obstacles, alignment : (V,) float array or None
-        Weights in [0, 1] at the input mesh's vertices.
+        Weights in [0, 1] at the vertices of the input mesh.
     smoothness : float
-        Factor of the bending in the smoothing of φ₀, and so of the fourth power of its length.
+        Factor of the bending term in the smoothing of φ₀, that is, of the fourth power of the
+        smoothing length.
     closed : bool
         Whether the curve returns from the last point to the first.
     via_points : mapping, optional
-        From the index of a control point to points on the path from there to the next one.
+        Mapping from the index of a control point to via points on the leg that starts there.
     pieces : int
         Refinement of the mesh along the path, see `path.band_refinement`.
+
+    Returns
+    -------
+    Problem
 
     Raises
     ------
     MeshError
-        If faces have no area.
+        If the component with the control points has faces without area.
     UnreachableError
         If no simple path passes the points in this order.
+    ArgumentError, ControlPointError
+        If the via points cannot be used, see `path.initial_loop.build_initial_loop`.
     """
     phi_fea = None
     if obstacles is not None or alignment is not None:
@@ -183,7 +193,7 @@ def build_problem(
 
 
 def requested_problem(mesh: Mesh, request: Request, pieces: int = PIECES) -> Problem:
-    """The problem of a request; see `build_problem`."""
+    """Build the problem of a request on a mesh, see `build_problem`."""
     return build_problem(
         mesh,
         request.points,
@@ -198,7 +208,7 @@ def requested_problem(mesh: Mesh, request: Request, pieces: int = PIECES) -> Pro
 
 
 def _near_ends(working: WorkingMesh, loop: InitialLoop) -> BoolArray:
-    """Vertices near an end of an open path, shape (n,)."""
+    """Whether each vertex is within `END_RADIUS` of an end of an open path, shape (n,)."""
     if loop.closed:
         return np.zeros(len(working.vertices), dtype=bool)
     distance = csgraph.dijkstra(

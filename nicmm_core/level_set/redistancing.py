@@ -1,9 +1,9 @@
-"""Signed distance to the zero set of a field, near that zero set.
+"""Signed distance to the zero set of a field, near that zero set, for the variational method.
 
-The heat method gives distances to vertices; a solver that moves the curve repeatedly needs
-distances to the curve itself, only near it. Vertices of the faces that the curve crosses get their
-distance to its segments, which propagates from there. The cost depends on the band, not on the
-mesh.
+The heat method gives distances to vertices. A solver that moves the curve repeatedly needs
+distances to the curve itself, but only near it. Vertices of faces that the curve crosses get their
+distance to the segments of the curve, and these distances are propagated outwards. The cost depends
+on the size of the band, not on that of the mesh.
 """
 
 from __future__ import annotations
@@ -25,24 +25,26 @@ def redistanced(
     limit: float = np.inf,
     bundle: SignBundle | None = None,
 ) -> FloatArray:
-    """Signed distance to the zero set of a field.
+    """Replace a field by the signed distance to its zero set.
 
     Parameters
     ----------
     surface : DistanceSurface
+        The working mesh, indexed for distances.
     field : (n,) float array
-        Its signs stay as they are.
+        Field with a zero set. Its signs are kept.
     zero_vertices : (k,) int array
-        Vertices that the zero set passes; they stay zero.
+        Vertices through which the zero set passes; they stay zero.
     limit : float
-        Distances are not propagated beyond this; there the result is constant.
+        Distance up to which distances are propagated. The absolute value of the result is constant
+        beyond it.
     bundle : SignBundle, optional
         Signs with which faces read the values of their corners.
 
     Returns
     -------
     (n,) float array
-        The field itself if it has no zero set.
+        Signed distance in the unit of the surface, or a copy of the field if it has no zero set.
     """
     sign = signs_with_zeros(field, zero_vertices)
     distance = _distance_at_the_curve(surface, field, sign, bundle)
@@ -59,7 +61,7 @@ def redistanced(
 def _distance_at_the_curve(
     surface: DistanceSurface, field: FloatArray, sign: IntArray, bundle: SignBundle | None
 ) -> FloatArray:
-    """Distance of the vertices of crossed faces to the segments in the faces around them."""
+    """Distance of the vertices of crossed faces to nearby segments, inf at all other vertices."""
     crossed, start, end = segment_ends(surface.vertices, surface.faces, field, sign, bundle)
     touching = surface.faces_around[:, crossed]
     face, segment = sparse.coo_array(touching.T @ touching).coords

@@ -1,16 +1,17 @@
-"""Signs with which a level set can be an open curve, or a loop that does not bound.
+"""Signs with which a zero set can be an open curve, or a loop that bounds no region.
 
 The zero set of a function always separates the surface. The zero set of a section of a sign bundle
-(a line bundle with signs ±1) need not: in every face each corner reads the value of its vertex with
-a sign, and neighbouring faces agree up to a common sign on the edge between them. Around an end of
+(a line bundle with signs ±1) need not. In every face, each corner reads the value of its vertex
+with a sign, and neighbouring faces agree on their common edge up to a common sign. Around an end of
 an open curve, or along a closed path that crosses a meridian of a torus once, the value returns
 with the opposite sign.
 
-The bundle used here is trivial away from the initial path. Faces on one side of the path read the
-vertices of the path with a plus and faces on the other side with a minus, so that |φ₀| becomes a
-section that changes sign across the path. Then every vertex takes the sign of the side to which it
-is nearest. This makes φ a smooth signed function near the path, and moves the sign changes far from
-it. Only the signs of corners enter the operators, the topology and the contour.
+The bundle is built in two steps. First it is trivial away from the initial path: faces on one side
+of the path read the vertices of the path with a plus sign and faces on the other side with a minus
+sign, so that |φ₀| becomes a section that changes sign across the path. Then every vertex takes the
+sign of the nearest side of the path. This makes φ a smooth signed function near the path and moves
+the sign changes far away from it. Only the signs of corners enter the operators, the topology and
+the contour.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ class SignBundle:
     Attributes
     ----------
     corner_sign : (m, 3) int array
-        ±1 by face and corner.
+        Sign, ±1, of each corner of each face.
     side : (n,) int array
-        Sign of the distance to the path at each vertex.
+        Sign, ±1, of the distance to the path at each vertex.
     ends : (e,) int array
-        The two ends of an open path; empty for a closed one.
+        The two end vertices of an open path; empty for a closed path.
     """
 
     corner_sign: IntArray
@@ -49,7 +50,7 @@ class SignBundle:
 
 
 def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
-    """The bundle in which the distance to a path changes its sign across the path."""
+    """Build the bundle in which the distance to the path changes its sign only across the path."""
     faces = working.faces
     at_corners = sparse.csr_array(corner_matrix(faces, len(working.vertices), None).T)
     corner_sign = np.ones(faces.shape, dtype=np.int64)
@@ -60,7 +61,7 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
         checkpoint()
         around = at_corners[[vertex]].indices // 3
         side = _sides(faces, around, vertex, loop.neighbours(place))
-        # Make the sides at one vertex of the path consistent with those at the next.
+        # The faces shared with the previous vertex of the path keep the side they have there.
         turns = (s * before[f] for f, s in zip(around.tolist(), side, strict=True) if f in before)
         side = next(turns, 1) * side
         before = dict(zip(around.tolist(), side.tolist(), strict=True))
@@ -72,7 +73,7 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
 
 
 def _sides(faces: IntArray, around: IntArray, vertex: int, path_neighbours: list[int]) -> IntArray:
-    """±1 for each face at a vertex of the path, with a change across the edges of the path."""
+    """Side, ±1, of each face at a vertex of the path; it changes across edges of the path."""
     star = faces[around]
     one, other = adjacent_sides(star)
     path = np.array([[vertex, neighbour] for neighbour in path_neighbours])
@@ -81,7 +82,7 @@ def _sides(faces: IntArray, around: IntArray, vertex: int, path_neighbours: list
 
 
 def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray) -> IntArray:
-    """The nearest side of the path for each vertex, +1 on the path, shape (n,)."""
+    """Sign of the nearest side of the path for each vertex, +1 on the path, shape (n,)."""
     n_vertices = len(working.vertices)
     on_path = np.zeros(n_vertices, dtype=bool)
     on_path[loop.vertices] = True
@@ -90,7 +91,7 @@ def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray
     inner = on_path.copy()
     if not loop.closed:
         inner[loop.vertices[[0, -1]]] = False
-    # A face lies on one side only, and so do its corners off the path.
+    # A face lies on one side of the path only, and so do its corners off the path.
     sign = np.where(inner[working.faces], corner_sign, 0).sum(axis=1)
     for corner in range(3):
         vertex = working.faces[:, corner]
@@ -107,12 +108,12 @@ def _nearest_side(working: WorkingMesh, loop: InitialLoop, corner_sign: IntArray
 
 
 def local_signs(sign: IntArray, faces: IntArray, bundle: SignBundle | None) -> IntArray:
-    """Signs at the corners of faces, from signs at vertices, shape (m, 3)."""
+    """Signs of a field at the corners of faces, from its signs at vertices, shape (m, 3)."""
     return sign[faces] if bundle is None else bundle.corner_sign * sign[faces]
 
 
 def corner_matrix(faces: IntArray, n_vertices: int, bundle: SignBundle | None) -> sparse.csr_array:
-    """Matrix from values at vertices to values at corners of faces, shape (3 m, n)."""
+    """Matrix that maps values at vertices to values at corners of faces, shape (3 m, n)."""
     values = np.ones(faces.size) if bundle is None else bundle.corner_sign.ravel().astype(float)
     entries = (values, (np.arange(faces.size), faces.ravel()))
     return sparse.csr_array(sparse.coo_array(entries, shape=(faces.size, n_vertices)))

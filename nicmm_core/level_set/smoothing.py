@@ -1,8 +1,8 @@
 """Smoothing of a field that keeps it zero at the control points.
 
-The initial loop zigzags along edges and has corners at the control points, and so does the distance
-to it. A network that sees one vertex at a time cannot remove them, so φ₀ is smoothed before it
-becomes an input. The same factorisation gives the correction of least bending that makes the
+The initial loop zigzags along edges and has corners at the control points, and so do the level sets
+of the distance to it. A network that sees one vertex at a time cannot remove them, so φ₀ is
+smoothed before it becomes an input. The same operator gives the smoothest correction that makes the
 network's φ exactly zero at the control points.
 """
 
@@ -19,24 +19,27 @@ from .finite_elements import FiniteElements
 from .sparse_solver import Solve, factorised
 
 MOST_ENTRIES = 150
-"""Products of entries of L per vertex up to which A is assembled; about 50 are usual."""
+"""Number of products of entries of L, per vertex, up to which A is assembled; usually about 50."""
 
 AT_ONCE = 8
-"""Right sides solved together; more would delay a cancellation."""
+"""Number of right-hand sides solved together; with more, a cancellation would take longer."""
 
 
 @dataclass(frozen=True)
 class Smoother:
-    """Factorised ``A = M + ℓ⁴ L M⁻¹ L`` and its response to the control points.
+    """Factorised operator ``A = M + ℓ⁴ L M⁻¹ L`` and its response to the control points.
+
+    M is the diagonal matrix of vertex areas and L the cotangent stiffness.
 
     Attributes
     ----------
     solve : callable
-        Of A, with M the vertex areas and L the cotangent stiffness.
+        Solver for the matrix A.
     vertex_areas : (n,) float array
     control_vertices : (k,) int array
     response : (n, k) float array
-        Column j is the field of least ``cᵀ A c`` that is 1 at control vertex j and 0 at the others.
+        Smooth fields, one per control vertex. Column j is the field c of least ``cᵀ A c`` that is 1
+        at control vertex j and 0 at all other control vertices.
     """
 
     solve: Solve
@@ -49,7 +52,7 @@ class Smoother:
         return self.interpolating(self.solve(self.vertex_areas * field))
 
     def interpolating(self, field: FloatArray) -> FloatArray:
-        """The field with the least correction that makes it zero at the control points."""
+        """Add the correction of least ``cᵀ A c`` that makes a field zero at the control points."""
         corrected = field - self.response @ field[self.control_vertices]
         corrected[self.control_vertices] = 0.0
         return corrected
@@ -61,10 +64,18 @@ def build_smoother(
     length: float,
     plain: FiniteElements | None = None,
 ) -> Smoother:
-    """Factorise the smoothing operator for a length ℓ in the unit of the elements.
+    """Factorise the smoothing operator and compute its response to the control points.
 
-    Detail shorter than about 2 π ℓ is removed. If the elements use a sign bundle, ``plain`` are the
-    elements of ordinary functions, for the responses to the control points.
+    Parameters
+    ----------
+    elements : FiniteElements
+        Operators for n vertices.
+    control_vertices : (k,) int array
+    length : float
+        Smoothing length ℓ in the unit of the elements. Detail shorter than about 2 π ℓ is removed.
+    plain : FiniteElements, optional
+        Operators for ordinary functions, if ``elements`` are those of a sign bundle. The responses
+        are computed with them.
     """
     solve = _factorised(elements, length)
     solve_response = solve if plain is None else _factorised(plain, length)
@@ -80,7 +91,7 @@ def build_smoother(
 
 
 def _factorised(elements: FiniteElements, length: float) -> Solve:
-    """Factorise A, by the mixed system if vertices of high valence would fill A."""
+    """Factorise A, or the mixed system if vertices of high valence would make A too dense."""
     valence = np.diff(elements.stiffness.indptr)
     if (valence**2).sum() <= MOST_ENTRIES * len(valence):
         return factorised(_bending_operator(elements, length))
@@ -90,8 +101,9 @@ def _factorised(elements: FiniteElements, length: float) -> Solve:
 def mixed_factorised(elements: FiniteElements, length: float) -> Solve:
     """Factorise A as an equivalent system of twice the size, without products of L.
 
-    With ψ = ℓ² M⁻¹ L φ, A φ = f is ``M φ + ℓ² L ψ = f`` and ``ℓ² L φ - M ψ = 0``. It is symmetric
-    and quasi-definite, so no elimination order needs pivoting (Vanderbei 1995).
+    With ψ = ℓ² M⁻¹ L φ, the equation A φ = f becomes ``M φ + ℓ² L ψ = f`` and
+    ``ℓ² L φ - M ψ = 0``. This system is symmetric and quasi-definite, so no elimination order needs
+    pivoting (Vanderbei 1995).
     """
     mass, coupling = sparse.diags_array(elements.vertex_areas), length**2 * elements.stiffness
     system = sparse.block_array([[mass, coupling], [coupling, -mass]], format="csr")

@@ -17,10 +17,11 @@ class Solution:
     field : (n,) float array
         φ of the iteration with the least loss, in units of the problem.
     terms : dict of str to float
-        The unweighted terms of its loss.
+        Unweighted terms of the loss of that φ.
     losses : list of float
         Total loss of every iteration.
     status : Status
+        How the computation ended.
     keeps_topology : bool
         Whether the zero set is known to be isotopic to that of φ₀.
     """

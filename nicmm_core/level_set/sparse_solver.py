@@ -1,4 +1,4 @@
-"""Factorisation of symmetric positive definite systems."""
+"""Factorisation of sparse symmetric systems, positive definite or quasi-definite."""
 
 from __future__ import annotations
 
@@ -18,26 +18,35 @@ DEGENERATE = (
 )
 
 PREORDERED_FROM = 4000
-"""Unknowns from which a bandwidth-reducing order is applied before the fill-reducing one."""
+"""Number of unknowns from which a bandwidth-reducing order precedes the fill-reducing one."""
 
 
 Solve = Callable[[FloatArray], FloatArray]
-"""Solves a system for one right side, (n,), or several, (n, k)."""
+"""A function that solves a factorised system for one right-hand side, (n,), or several, (n, k)."""
 
 
 def factorised(matrix: sparse.sparray) -> Solve:
-    """Factorise a symmetric positive definite matrix, without pivoting off the diagonal.
+    """Factorise a symmetric positive definite or quasi-definite matrix with diagonal pivots.
 
-    SciPy has no sparse Cholesky factorisation. With an ordering for symmetric patterns its LU is
-    about five times faster than with the default one. Unlike Cholesky it also handles systems of
-    very thin triangles that rounding makes slightly indefinite. SuperLU is slow on large matrices
-    in the order of a subdivided mesh: 42 s for the Laplacian of 64,000 vertices, and 0.35 s after a
-    reverse Cuthill–McKee ordering, with the same fill.
+    SciPy has no sparse Cholesky factorisation. With an ordering for symmetric patterns, its LU
+    factorisation is about five times faster than with the default ordering. Unlike Cholesky, it
+    also handles systems on very thin triangles that rounding makes slightly indefinite. SuperLU is
+    slow on large matrices whose rows are in the order of a subdivided mesh: 42 s for the Laplacian
+    of 64,000 vertices, but 0.35 s after a reverse Cuthill–McKee ordering, with the same fill.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+
+    Returns
+    -------
+    Solve
+        Solver for right-hand sides.
 
     Raises
     ------
     MeshError
-        If the matrix is singular or not finite, as with faces without area.
+        If the matrix is singular or has entries that are not finite, as with faces without area.
     """
     if not np.isfinite(matrix.data).all():
         raise MeshError(DEGENERATE)

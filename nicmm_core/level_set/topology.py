@@ -1,12 +1,13 @@
-"""Keep the topology of the zero set: one loop.
+"""Correct a solver's φ so that its zero set remains one simple curve.
 
 A level set can split, merge and miss points (the paper's Fig. 16), and often does on thin limbs.
-Flipping the sign of one vertex preserves the topology of the zero set exactly if the signs around
-its link form one positive and one negative run: a simple vertex. The start is a field whose zero
-set is one simple loop through the control points. Each vertex with another sign in the solution is
-flipped as soon as it is simple. If all can be flipped, the solution is isotopic to the start: one
-simple loop through the control points in the same order. Around the others, the solution is blended
-with the start over a few edges.
+Flipping the sign of one vertex preserves the topology of the zero set exactly if the vertex is
+simple, that is, if the signs around its link form one positive and one negative run. The start is a
+field whose zero set is one simple curve through the control points. Each vertex that has another
+sign in the solution is flipped as soon as it is simple. If all of these vertices can be flipped,
+the zero set of the solution is isotopic to that of the start: one simple curve through the control
+points in the same order. Around vertices that cannot be flipped, the solution is blended with the
+start over a few edges.
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from .sign_bundle import SignBundle
 from .vertex_links import VertexLinks
 
 FALLBACK_RADIUS = 4.0
-"""Radius around a topology-breaking vertex within which the start replaces the solution.
+"""Radius around a breaking vertex within which the start replaces the solution.
 
-In edge lengths at the loop; the blend ends at three times that.
+The unit is the mean edge length at the loop. At three times this radius the blend ends.
 """
 
 FALLBACK_GROWTH = 1.3
-"""Growth of that radius from one attempt to the next."""
+"""Factor by which that radius grows from one attempt to the next."""
 
 FALLBACK_ATTEMPTS = 12
-"""Attempts before the start replaces the solution everywhere."""
+"""Number of attempts after which the start replaces the solution everywhere."""
 
 
 def keep_topology(
@@ -44,23 +45,24 @@ def keep_topology(
     wanted: FloatArray,
     bundle: SignBundle | None = None,
 ) -> tuple[FloatArray, int]:
-    """Follow a field wherever its zero set stays isotopic to that of the start.
+    """Follow a field as far as the zero set stays isotopic to that of the start.
 
     Parameters
     ----------
     working : WorkingMesh
     loop : InitialLoop
     start : (n,) float array
-        A field whose zero set is one simple loop through the control vertices.
+        Field whose zero set is one simple curve through the control vertices.
     wanted : (n,) float array
-        The field to follow, in the same unit.
+        Field to follow, in the same unit.
     bundle : SignBundle, optional
         Signs with which faces read the values of their corners.
 
     Returns
     -------
     (n,) float array
-        ``wanted`` if it keeps the topology, otherwise a blend of both.
+        ``wanted`` if it keeps the topology, otherwise a blend of both fields, or ``start`` if no
+        blend keeps the topology.
     int
         Number of vertices whose sign in ``wanted`` breaks the topology; 0 if ``wanted`` is
         returned.
@@ -87,20 +89,25 @@ def keep_topology(
 def breaking_vertices(
     links: VertexLinks, start: FloatArray, wanted: FloatArray, control_vertices: IntArray
 ) -> IntArray:
-    """Vertices whose wanted sign no sequence of simple flips reaches.
+    """Find the vertices that cannot be changed to their wanted signs by flips of simple vertices.
+
+    Vertices are flipped greedily, so another sequence of flips might leave fewer of them.
 
     Parameters
     ----------
     links : VertexLinks
+        Links of the vertices.
     start : (n,) float array
-        A field whose zero set is one simple loop through the control vertices.
+        Field whose zero set is one simple curve through the control vertices.
     wanted : (n,) float array
+        Field with the wanted signs.
     control_vertices : (k,) int array
 
     Returns
     -------
     (q,) int array
-        Empty if the zero set of ``wanted`` is isotopic to that of ``start``.
+        Vertices that keep the sign of ``start``. If there are none, the zero set of ``wanted`` is
+        isotopic to that of ``start``.
     """
     sign = signs_with_zeros(start, control_vertices)
     goal = signs_with_zeros(wanted, control_vertices)
@@ -119,7 +126,7 @@ def breaking_vertices(
         if any(links.sign_changes(v, sign) != changes_at_control[v] for v in controls_around):
             sign[vertex] = -goal[vertex]
             continue
-        # A flip can make neighbours simple and, beside a control point, those of the point.
+        # A flip can make neighbours simple, and beside a control point also the point's neighbours.
         freed = set(around).union(*(links.neighbours(v) for v in controls_around))
         for other in sorted(freed):
             if sign[other] != goal[other] and not queued[other]:
@@ -129,6 +136,6 @@ def breaking_vertices(
 
 
 def _smooth_step(fraction: FloatArray) -> FloatArray:
-    """A smooth step from 0 at 0 to 1 at 2."""
+    """A smooth step that rises from 0 at 0 to 1 at 2."""
     t = np.clip(0.5 * fraction, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)

@@ -1,11 +1,12 @@
 """The variational method: the same energy, with φ at the vertices of a narrow band as unknowns.
 
-The paper compares with Zhang et al. ("Versatile curve design by level set with quadratic
-convergence", 2024), whose code is not public; this is the strongest method of that kind known to
-us. Every iteration takes a damped Gauss–Newton step in the band around the current curve and then
-replaces φ by the signed distance to the new curve. Otherwise the ridges of the old distance would
-hold the curve back. A vertex whose change of sign would split the curve, or detach it from a
-control point, is held for one step, so the curve is always one loop.
+The paper compares itself with Zhang et al. ("Versatile curve design by level set with quadratic
+convergence", 2024), whose code is not public. This module is the strongest method of that kind
+known to us. Every iteration takes a damped Gauss–Newton step in the band around the current
+curve and then replaces φ by the signed distance to the new curve, because the ridges of the old
+distance would hold the curve back. If changing the sign of a vertex would split the curve or detach
+it from a control point, the vertex is held for that step. So the zero set is always one simple
+curve.
 """
 
 from __future__ import annotations
@@ -37,23 +38,26 @@ class VariationalConfig:
     Attributes
     ----------
     half_width : float
-        Of the band. The Gaussian of the bending term ends at 3; wider bands more often cross the
-        ridge between two strands of the curve.
+        Half width of the band. The Gaussian of the bending term ends at 3; wider bands cross the
+        ridge between two strands of the curve more often.
     longest_move : float
-        Greatest change of φ near the curve in a step; the band must contain the new curve.
+        Maximum change of φ near the curve in one step, chosen so that the band contains the new
+        curve.
     beside : float
         Distance to the curve within which that limit applies.
     damping : float
-        Weight of the step's norm at the start, relative to λ_sdf.
+        Initial weight of the step's norm, relative to λ_sdf.
     least_damping : float
+        Lower bound of that weight.
     patience : int
-        Converged when the least loss falls by less than the tolerance in this many iterations
-        (the paper's section 4.5, as for the tolerance).
+        Number of iterations after which the solver has converged if the least loss has fallen by
+        less than the tolerance in them (section 4.5 of the paper).
     tolerance : float
+        Decrease of the least loss that counts as progress, from the same section.
     iterations : int
-        Cap.
+        Maximum number of iterations.
     trials : int
-        Most trial steps in one iteration.
+        Maximum number of trial steps in one iteration.
     """
 
     half_width: float = 4.0
@@ -68,10 +72,10 @@ class VariationalConfig:
 
 
 LEAST_GAIN = 1e-3
-"""Least decrease of an accepted step, relative to the predicted decrease."""
+"""Least decrease of the energy for which a step is accepted, relative to the predicted decrease."""
 
 GOOD_GAIN, POOR_GAIN = 0.75, 0.25
-"""Relative decreases above which damping falls, and below which it rises."""
+"""Relative decreases above which the damping is lowered, and below which it is raised."""
 
 
 def solve(
@@ -88,13 +92,13 @@ def solve(
     weights : LossWeights
     config : VariationalConfig
     watch : callable, optional
-        Called after every iteration with the iterations done, as a fraction of the cap, and the
-        best φ; the solver stops when it returns False.
+        Function called in every iteration with the progress, as a fraction of the maximum number of
+        iterations, and the best φ so far. The solver stops when the function returns False.
 
     Returns
     -------
     Solution
-        Its zero set is isotopic to that of φ₀.
+        The best φ as a signed distance; its zero set is isotopic to that of φ₀.
     """
     h = problem.edge_length
     controls = problem.loop.control_vertices
@@ -130,7 +134,7 @@ def solve(
 
 
 def _is_still(least: list[float], config: VariationalConfig) -> bool:
-    """Whether the least loss has converged."""
+    """Whether the least loss so far, in every iteration, has converged."""
     if len(least) <= config.patience:
         return False
     return least[-1 - config.patience] - least[-1] < config.tolerance
@@ -145,12 +149,26 @@ def gauss_newton_step(
     damping: float,
     config: VariationalConfig,
 ) -> tuple[FloatArray | None, float]:
-    """One damped Gauss–Newton step (Levenberg–Marquardt).
+    """Take one damped Gauss–Newton step (Levenberg–Marquardt).
+
+    Parameters
+    ----------
+    problem : Problem
+    band : NarrowBand
+        Operators around the zero set of the field.
+    links : VertexLinks
+        Links of the working vertices.
+    field : (n,) float array
+        Current φ.
+    weights : LossWeights
+    damping : float
+        Weight of the step's norm, relative to λ_sdf.
+    config : VariationalConfig
 
     Returns
     -------
     (n,) float array or None
-        The new φ; None if no step lowers the energy.
+        The new φ, or None if no step lowers the energy.
     float
         Damping for the next step.
     """
@@ -194,7 +212,7 @@ def _damped_step(
     damping: float,
     free: BoolArray,
 ) -> FloatArray:
-    """Solve the damped system for the unknowns that may move, shape (u,)."""
+    """Solve the damped system for the free unknowns; zero for the held ones, shape (u,)."""
     system = hessian + damping * band.damping
     step = np.zeros(len(gradient))
     step[free] = factorised(system[free][:, free])(-gradient[free])

@@ -1,7 +1,7 @@
-"""Links of vertices, and whether a vertex is simple for the signs of a field.
+"""Links of vertices, and the test whether a vertex is simple for the signs of a field.
 
 A vertex is simple if the signs around its link form one positive and one negative run. Then the
-zero set crosses its star in one strand, whatever the sign of the vertex itself.
+zero set crosses the star of the vertex in one strand, whatever the sign of the vertex itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,14 @@ from .sign_bundle import SignBundle
 
 
 class VertexLinks:
-    """The link of each vertex in order, computed on first use."""
+    """The links of the vertices of a working mesh, each computed and ordered on first use.
+
+    Parameters
+    ----------
+    working : WorkingMesh
+    bundle : SignBundle, optional
+        Signs with which faces read the values of their corners.
+    """
 
     def __init__(self, working: WorkingMesh, bundle: SignBundle | None = None) -> None:
         corners = working.faces.ravel()
@@ -36,9 +43,9 @@ class VertexLinks:
         return link is not None and self.sign_changes(vertex, sign) == (2 if link[1] else 1)
 
     def sign_changes(self, vertex: int, sign: IntArray) -> int:
-        """Sign changes around the link without its zeros; -1 if the link is not a simple path.
+        """Number of sign changes around the link, zeros left out; -1 at a non-manifold vertex.
 
-        A control vertex in the link is a zero, where the curve crosses the link.
+        A control vertex in the link has the sign 0, because the curve crosses the link there.
         """
         if vertex in self._ends:
             return self._sign_changes_round_end(vertex, sign)
@@ -53,7 +60,7 @@ class VertexLinks:
         return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
 
     def _relative_signs(self, vertex: int) -> dict[int, int]:
-        """Signs of neighbours relative to that of the vertex, by the bundle."""
+        """Signs of the bundle at neighbours of a vertex, relative to its sign at the vertex."""
         if self._corner_sign is None:
             return {}
         relative: dict[int, int] = {}
@@ -64,23 +71,25 @@ class VertexLinks:
         return relative
 
     def _sign_changes_round_end(self, vertex: int, sign: IntArray) -> int:
-        """Number of faces at an end of an open curve whose other corners differ in sign."""
+        """Number of faces at an end of an open curve whose other two corners differ in sign."""
         around = self._faces_at(vertex)
-        assert self._corner_sign is not None  # ends are those of a bundle
+        assert self._corner_sign is not None  # only a bundle has ends
         local = self._corner_sign[around] * sign[self._faces[around]]
         local[self._faces[around] == vertex] = 0
         return int(((local == 1).any(axis=1) & (local == -1).any(axis=1)).sum())
 
     def _faces_at(self, vertex: int) -> IntArray:
+        """Faces around a vertex."""
         return self._by_vertex[self._start[vertex] : self._start[vertex + 1]]
 
     def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
-        """The link as a path and whether it is closed; None at a non-manifold vertex."""
+        """Ordered vertices of the link and whether it is closed; None at a non-manifold vertex."""
         if vertex not in self._link:
             self._link[vertex] = self._trace(vertex)
         return self._link[vertex]
 
     def _trace(self, vertex: int) -> tuple[list[int], bool] | None:
+        """Compute the result of `_ordered`."""
         joined: dict[int, list[int]] = {}
         faces = self._faces[self._faces_at(vertex)]
         for face in faces.tolist():

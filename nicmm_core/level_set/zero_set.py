@@ -1,4 +1,7 @@
-"""The zero set of a level set as a polyline: one loop through the control points."""
+"""The zero set of φ as a polyline on the input mesh: one simple curve through the control points.
+
+The solvers' φ need not have such a zero set, so φ is corrected before the contour is extracted.
+"""
 
 from __future__ import annotations
 
@@ -19,15 +22,16 @@ from .topology import keep_topology
 
 @dataclass(frozen=True)
 class ZeroSet:
-    """A level set and its zero set.
+    """A level-set function φ and its zero set.
 
     Attributes
     ----------
     field : (n,) float array
         φ, exactly zero at the control points.
     breaking_vertices : int
-        Number of vertices whose sign had to change to keep one loop.
+        Number of vertices at which the sign given by the solver would break the topology.
     curves : list of SurfaceCurve
+        Components of the zero set.
     """
 
     field: FloatArray
@@ -35,7 +39,7 @@ class ZeroSet:
     curves: list[SurfaceCurve]
 
     def is_simple_curve(self, mesh: Mesh, closed: bool) -> bool:
-        """Whether it is a single simple curve, closed or open, through all control points."""
+        """Whether the zero set is one simple curve, closed or open, through all control points."""
         if not is_one_curve(self.curves, closed):
             return False
         curve = self.curves[0]
@@ -46,17 +50,21 @@ class ZeroSet:
 def zero_set(
     mesh: Mesh, problem: Problem, field: FloatArray, keeps_topology: bool = False
 ) -> ZeroSet:
-    """Make φ exactly zero at the control points and its zero set one loop; extract the contour.
+    """Make φ zero at the control points and its zero set one curve, then extract the contour.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh that the problem was built on.
+        Mesh on which the problem was built.
     problem : Problem
     field : (n,) float array
         φ from a solver.
     keeps_topology : bool
-        Whether the solver has ensured both already.
+        Whether the solver has already ensured both properties. Then φ is not changed.
+
+    Returns
+    -------
+    ZeroSet
     """
     breaking = 0
     if not keeps_topology:
@@ -73,20 +81,26 @@ def zero_set(
 
 
 def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
-    """The zero set, that of φ₀ or that of the initial path's distance: the shortest by the map.
+    """Choose the shortest of three zero sets: a solver's, that of φ₀ and the initial path's.
 
-    Lengths are weighted as for the path, less in a lane and more in an obstacle. A good level set
-    is not longer than the path from which it was made. A longer one is wrong: near sharp edges,
-    where maps are common, it may loop around an end of an open curve or a corner of the surface,
-    and so may φ₀.
+    Lengths are weighted by the feature map as for the path: less in a lane and more in an obstacle.
+    A good zero set is not longer than the path from which it was made. A longer zero set is wrong:
+    near sharp edges, where maps are common, it may loop around an end of an open curve or a corner
+    of the surface. The zero set of φ₀ may do so too.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh that the problem was built on.
+        Mesh on which the problem was built.
     problem : Problem
-        With a feature map.
+        Problem with a feature map.
     zeros : ZeroSet
+        Zero set from a solver.
+
+    Returns
+    -------
+    ZeroSet
+        The shortest of those that are one simple curve, or ``zeros`` if none of them is.
     """
     fields = [problem.initial_distance, problem.distance]
     candidates = [zeros, *(zero_set(mesh, problem, field, True) for field in fields)]
@@ -96,7 +110,7 @@ def shortest_by_map(mesh: Mesh, problem: Problem, zeros: ZeroSet) -> ZeroSet:
 
 
 def _length_by_map(mesh: Mesh, problem: Problem, curve: SurfaceCurve) -> float:
-    """Length of a curve, weighted as for the initial path, in mesh units."""
+    """Length of a curve in mesh units, weighted by the feature map as for the initial path."""
     assert problem.feature_map is not None
     known = problem.working.input_vertex >= 0
     phi_fea = np.ones(len(mesh.vertices))

@@ -1,5 +1,5 @@
-"""The network that infers where the curve runs: its forward pass, its training and its weights.
+"""The network that infers the course of the curve: its forward pass, training and weights.
 
-`single_pass` runs it as pretrained; `finetuning` trains it further for each curve, as the paper
-does. Only the modules that train it import PyTorch.
+`single_pass` runs the pretrained network; `finetuning` trains it further for each curve, as the
+paper does. Only the modules for training import PyTorch.
 """

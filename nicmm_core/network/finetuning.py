@@ -37,20 +37,21 @@ class FinetuningConfig:
     Attributes
     ----------
     learning_rate : float
-        As in the paper.
+        Learning rate of AdamW, as in the paper.
     patience : int
-        Number of last iterations in which the fluctuation is measured.
+        Number of most recent iterations over which the fluctuation is measured.
     fluctuation : float
-        Greatest range of the narrow-band energy over them, relative to its value, at convergence.
-        The paper requires "minimal fluctuations".
+        Maximum range of the narrow-band energy over these iterations, relative to its last value,
+        at convergence. The paper requires "minimal fluctuations".
     threshold : float
-        Energy below which the curve has converged at once. On a sphere, where the least energy is
-        zero, a curve at this value is within 6 % of the radius of the great circle.
+        Narrow-band energy below which the curve has converged immediately. On a sphere, where the
+        least energy is zero, a curve with this energy is within 6 % of the radius of the great
+        circle.
     least_iterations : int
-        Iterations before the fluctuation counts. AdamW needs some to adapt its step sizes; on a
-        plateau at the start the energy hardly changes.
+        Number of iterations before the fluctuation is considered. AdamW needs some iterations to
+        adapt its step sizes, and on a plateau at the start the energy hardly changes.
     iterations : int
-        Cap.
+        Maximum number of iterations.
     """
 
     learning_rate: float = 0.001
@@ -74,13 +75,18 @@ def finetune(
     Parameters
     ----------
     network : CurveNetwork
-        The pretrained network; not changed.
+        The pretrained network, which is not changed.
     problem : Problem
     weights : LossWeights
     config : FinetuningConfig
     watch : callable, optional
-        Called after every iteration with the iterations done, as a fraction of the cap, and the
-        best φ; fine-tuning stops when it returns False.
+        Function called in every iteration with the progress, as a fraction of the maximum number of
+        iterations, and the best φ so far. Fine-tuning stops when the function returns False.
+
+    Returns
+    -------
+    Solution
+        The φ of least loss, or φ₀ if the first loss is not finite.
     """
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     surface = surface_tensors(problem, device)
@@ -122,7 +128,7 @@ def finetune(
 def narrow_band_energy(
     surface: EnergySurface, phi: Tensor, weights: LossWeights, edge_length: float
 ) -> float:
-    """Mean density of the level-set and smoothness terms in the band around the zero set."""
+    """Mean weighted density of the level-set and smoothness terms in a band about the zero set."""
     inside = surface.centroid(phi).abs() < 0.5 * BAND_WIDTH * edge_length  # (m,)
     density = weights.sdf * sdf_density(surface, phi)
     density = density + weights.smooth * smoothness_density(surface, phi)

@@ -1,11 +1,11 @@
 """The network (section 3.2, Fig. 2): an MLP with Efficient Channel Attention and Light GLU.
 
-It processes one vertex at a time, except that the weights of the attention depend on the mean over
-the surface. The paper gives neither widths nor kernel sizes; `NetworkConfig` has those chosen here,
-with reasons.
+It processes one vertex at a time, except that the attention weights depend on means over the
+surface. The paper gives neither widths nor kernel sizes; `NetworkConfig` has the values chosen
+here, with reasons.
 
-The functions take arrays and parameters by name. They accept NumPy arrays, for inference
-(`single_pass`), and tensors, for training (`trainable_network`).
+The parameters of the network are looked up by name. All functions accept NumPy arrays, for
+inference (`single_pass`), and torch tensors, for training (`trainable_network`).
 """
 
 from __future__ import annotations
@@ -29,28 +29,32 @@ class NetworkConfig:
     Attributes
     ----------
     width : int
-        Channels C of every hidden layer. Above 64 the loss after pretraining hardly decreases.
+        Number of channels C of every hidden layer. Above 64 channels the loss after pretraining
+        hardly decreases.
     depth : int
-        Hidden blocks.
+        Number of hidden blocks.
     attention : bool
-        Efficient Channel Attention in every block; off for the ablation of Table 3.
+        Whether every block has Efficient Channel Attention; False for the ablation of Table 3.
     attention_kernel : int
-        Number of neighbouring channels that interact, odd; ECA-Net's rule gives 3 for 64 channels.
+        Number of neighbouring channels that interact, odd. ECA-Net's rule gives 3 for 64 channels.
     gating : bool
-        Light GLU in every block; off for the ablation of Table 3.
+        Whether every block has a Light GLU; False for the ablation of Table 3.
     gate_rank : int
-        Rank of the gate's matrix in Light GLU: a full gate would double the parameters of a block,
-        rank 8 of 64 adds a quarter.
+        Rank of the gate's matrix in Light GLU. A gate of full rank would double the parameters of a
+        block; rank 8 of 64 adds a quarter.
     position_gain : float
-        Factor on the first layer's initial weights for positions. Coordinates lie within about
-        ±0.5, where tanh of a plain layer is almost linear; 5 resolves a tenth of the surface.
+        Factor of the first layer's initial weights for positions. Coordinates lie within about
+        ±0.5, where tanh of a plain layer is almost linear. A factor of 5 resolves a tenth of the
+        surface.
     normals : bool
-        Normals N among the input; off for the ablation of Table 4, where zeros replace them.
+        Whether the input has normals N; False for the ablation of Table 4, where zeros replace
+        them.
     control_indicator : bool
-        φ_p among the input; off for Table 4 likewise.
+        Whether the input has φ_p; False for the ablation of Table 4, likewise with zeros.
     distance : bool
-        φ₀ among the input and added to the output; off for Table 4. The last layer then starts from
-        random weights, because the gradient of the energy vanishes at φ = 0.
+        Whether φ₀ is part of the input and is added to the output; False for the ablation of Table
+        4. Without φ₀ the last layer starts from random weights, because the gradient of the energy
+        vanishes at φ = 0.
     """
 
     width: int = 64
@@ -71,12 +75,14 @@ class NetworkInput(NamedTuple):
     Attributes
     ----------
     features : (n, channels) array
+        Input features of every vertex, see `level_set.features`.
     initial_distance : (n,) array
         φ₀, zero at the control vertices.
     area_share : (n,) array
-        Share of each vertex in the surface's area; sums to 1.
+        Fraction of the surface's area at each vertex; sums to 1.
     response : (n, k) array
-        Column j is a smooth field that is 1 at control vertex j and 0 at the others.
+        Smooth fields, one per control point. Column j is 1 at control vertex j and 0 at all other
+        control vertices.
     control_vertices : (k,) int array
     """
 
@@ -88,19 +94,19 @@ class NetworkInput(NamedTuple):
 
 
 Parameters = Mapping[str, Array]
-"""Arrays by name, in the shapes of `parameter_shapes`."""
+"""Arrays of the network by name, with the shapes given by `parameter_shapes`."""
 
 
 @dataclass(frozen=True)
 class NetworkWeights:
-    """A network: its configuration and its parameters, as arrays of one kind."""
+    """A network: its configuration and its parameters, all NumPy arrays or all tensors."""
 
     config: NetworkConfig
     parameters: Parameters
 
 
 def parameter_shapes(config: NetworkConfig, channels: int) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """Name and shape of every parameter, for a number of input channels."""
+    """Name and shape of every parameter of a network with a given number of input channels."""
     width, rank = config.width, config.gate_rank
     yield from _linear_shapes("stem", channels, width)
     for block in range(config.depth):
@@ -128,13 +134,14 @@ class Operations(NamedTuple):
     Attributes
     ----------
     linear : callable
-        Maps values (n, inputs), a weight (outputs, inputs) and a bias (outputs,) or None to
-        (n, outputs).
+        Linear layer: maps values (n, inputs), a weight (outputs, inputs) and a bias (outputs,) or
+        None to (n, outputs).
     tanh, sigmoid : callable
-        Elementwise.
+        Elementwise functions.
     correlate : callable
-        Maps values (C,) and an odd kernel (kernel,) to (C,), with zeros beyond the ends.
+        Correlation of values (C,) with a kernel of odd length to (C,), with zeros beyond the ends.
     ones_like : callable
+        Function that returns ones in the shape of its argument.
     """
 
     linear: Callable[[Array, Array, Array | None], Array]
@@ -145,25 +152,26 @@ class Operations(NamedTuple):
 
 
 def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operations) -> Array:
-    """φ = φ₀ + the correction by the network, which is zero at the control points.
+    """Compute φ = φ₀ + the network's correction, which is zero at the control points.
 
     φ₀ is "the foundation for network initialization" (section 3.1): the last layer starts at zero,
     so the untrained network returns φ₀. Smooth fields cancel the output of the layers at the
-    control points, so that φ is exactly zero there. The paper relies on a large λ_int for this, but
-    then AdamW spends its steps on the interpolation term: in 200 steps a curve hardly moved that
-    reached a great circle with exact zeros.
+    control points, so that φ is exactly zero there. The paper relies on a large λ_int instead, but
+    then AdamW spends its steps on the interpolation term: in 200 steps, a curve that reached a
+    great circle with exact zeros hardly moved.
 
     Parameters
     ----------
     weights : NetworkWeights
     given : NetworkInput
-        Arrays of the kind and precision of the parameters.
+        Input of the network, of the same array type and precision as the parameters.
     operations : Operations
-        For arrays of that kind.
+        Operations for that array type.
 
     Returns
     -------
     (n,) array
+        φ at the vertices.
     """
     config, parameters = weights.config, weights.parameters
     seen = channels_seen(config, given.features, operations)  # (channels,)
@@ -179,7 +187,7 @@ def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operatio
 
 
 def channels_seen(config: NetworkConfig, features: Array, operations: Operations) -> Array:
-    """1 for each active input channel and 0 for those switched off."""
+    """Factors of the input channels: 0 for channels switched off, 1 for all others."""
     seen = operations.ones_like(features[0])  # (channels,)
     seen[NORMAL_CHANNELS] *= config.normals
     seen[INDICATOR_CHANNEL] *= config.control_indicator
@@ -190,7 +198,7 @@ def channels_seen(config: NetworkConfig, features: Array, operations: Operations
 def block(
     weights: NetworkWeights, name: str, hidden: Array, area_share: Array, operations: Operations
 ) -> Array:
-    """Linear, tanh, attention, and a residual step through the gated unit; (n, C) to (n, C)."""
+    """Linear layer, tanh, attention and a residual step through the gated unit, on (n, C)."""
     config, parameters = weights.config, weights.parameters
     inner = operations.tanh(linear(parameters, f"{name}.linear", hidden, operations))  # (n, C)
     if config.attention:
@@ -202,13 +210,17 @@ def block(
 def attended(
     parameters: Parameters, name: str, inner: Array, area_share: Array, operations: Operations
 ) -> Array:
-    """Efficient Channel Attention: scale channels by weights from the means of neighbouring ones.
+    """Efficient Channel Attention: scale each channel by a weight from its neighbours' means.
+
+    The means are taken over the surface, and the weight is the sigmoid of a correlation with the
+    attention kernel.
 
     Parameters
     ----------
     inner : (n, C) array
+        Channel values at the vertices.
     area_share : (n,) array
-        Sums to 1.
+        Fraction of the surface's area at each vertex; sums to 1.
     """
     kernel = parameters[f"{name}.across.weight"][0, 0]  # (kernel,)
     mean = area_share @ inner  # (C,)
@@ -216,12 +228,12 @@ def attended(
 
 
 def gated_unit(parameters: Parameters, name: str, inner: Array, operations: Operations) -> Array:
-    """Light GLU: a linear layer times a sigmoid gate of low rank; (n, C) to (n, C)."""
+    """Light GLU: a linear layer multiplied by a sigmoid gate of low rank, on (n, C)."""
     low = operations.linear(inner, parameters[f"{name}.gate_down.weight"], None)  # (n, rank)
     gate = operations.sigmoid(linear(parameters, f"{name}.gate_up", low, operations))  # (n, C)
     return linear(parameters, f"{name}.value", inner, operations) * gate  # (n, C)
 
 
 def linear(parameters: Parameters, name: str, values: Array, operations: Operations) -> Array:
-    """A linear layer, (n, inputs) to (n, outputs)."""
+    """Apply the linear layer with the given name, (n, inputs) to (n, outputs)."""
     return operations.linear(values, parameters[f"{name}.weight"], parameters[f"{name}.bias"])

@@ -1,8 +1,8 @@
-"""Stage 1 (section 4.1): train one network on random control points of one or more meshes.
+"""Stage 1 (section 4.1): train one network on random sets of control points of one or more meshes.
 
-Each set has the λ_smooth of its design (`losses.balanced`): with one value for all, the minimum of
-most sets would be a flat φ. In every epoch each set gets a random permutation and random signs of
-its axes, since a few bodies have few orientations.
+For each set λ_smooth has the value that a design with these points would have (`losses.balanced`):
+with one value for all sets, the minimum of most sets would be a flat φ. In every epoch the axes of
+each set are permuted and reversed at random, since a few meshes have few orientations.
 """
 
 from __future__ import annotations
@@ -38,33 +38,35 @@ from .training_maps import random_maps
 from .weights_file import save_weights
 
 GRADIENT_LIMIT = 1.0
-"""Norm to which gradients are clipped; single sets with a bad loop would derail training."""
+"""Norm to which gradients are clipped; single sets with a bad loop would derail the training."""
 
 
 @dataclass(frozen=True)
 class PretrainingConfig:
-    """Settings of stage 1; sets, points and learning rate are the paper's.
+    """Settings of stage 1; numbers of sets and points and the learning rate are the paper's.
 
     Attributes
     ----------
     sets : int
         Number of sets of control points, distributed evenly over the meshes.
     fewest_points, most_points : int
-        Number of points of a set.
+        Range of the number of points in a set.
     open_share : float
-        Share of sets with an open curve.
+        Fraction of sets with an open curve.
     given_share : float
-        Share of sets whose closed curve visits the points in random order, not the shortest.
+        Fraction of sets with a closed curve that visits the points in random order instead of the
+        shortest order.
     map_share : float
-        Share of sets with obstacles or lanes. Above 0, the network has the ninth channel φ_fea,
-        which is neutral in the other sets.
+        Fraction of sets with obstacles or lanes. If it is above 0, the network has φ_fea as its
+        ninth channel, with neutral values in sets without maps.
     batch : int
-        Sets per step.
+        Number of sets per step.
     epochs : int
-        Passes over all sets.
+        Number of passes over all sets.
     learning_rate : float
-        Initial rate of AdamW; it falls to zero along a cosine.
+        Initial learning rate of AdamW; it decreases to zero along a cosine.
     seed : int
+        Seed of all random choices.
     """
 
     sets: int = 1000
@@ -91,18 +93,22 @@ def pretrain(
     """Train on random control points of the meshes and write the weights (Eq. 9).
 
     A checkpoint is written beside the output after every epoch. An interrupted run resumes from it
-    and ends with the same weights as without interruption.
+    and ends with the same weights as a run without interruption.
 
     Parameters
     ----------
     meshes : sequence of Mesh
     output : path
-        The file of the weights, a ``.npz`` archive.
-    network_config, config, weights : optional
-        By default those of the paper and of this package. λ_smooth is lowered for single sets, as
-        for a design.
+        File for the weights, a ``.npz`` archive.
+    network_config : NetworkConfig, optional
+        Sizes and switches of the network.
+    config : PretrainingConfig, optional
+        Settings of the training.
+    weights : LossWeights, optional
+        Weights of the energy. λ_smooth is lowered for single sets, as for a design.
     progress : callable, optional
-        Called with the name of the stage, steps done, total steps and the mean loss so far.
+        Function called with the name of the stage, the number of sets processed in it, the total
+        number to process (over all epochs), and the mean loss of the current epoch.
 
     Returns
     -------
@@ -112,7 +118,9 @@ def pretrain(
     Raises
     ------
     ArgumentError
-        If there are no meshes, or a checkpoint belongs to another configuration.
+        If there are no meshes, if a mesh has too few vertices or too few sets with a path, if a
+        setting is out of range, if the folder of the output does not exist, or if a checkpoint
+        cannot be read or belongs to a run with other meshes or settings.
     """
     config = config or PretrainingConfig()
     weights = weights or LossWeights()
@@ -141,7 +149,7 @@ def pretrain(
     configuration = repr((network.config, config, weights, _fingerprint(meshes)))
     losses = _resume(checkpoint, configuration, network, optimiser)
 
-    # The tensors of a set on 4,000 vertices take about 2 MB, so all stay on the device.
+    # The tensors of a set on 4,000 vertices take about 2 MB, so all sets stay on the device.
     prepared = [
         (
             surface_tensors(problem, device),
@@ -178,7 +186,7 @@ def pretrain(
             "optimiser": optimiser.state_dict(),
             "losses": losses,
         }
-        # An interruption while writing must not destroy the previous checkpoint.
+        # Written under another name first: an interruption must not destroy the last checkpoint.
         partial = checkpoint.with_suffix(".partial")
         torch.save(state, partial)
         partial.replace(checkpoint)
@@ -188,9 +196,9 @@ def pretrain(
 
 
 def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
-    """The same set with its axes permuted and reversed at random, and a random sign of φ₀.
+    """Permute and reverse the axes of a network input at random, and choose the sign of φ₀.
 
-    The energy of Eq. 2 is invariant under both.
+    The energy of Eq. 2 is invariant under both changes.
     """
     axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
     side = float(generator.choice([-1.0, 1.0]))
@@ -202,14 +210,14 @@ def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
 
 
 def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
-    """Half a cosine from the initial rate to zero."""
+    """Learning rate of an epoch: half a cosine wave from the initial rate to zero."""
     return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * epoch / config.epochs))
 
 
 def _resume(
     checkpoint: Path, configuration: str, network: CurveNetwork, optimiser: torch.optim.Optimizer
 ) -> list[float]:
-    """Load an interrupted run, if there is one; return the losses of its epochs."""
+    """Load the checkpoint of an interrupted run, if it exists; return the losses of its epochs."""
     if not checkpoint.exists():
         return []
     try:
@@ -230,13 +238,14 @@ def _resume(
 
 
 def _kind(sample: float, config: PretrainingConfig) -> tuple[bool, str]:
-    """Whether the curve of a set is closed, and the order of its points."""
+    """Whether the curve of a set is closed, and the order of its points, from a random number."""
     if sample < config.open_share:
         return False, "shortest"
     return True, "given" if sample < config.open_share + config.given_share else "shortest"
 
 
 def _fingerprint(meshes: Sequence[Mesh]) -> str:
+    """Hash of the arrays of all meshes."""
     digest = hashlib.sha256()
     for mesh in meshes:
         digest.update(mesh.vertices.tobytes())
@@ -249,7 +258,10 @@ def _random_problems(
     config: PretrainingConfig,
     report: Callable[[str, int, int, float], None],
 ) -> Iterator[Problem]:
-    """Random sets of vertices, equally many per mesh; sets without a simple path are replaced."""
+    """Problems of random sets of vertices, evenly distributed over the meshes.
+
+    Sets without a simple path are replaced.
+    """
     done = 0
     per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
     for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
@@ -288,7 +300,7 @@ def _random_problems(
 def _maps(
     mesh: Mesh, points: IntArray, config: PretrainingConfig, generator: np.random.Generator
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """Obstacles and alignment of a set; None if the network has no ninth channel."""
+    """Weights of obstacles and alignment for a set; None if the network has no ninth channel."""
     if config.map_share == 0.0:
         return None, None
     if generator.random() < config.map_share:
@@ -298,4 +310,4 @@ def _maps(
 
 
 TRIES_PER_SET = 10
-"""Most random sets per set wanted, before a mesh is rejected."""
+"""Number of random sets tried, per set wanted, before a mesh is rejected."""

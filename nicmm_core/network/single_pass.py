@@ -1,4 +1,4 @@
-"""Inference: one forward pass of the pretrained network in NumPy, without training."""
+"""Inference: one forward pass of the pretrained network in NumPy, without further training."""
 
 from __future__ import annotations
 
@@ -30,9 +30,10 @@ class Inference:
     ----------
     problem : Problem
     solution : Solution
-        The level set by the network.
+        Level set given by the network.
     zeros : ZeroSet
-        Of the solution; with maps, of the choice of `shortest_by_map`.
+        Zero set of the solution or, if the request has maps, the one that `shortest_by_map`
+        chooses.
     """
 
     problem: Problem
@@ -41,17 +42,21 @@ class Inference:
 
 
 def infer(mesh: Mesh, request: Request) -> Inference:
-    """Infer the course of a curve.
+    """Infer the course of a curve, from the request to the zero set.
 
     Parameters
     ----------
     mesh : Mesh
     request : Request
 
+    Returns
+    -------
+    Inference
+
     Raises
     ------
     MeshError
-        If faces have no area.
+        If the component with the control points has faces without area.
     UnreachableError
         If no simple path passes the points in this order.
     """
@@ -66,15 +71,20 @@ def infer(mesh: Mesh, request: Request) -> Inference:
 
 
 def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
-    """The level set of a problem by the network, or φ₀ if that is not finite.
+    """Infer the level set of a problem; φ₀ replaces it if the network's values are not finite.
 
     Parameters
     ----------
     weights : NetworkWeights
-        As NumPy arrays.
+        Weights as NumPy arrays.
     problem : Problem
+
+    Returns
+    -------
+    Solution
+        φ without iterations. Its status is ``DIVERGED`` if φ₀ has replaced the network's values.
     """
-    # Weights of a bad file may overflow; this is checked below.
+    # Weights from a bad file may cause an overflow, which is checked below.
     with np.errstate(over="ignore", invalid="ignore"):
         field = level_set(weights, network_input(problem), NUMPY).astype(np.float64)
     status = Status.CONVERGED
@@ -84,9 +94,9 @@ def infer_level_set(weights: NetworkWeights, problem: Problem) -> Solution:
 
 
 def network_input(problem: Problem) -> NetworkInput:
-    """The input of the network, in single precision as in training.
+    """The input of the network for a problem, in single precision as in training.
 
-    φ then differs from double precision by about 1e-7, in units of the problem.
+    φ then differs by about 1e-7, in units of the problem, from φ in double precision.
     """
     areas = problem.elements.vertex_areas
     return NetworkInput(
@@ -106,7 +116,7 @@ def _linear(values: SingleArray, weight: SingleArray, bias: SingleArray | None) 
 
 
 def _sigmoid(values: SingleArray) -> SingleArray:
-    """1 / (1 + exp(-x)) by tanh, which cannot overflow and is faster."""
+    """1 / (1 + exp(-x)), computed by tanh, which cannot overflow and is faster than exp."""
     half = np.tanh(0.5 * values)
     half += 1.0
     half *= 0.5

@@ -1,4 +1,4 @@
-"""A constant sparse matrix as a differentiable operator."""
+"""A constant sparse matrix as a differentiable operator on torch tensors."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from torch import Tensor
 
 
 def sparse_operator(matrix: sparse.sparray, device: torch.device) -> Callable[[Tensor], Tensor]:
-    """Multiplication of a vector (n,) by a sparse matrix (m, n), differentiable in the vector."""
+    """A function that multiplies a sparse matrix (m, n) by a vector (n,), with derivatives."""
     csr = sparse.csr_array(matrix)
     with warnings.catch_warnings():
-        # torch warns once that compressed sparse tensors are in beta.
+        # torch warns once per process that compressed sparse tensors are in beta.
         warnings.filterwarnings("ignore", message="Sparse")
         tensor = torch.sparse_csr_tensor(
             torch.as_tensor(csr.indptr, dtype=torch.int32),

@@ -1,4 +1,4 @@
-"""Problems as tensors in single precision, for training and fine-tuning."""
+"""Conversion of problems to torch tensors in single precision, for pretraining and fine-tuning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .sparse_operator import sparse_operator
 
 
 def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
-    """The operators of the energy on a device."""
+    """The operators of the energy as tensors on a device, see `losses.energy_surface`."""
     arrays = energy_surface(problem)
     elements = problem.elements
     phi_fea = arrays.feature_map
@@ -30,7 +30,7 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
 
 
 def network_input(problem: Problem, device: torch.device) -> NetworkInput:
-    """The input of the network on a device."""
+    """The input of the network as tensors on a device, see `single_pass.network_input`."""
     arrays = single_pass.network_input(problem)
     return NetworkInput(*(torch.as_tensor(array, device=device) for array in arrays))
 

@@ -1,4 +1,4 @@
-"""The network as a trainable torch module."""
+"""The network as a torch module, for pretraining and fine-tuning."""
 
 from __future__ import annotations
 
@@ -21,23 +21,30 @@ from .weights_file import SHIPPED, load_weights
 
 
 class CurveNetwork(nn.Module):
-    """The parameters of a network and its forward pass `network.level_set`.
+    """The parameters of a network, with `forward_pass.level_set` as its forward pass.
 
-    Initial weights are as torch's: uniform within the inverse square root of the number of inputs.
-    But the first layer's weights for positions are larger, and the last layer is zero.
+    Parameters are initialised as in torch: uniformly within the inverse square root of the number
+    of inputs. But the first layer's weights for positions are larger by
+    `NetworkConfig.position_gain`, and the last layer is zero if φ₀ is added to its output.
+
+    Parameters
+    ----------
+    config : NetworkConfig
+    channels : int
+        Number of input channels.
     """
 
     def __init__(self, config: NetworkConfig, channels: int = BASE_CHANNELS) -> None:
         super().__init__()
         self.config = config
         shapes = dict(parameter_shapes(config, channels))
-        # A list, since torch allows no dots in the name of a parameter.
+        # The parameters are kept in a list, since torch allows no dots in their names.
         self.names = tuple(shapes)
         self.arrays = nn.ParameterList(torch.empty(shape) for shape in shapes.values())
         parameters = self.weights.parameters
         with torch.no_grad():
             for name, parameter in parameters.items():
-                # A bias has the number of inputs of its weight.
+                # The range of a bias is that of its weight.
                 inputs = math.prod(shapes[name.replace("bias", "weight")][1:])
                 parameter.uniform_(-1.0 / math.sqrt(inputs), 1.0 / math.sqrt(inputs))
             parameters["stem.weight"][:, :3] *= config.position_gain
@@ -47,7 +54,7 @@ class CurveNetwork(nn.Module):
 
     @property
     def weights(self) -> NetworkWeights:
-        """Configuration and parameters by name: the tensors themselves."""
+        """Configuration and parameters by name; these are the trained tensors, not copies."""
         return NetworkWeights(self.config, dict(zip(self.names, self.arrays, strict=True)))
 
     def forward(self, given: NetworkInput) -> Tensor:
@@ -56,7 +63,7 @@ class CurveNetwork(nn.Module):
 
 
 def build_network(weights: NetworkWeights) -> CurveNetwork:
-    """A network with a copy of some weights."""
+    """Build a network with a copy of the given weights."""
     network = CurveNetwork(weights.config, weights.parameters["stem.weight"].shape[1])
     with torch.no_grad():
         for name, parameter in network.weights.parameters.items():
@@ -65,7 +72,7 @@ def build_network(weights: NetworkWeights) -> CurveNetwork:
 
 
 def network_weights(network: CurveNetwork) -> NetworkWeights:
-    """A copy of the weights of a network, as NumPy arrays."""
+    """Copy the weights of a network to NumPy arrays."""
     return NetworkWeights(
         network.config,
         {
@@ -76,7 +83,7 @@ def network_weights(network: CurveNetwork) -> NetworkWeights:
 
 
 def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> CurveNetwork:
-    """Read a network to train further; see `weights_file.load_weights`."""
+    """Read a network for further training; see `weights_file.load_weights`."""
     return build_network(load_weights(path, channels))
 
 

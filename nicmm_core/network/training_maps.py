@@ -11,16 +11,16 @@ from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
 
 BESIDE = 0.12
-"""Greatest distance of the ends of a lane from the path between two control points, in √area."""
+"""Maximum distance from each end of a lane to the path between two control points, in √area."""
 
 PART = (0.2, 0.8)
-"""The section of that path along which a lane runs."""
+"""Start and end of a lane along that path, as fractions of the path's number of vertices."""
 
 RADII = (0.02, 0.07)
-"""Of obstacles, in √area."""
+"""Range of the radii of obstacles, in √area."""
 
 WEIGHTS = (0.4, 1.0)
-"""Of strokes."""
+"""Range of the weights of strokes."""
 
 MOST_STROKES = 3
 
@@ -28,17 +28,23 @@ MOST_STROKES = 3
 def random_maps(
     mesh: Mesh, points: IntArray, generator: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Weights of obstacles and of alignment, both (V,), from one to three strokes.
+    """Generate weights of obstacles and of alignment, both (V,), from one to three random strokes.
 
-    A stroke belongs to the shortest path along edges between two of the control points: a lane with
-    ends near the path, or an obstacle around one of its vertices.
+    Every stroke is placed relative to the shortest path along edges between two control points. It
+    is a lane with its ends near the path, or an obstacle around a vertex of the path.
 
     Parameters
     ----------
     mesh : Mesh
     points : (k,) int array
-        Vertices of one component, the control points.
+        Vertices of the control points, all on one component.
     generator : Generator
+        Random number generator.
+
+    Returns
+    -------
+    obstacles, alignment : (V,) float array
+        Weights in [0, 1].
     """
     size = len(mesh.vertices)
     start, end = mesh.edges.T
@@ -67,12 +73,12 @@ def random_maps(
 
 
 def _shortest_path(graph: sparse.csr_array, start: int, end: int) -> IntArray:
-    """Vertices of the shortest path along edges."""
+    """Vertices of the shortest path along edges between two vertices."""
     _, previous = csgraph.dijkstra(graph, directed=False, indices=end, return_predecessors=True)
     return np.array(path_between(previous, end, start)[::-1])
 
 
 def _around(graph: sparse.csr_array, middle: int, radius: float) -> IntArray:
-    """Vertices within a distance along edges, including the middle itself."""
+    """Vertices within a radius of a vertex, measured along edges, with the vertex itself."""
     distance = csgraph.dijkstra(graph, directed=False, indices=middle, limit=radius)
     return np.flatnonzero(np.isfinite(distance))

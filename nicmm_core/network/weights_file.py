@@ -1,4 +1,4 @@
-"""Network weights on disk: one NumPy archive with the arrays and the configuration."""
+"""Network weights on disk: a NumPy archive of the parameters and the configuration."""
 
 from __future__ import annotations
 
@@ -21,32 +21,43 @@ from ..level_set.features import BASE_CHANNELS
 from .forward_pass import NetworkConfig, NetworkWeights, parameter_shapes
 
 SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
-"""Weights that come with the package; `docs/pretraining.md` names the command that made them."""
+"""Weights shipped with the package; `docs/pretraining.md` gives the command that produced them."""
 
 SHIPPED_WITH_MAPS = SHIPPED.with_name("nicmm-maps.npz")
-"""Those of the network with φ_fea in the ninth channel."""
+"""Shipped weights of the network with φ_fea as its ninth channel."""
 
 LARGEST = 2**28
-"""Most bytes of all arrays of a file; a small archive may unpack to any size."""
+"""Maximum number of bytes of all arrays in a file; a small archive could unpack to any size."""
 
 
 def save_weights(path: str | Path, weights: NetworkWeights) -> None:
-    """Write configuration and parameters; these must be NumPy arrays."""
+    """Write configuration and parameters to a file; the parameters have to be NumPy arrays."""
     config = np.array(json.dumps(asdict(weights.config)))
     with Path(path).open("wb") as file:
         np.savez_compressed(file, config=config, **weights.parameters)
 
 
 def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> NetworkWeights:
-    """Read the weights of a network for a number of input channels, as NumPy arrays.
+    """Read the weights of a network as NumPy arrays.
 
-    If a file has weights for the eight base channels only, the ninth, φ_fea, gets zero weights.
-    Settings missing in a file have their defaults.
+    If a file has weights for the eight base channels only, the ninth channel, φ_fea, gets zero
+    weights. Settings missing from a file get their defaults.
+
+    Parameters
+    ----------
+    path : path
+        A file written by `save_weights`.
+    channels : int
+        Number of input channels.
+
+    Returns
+    -------
+    NetworkWeights
 
     Raises
     ------
     ArgumentError
-        If the file is missing or is not a weights file.
+        If the file is missing, or does not contain valid weights for this number of channels.
     """
     try:
         arrays = _read_arrays(path)
@@ -73,7 +84,7 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
 def _read_arrays(path: str | Path) -> dict[str, Array]:
     """The arrays of an archive by name. Pickles are refused, so a file cannot execute code."""
     with Path(path).open("rb") as file, warnings.catch_warnings():
-        warnings.simplefilter("error")  # NumPy warns of unclear headers
+        warnings.simplefilter("error")  # NumPy only warns about ambiguous headers
         with np.load(file, allow_pickle=False) as archive:
             size = sum(member.file_size for member in archive.zip.infolist())
             if size > LARGEST:
@@ -83,11 +94,11 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
 
 @cache
 def shipped_weights(channels: int) -> NetworkWeights:
-    """The weights that come with the package, cached; do not modify them."""
+    """The shipped weights for a number of input channels, cached; do not modify them."""
     return load_weights(SHIPPED if channels == BASE_CHANNELS else SHIPPED_WITH_MAPS, channels)
 
 
-# Raised by a missing file, another kind of file or weights of another network.
+# Errors raised for a missing file, another kind of file, or weights of another network.
 _UNREADABLE = (
     OSError,
     EOFError,

@@ -1,4 +1,5 @@
-"""A simple initial path through the control points, with virtual splits where vertices are too few.
+"""The initial path: a simple path of mesh edges through the control points.
 
-`initial_loop` is the entry point.
+Where the mesh has too few vertices for such a path, edges are split virtually. The entry point is
+`initial_loop`.
 """

@@ -1,8 +1,8 @@
 """Virtual refinement of the mesh along the initial loop.
 
-φ is linear in every face, so a curve on a coarse mesh has few straight segments and can hardly
-bend. Edges near the loop that are long relative to it are bisected virtually, the longest first, so
-that the curve has enough segments on any mesh. The surface does not change.
+φ is linear in every face, so on a coarse mesh its zero set consists of few straight segments and
+can hardly bend. Edges near the loop that are long compared with the loop are bisected virtually,
+the longest first, so that the curve has enough segments on any mesh. The surface does not change.
 """
 
 from __future__ import annotations
@@ -17,21 +17,22 @@ from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 
 PIECES = 64
-"""Length of the loop over the longest edge near it, where the level set is the result."""
+"""Ratio of the loop's length to the longest edge near it, where the level set is the result."""
 
 PIECES_TO_START = 32
-"""The same where the level set is only the start of a relaxation."""
+"""The same ratio where the level set is only the start of a relaxation."""
 
 BAND_SHARE = 0.05
 """Half width of the refined band, relative to the length of the loop.
 
-The curve moves within it. Farther out, the longest edge allowed is twice the distance to the band.
+The curve moves within this band. Outside it, an edge may be as long as twice the distance from its
+midpoint to the band.
 """
 
 MOST_SPLITS = 3_000
-"""Most edges bisected; adjacent needles would need many times more.
+"""Maximum number of edges bisected; adjacent needles would need many times more.
 
-The longest edges come first, so stopping early leaves an evenly coarser band.
+The longest edges are bisected first, so stopping at this number leaves an evenly coarser band.
 """
 
 
@@ -43,23 +44,23 @@ def refine_along(
     Parameters
     ----------
     split : SplitMesh
-        Changed.
+        Mesh with the path; it is modified.
     component : int
-        The connected component that the path is on.
+        Index of the connected component that contains the path.
     loop : list of int
-        Vertices of the path, the first not repeated.
+        Vertices of the path; the first one is not repeated at the end.
     closed : bool
-        Whether the last vertex is joined to the first.
+        Whether an edge joins the last vertex to the first.
     pieces : int
-        Length of the path over the longest edge near it.
+        Ratio of the path's length to the longest edge allowed near it.
 
     Returns
     -------
     list of int
         Vertices of the path after the splits.
     float
-        Size of the zigzag of the path: the mean length of its edges before the splits, at most the
-        longest edge length allowed after them.
+        Step length of the path's zigzag: the mean length of its edges before the splits, but at
+        most the longest edge allowed after them.
     """
     points = np.array([split.position(vertex) for vertex in loop])
     if closed:
@@ -71,7 +72,7 @@ def refine_along(
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Lengths of edges, and whether they are too long at their distance from the loop."""
-        # Rounded, so that edges of equal length stay equal under rotations of the model.
+        # Rounded, so that edges of equal length remain equal when the model is rotated.
         size = np.round(np.linalg.norm(start - end, axis=1) / longest, 6) * longest
         distance, _ = tree.query(0.5 * (start + end))
         return size, (size > longest) & (distance < half_width + 0.5 * size)
@@ -111,7 +112,7 @@ def refine_along(
 
 
 def _samples(points: FloatArray, spacing: float) -> FloatArray:
-    """Samples of a polyline, no farther apart than the spacing."""
+    """Points along a polyline, no farther apart than the spacing."""
     points, following = points[:-1], points[1:]
     count = np.ceil(np.linalg.norm(following - points, axis=1) / spacing).astype(int).clip(min=1)
     return np.concatenate(

@@ -1,8 +1,8 @@
-"""The initial path (section 3.1): mesh edges through the control points, closed or open.
+"""The initial path (section 3.1): a closed or open path of mesh edges through the control points.
 
-Shortest paths between consecutive points may share edges or cross, and then have no signed
-distance. Here each path avoids all vertices of earlier paths. Where vertices are too few it passes
-through midpoints of edges, which are then split virtually.
+Shortest paths between consecutive points may share edges or cross, and then no signed distance to
+them exists. So each leg of the path avoids all vertices of the earlier legs. Where there are too
+few vertices, the leg runs through midpoints of edges, which are then split virtually.
 """
 
 from __future__ import annotations
@@ -35,17 +35,20 @@ class InitialLoop:
     Attributes
     ----------
     vertices : (l,) int array
-        Working vertices in order, the first of a closed path not repeated at the end. An edge
-        between two of them is always an edge of the path.
+        Working vertices in order; the first vertex of a closed path is not repeated at the end. An
+        edge of the working mesh that joins two of them is always an edge of the path.
     control_vertices : (k,) int array
-        The working vertices of the control points, in order along the path.
+        Working vertices of the control points, in order along the path.
     order : (k,) int array
-        Their indices among the caller's control points.
+        Indices of the control points in the caller's array, in the same order.
     edge_length : float
-        Mean length h of the edges at the loop, the unit of the widths of band and delta.
+        Mean length h of the edges with at least one end on the path, in mesh units. The widths of
+        the narrow band and of the Dirac delta are multiples of h.
     zigzag : float
-        Length of the steps of the loop along the mesh, which smoothing has to remove.
+        Step length of the path's zigzag along mesh edges, which smoothing has to remove. See
+        `refine_along`.
     closed : bool
+        Whether an edge joins the last vertex to the first.
     """
 
     vertices: IntArray
@@ -57,12 +60,12 @@ class InitialLoop:
 
     @property
     def edges(self) -> IntArray:
-        """Pairs of consecutive vertices, shape (l, 2), or (l - 1, 2) of an open path."""
+        """Pairs of consecutive vertices, shape (l, 2), or (l - 1, 2) for an open path."""
         pairs = np.stack([self.vertices, np.roll(self.vertices, -1)], axis=1)
         return pairs if self.closed else pairs[:-1]
 
     def neighbours(self, place: int) -> list[int]:
-        """The previous and the next vertex at an index of the path."""
+        """The vertices before and after the vertex at an index of the path, in either order."""
         edges = self.edges
         return edges[(edges == self.vertices[place])[:, ::-1]].tolist()
 
@@ -76,38 +79,40 @@ def build_initial_loop(
     via_points: ViaPoints | None = None,
     pieces: int = PIECES,
 ) -> tuple[WorkingMesh, InitialLoop]:
-    """Insert the control points and join them by edge paths without contact.
+    """Insert the control points as vertices and join them by edge paths that never touch.
 
     Parameters
     ----------
     mesh : Mesh
     points : SurfacePoints
-        At least three, or two of an open path, on one component.
+        At least three control points, or two for an open path, on one connected component.
     order : {"given", "shortest"}
-        Visit the points as given, or in the shortest order.
+        Whether the points are visited as given or in the shortest order.
     phi_fea : (V,) float array, optional
-        φ_fea at the input vertices. Lengths are weighted by its square, as in Eq. 7, so the loop
-        avoids obstacles and follows alignment from the start.
+        φ_fea at the input vertices. Lengths are weighted by its square, as in Eq. 7, but with at
+        least `leg_search.LEAST_WEIGHT`. So the path avoids obstacles and follows alignment from the
+        start.
     closed : bool
         Whether the path returns from the last point to the first.
     via_points : mapping, optional
-        From the index of a control point to points on the path from there to the next one.
+        Mapping from the index of a control point to via points on the leg that starts there.
     pieces : int
         Refinement of the mesh along the path, see `refine_along`.
 
     Returns
     -------
     WorkingMesh
-        The component of the points, split so that the loop runs along edges.
+        The component that contains the points, split so that the path runs along edges.
     InitialLoop
+        The path on that mesh.
 
     Raises
     ------
     UnreachableError
-        If no simple path visits the points in this order, or only one with too many windings. The
-        message names an order that works, if one is found.
+        If no simple path through the points in this order is found, or only one with too many
+        windings. The message names an order that works, if one is found.
     ArgumentError
-        If a key of the via points is not the index of a leg.
+        If a key of the via points is not the index of a leg, or the order is not "given".
     ControlPointError
         If a via point cannot be used.
     """
@@ -146,14 +151,14 @@ def build_initial_loop(
 
 
 class _Tours:
-    """Orders in which a curve may visit control points, each computed on first use."""
+    """Possible orders of the control points along the curve, each computed on first use."""
 
     def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
         self._mesh, self._points, self.closed = mesh, points, closed
         self.given = np.arange(len(points))
 
     def of(self, order: str) -> Iterator[IntArray]:
-        """The orders to try for a request, the best one first."""
+        """Orders to try for a request, the preferred one first."""
         if order == "given":
             yield self.given
         else:
@@ -167,7 +172,7 @@ class _Tours:
 
     @cached_property
     def along_boundaries(self) -> IntArray:
-        """A short order in which a curve can visit all points, (k,)."""
+        """A short order that is possible even if points lie on boundaries, (k,)."""
         working, vertices, distance = self._on_mesh
         place = np.full(len(working.vertices), -1)
         place[vertices] = np.arange(len(vertices))
@@ -176,7 +181,7 @@ class _Tours:
 
     @cached_property
     def _on_mesh(self) -> tuple[WorkingMesh, IntArray, FloatArray]:
-        """A mesh with all points as vertices, these vertices, and distances along edges."""
+        """The working mesh with all points inserted, their vertices and their edge distances."""
         split = SplitMesh(self._mesh)
         controls = split.insert_points(self._points)
         component = int(self._mesh.face_component[self._points.faces[0]])
@@ -187,9 +192,13 @@ class _Tours:
 
 
 def boundary_loops(faces: IntArray) -> list[IntArray]:
-    """Loops of vertices along the boundary of a manifold, directed with the surface on one side.
+    """Vertices of each boundary loop of a manifold, with the surface on the same side of all loops.
 
     On a non-orientable surface the direction of each loop is arbitrary.
+
+    Parameters
+    ----------
+    faces : (m, 3) int array
     """
     oriented = igl.bfs_orient(faces)[0]
     sides = oriented[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -221,17 +230,18 @@ def _advice(
     phi_fea: FloatArray | None,
     via: bool,
 ) -> str:
-    """What to change, after trying it.
+    """Advice for the error message: an order that was tried and works, or what else to change.
 
     Parameters
     ----------
     mesh, points, phi_fea
-        As in `build_initial_loop`.
+        Arguments of `build_initial_loop`.
     tours : _Tours
+        Orders to try.
     visited : (k,) int array
-        The order that does not work.
+        The order that failed.
     via : bool
-        Whether there are via points, so that the same order may work without them.
+        Whether the failed path had via points. If so, the same order is tried without them.
     """
     tried = [] if via else [visited.tolist()]
     for order in (tours.given, tours.shortest, tours.along_boundaries):
@@ -251,19 +261,23 @@ def _advice(
 
 
 def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCurve:
-    """The initial path itself as a curve: simple, and exactly through the control points.
+    """Convert the initial path to a curve, which is simple and passes exactly through the points.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh that the working mesh is a part of.
+        The input mesh, from which the working mesh was made.
     working : WorkingMesh
     loop : InitialLoop
+
+    Returns
+    -------
+    SurfaceCurve
     """
     path = loop.vertices
     following = np.roll(path, -1)
     if not loop.closed:
-        following[-1] = path[-2]  # the last point lies on the last segment
+        following[-1] = path[-2]  # no segment starts at the last point, so the last one is used
     size = len(working.vertices)
     keys = side_keys(working.faces, size)
     order = np.argsort(keys, kind="stable")
@@ -282,8 +296,8 @@ def _separate_strands(split: SplitMesh, loop: list[int], closed: bool) -> None:
     """Insert vertices between neighbouring strands of the loop.
 
     An edge between two loop vertices that is not an edge of the loop is split, and so is a face
-    whose three edges belong to the loop. Then the two sides of the loop are different components of
-    the remaining vertices, and flood fill can tell them apart.
+    whose three edges belong to the loop. Then the remaining vertices on the two sides of the loop
+    belong to different components, which flood fill can tell apart.
     """
     on_loop = set(loop)
     onward = loop[1:] + loop[:1] if closed else loop[1:]

@@ -1,4 +1,7 @@
-"""The search graph of legs: vertices and edge midpoints of a part of a split mesh."""
+"""The graph in which the legs of the path are searched for, on a part of a split mesh.
+
+Its nodes are the vertices and the midpoints of edges.
+"""
 
 from __future__ import annotations
 
@@ -13,27 +16,31 @@ from ..geometry.mesh import Mesh, adjacent_sides, joined_corners, side_corners
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]
-"""A vertex of the split mesh, or an edge, which stands for its midpoint."""
+"""A vertex of the split mesh, or the two ends of an edge, which stand for its midpoint."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Some faces of the split mesh as a graph of n vertices and then E edge midpoints.
+    """A set of faces of the split mesh as a graph of n vertices followed by E edge midpoints.
 
     Attributes
     ----------
     vertices : (n,) int array
         Vertices of the split mesh, sorted.
     edges : (E, 2) int array
-        Sorted.
-    on_rim, nonmanifold_edges : (E,) bool array
-        Edges with one face, and with more than two.
+        Edges as pairs of indices into ``vertices``, smaller index first, sorted.
+    on_rim : (E,) bool array
+        Whether an edge has only one face in the patch.
+    nonmanifold_edges : (E,) bool array
+        Whether an edge has more than two faces.
     positions : (n + E, 3) float array
-        Of the nodes.
+        Positions of the nodes.
     weight : (n + E,) float array
-        Factor of lengths at the nodes, see `leg_search.length_factor`.
+        Factor of lengths at each node, see `leg_search.length_factor`.
     arcs : (a, 2) int array
+        Pairs of nodes that an arc joins.
     through_midpoints : (a,) bool array
+        Whether one or both ends of an arc are midpoints.
     """
 
     vertices: IntArray
@@ -56,37 +63,38 @@ class Patch:
         return self.step_lengths(self.arcs)
 
     def step_lengths(self, steps: IntArray) -> FloatArray:
-        """Weighted lengths of pairs of nodes (s, 2), shape (s,)."""
+        """Weighted lengths of the steps between pairs of nodes (s, 2), shape (s,)."""
         start, end = steps.T
         apart = np.linalg.norm(self.positions[start] - self.positions[end], axis=1)
         return apart * (0.5 * (self.weight[start] + self.weight[end]))
 
     def graph(self, lengths: FloatArray) -> sparse.csr_array:
-        """The arcs as a symmetric matrix; arcs of infinite length are blocked."""
+        """Symmetric matrix of the lengths given for the arcs; infinite lengths block an arc."""
         arc, indices, indptr = self._structure
         return sparse.csr_array((lengths[arc], indices, indptr), shape=(self.size, self.size))
 
     @cached_property
     def _structure(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The arc and the column of each matrix entry, and the start of each row."""
+        """Arc index and column of each matrix entry, and the first entry of each row."""
         arc = np.arange(len(self.arcs))
         rows, columns = np.concatenate([self.arcs, self.arcs[:, ::-1]]).T
         entries = sparse.coo_array(
             (np.concatenate([arc, arc]), (rows, columns)), shape=(self.size, self.size)
         )
-        # Two faces with the same corners give arcs twice; their numbers must not be summed.
+        # Two faces with the same corners give the same arcs twice. The conversion would sum their
+        # arc indices if the matrix were not declared free of duplicates.
         entries.has_canonical_format = True
         checkpoint()
         matrix = entries.tocsr()
         return matrix.data, matrix.indices, matrix.indptr
 
     def places(self, vertices: IntArray) -> IntArray:
-        """Nodes of vertices of the split mesh, omitting vertices outside this part."""
+        """Nodes of vertices of the split mesh; vertices outside this patch are omitted."""
         place = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
         return place[self.vertices[place] == vertices]
 
     def node(self, place: int) -> Node:
-        """The vertex, or the edge of the midpoint, of a node."""
+        """The vertex at a node, or the edge whose midpoint the node is."""
         if place < len(self.vertices):
             return int(self.vertices[place])
         start, end = self.vertices[self.edges[place - len(self.vertices)]]
@@ -96,7 +104,7 @@ class Patch:
 def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
     """Vertices whose faces form more than one fan, shape (V,).
 
-    Faces at a vertex belong to the same fan if edges at that vertex connect them.
+    Faces at a vertex belong to the same fan if they are connected through edges at that vertex.
     """
     ends = side_corners(mesh.faces)
     one, other = adjacent_sides(mesh.faces)

@@ -1,7 +1,8 @@
-"""The shortest path of one leg: Dijkstra's algorithm over free vertices and edge midpoints.
+"""The shortest path for one leg: Dijkstra's algorithm over free vertices and edge midpoints.
 
-Midpoints connect every face to its neighbours across all edges that do not belong to a path or the
-boundary. So a leg exists wherever the remaining surface is connected, however few vertices it has.
+Midpoints connect every face to its neighbours across all edges that belong neither to another leg
+nor to the boundary. So a leg is found wherever the remaining surface is connected, however few
+vertices it has.
 """
 
 from __future__ import annotations
@@ -22,56 +23,57 @@ from .virtual_splits import SplitMesh
 MIDPOINT_DETOUR = 2.0
 """Cost of a length through edge midpoints, relative to the same length along edges.
 
-Above 1 so that the mesh is split only where edges alone would make a long detour.
+It is above 1, so that edges are split only where a path along edges would be a long detour.
 """
 
 STRAND_PENALTY = 4.0
-"""Relative cost added to lengths right beside an earlier path.
+"""Relative cost added to lengths right beside an earlier leg.
 
-Two strands of a loop then pass a thin limb on opposite sides, which leaves room for the level set
-between them.
+It makes two strands of a loop pass a thin limb on opposite sides, which leaves room for the level
+set between them.
 """
 
 NONMANIFOLD_FACTOR = 20.0
 """Factor of lengths at non-manifold vertices and edges.
 
-These belong to several sheets and can be passed only once, so a leg uses them only where it must.
+These belong to several sheets but can be passed only once, so a leg should use them only where it
+has to.
 """
 
 LEAST_WEIGHT = 1.0 / 3.0
-"""Least factor that alignment gives to a length, which limits the detour a leg takes for a lane.
+"""Least factor of a length under alignment, which limits the detour of a leg to a lane.
 
-At 0.1 distant legs are attracted to a lane, and two legs share one; at 0.5 legs ignore more of the
-lanes that are 5 % of the diagonal away.
+At 0.1, distant legs are attracted to a lane, and two legs share a lane. At 0.5, legs ignore more of
+the lanes that are 5 % of the diagonal away.
 """
 
 FIRST_REACH = 3.0
-"""Length limit of the first search, relative to the distance between the ends in space."""
+"""Length limit of the first search, relative to the straight-line distance between the ends."""
 
 REACH_GROWTH = 2.0
-"""Factor of the length limit from one search to the next."""
+"""Factor by which the length limit grows from one search to the next."""
 
 WHOLE_SHARE = 0.5
-"""Share of the faces above which the whole component is searched."""
+"""Fraction of the component's faces above which the search covers the whole component instead."""
 
 
 def length_factor(phi_fea: FloatArray) -> FloatArray:
-    """Factor of lengths at values of φ_fea, any shape."""
+    """Factor of lengths where φ_fea has the values given, an array of any shape."""
     return np.maximum(phi_fea**2, LEAST_WEIGHT)
 
 
 @dataclass(frozen=True)
 class BlockedElements:
-    """What a leg must avoid.
+    """Vertices and edges that a leg must avoid.
 
     Attributes
     ----------
     vertices : (q,) int array
-        Vertices on other legs, and waypoints of other legs.
+        Vertices of other legs, and waypoints that do not belong to this leg.
     edges : (p, 2) int array
         Edges of other legs, which must not be crossed.
     ends : (e,) int array
-        Vertices where only one leg ends so far, from which another leg continues.
+        Waypoints at which exactly one leg ends so far, from which the path may continue.
     """
 
     vertices: IntArray
@@ -81,13 +83,14 @@ class BlockedElements:
 
 @dataclass(frozen=True)
 class Leg:
-    """A path from one vertex to another.
+    """A path from one waypoint to the next.
 
     Attributes
     ----------
     nodes : list of Node
+        Vertices and edge midpoints of the path, in order.
     length : float
-        Weighted by φ_fea, without the penalties of the search.
+        Length of the path, weighted by φ_fea, without the penalties of the search.
     """
 
     nodes: list[Node]
@@ -102,13 +105,13 @@ class LegSearch:
     mesh : Mesh
         The input mesh.
     split : SplitMesh
-        Its splits; more may be added between searches.
+        Virtual splits of the input mesh; more may be added between searches.
     component : (F,) bool array
-        The input faces of the component.
+        Whether each input face belongs to the component.
     phi_fea : (V,) float array or None
         φ_fea at the input vertices.
     clearance : float
-        Distance within which legs repel each other.
+        Distance within which a leg avoids other legs, in mesh units.
     """
 
     def __init__(
@@ -135,10 +138,11 @@ class LegSearch:
             self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
 
     def shortest(self, source: int, target: int, obstacles: BlockedElements) -> Leg | None:
-        """The shortest free leg, or None.
+        """Find the shortest leg that avoids the obstacles; None if no leg exists.
 
-        The search covers the part of the surface that a leg of limited length can reach, and is
-        repeated with greater limits. The leg found is the shortest on the whole surface.
+        A search covers only the part of the surface that a leg of limited length can reach. It is
+        repeated with larger limits until it succeeds. The leg found is the shortest one on the
+        whole surface.
         """
         start, end = self._split.position(source), self._split.position(target)
         apart = np.linalg.norm(self._mesh.vertices - start, axis=1)
@@ -157,7 +161,7 @@ class LegSearch:
             reach *= REACH_GROWTH
 
     def are_joinable(self, pairs: list[tuple[int, int]], obstacles: BlockedElements) -> bool:
-        """Whether each pair of vertices, on its own, can be joined."""
+        """Whether each pair of vertices, taken alone, can be joined by a leg."""
         patch = self._whole()
         free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
         free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
@@ -174,6 +178,7 @@ class LegSearch:
     def _search(
         self, patch: Patch, source: int, target: int, obstacles: BlockedElements, limit: float
     ) -> Leg | None:
+        """The cheapest leg on a patch, penalties included; None if all exceed the cost limit."""
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
         factor = self._nonmanifold_factor(patch)
         if factor is not None:
@@ -199,18 +204,19 @@ class LegSearch:
         return Leg([patch.node(place) for place in places], length)
 
     def _whole(self) -> Patch:
-        """The component, cached until something is split."""
+        """Graph of the whole component, cached until the mesh is split again."""
         if self._kept is None or self._kept[0] != self._split.n_faces:
             self._kept = self._split.n_faces, self._patch(self._component)
         return self._kept[1]
 
     def _patch(self, inside: BoolArray) -> Patch:
-        """Graph of the living faces in some input faces.
+        """Graph of the living faces inside selected input faces.
 
-        Arcs are edges, half edges, and the three lines between midpoints in every face. Lines from
-        a vertex to the opposite midpoint are omitted: with them, splitting the edges of a path one
-        by one would not always produce its own lines as edges. Boundary edges have no arcs: a path
-        along the boundary would separate what lies beyond.
+        The arcs are the edges, the two halves of each edge, and the three lines between edge
+        midpoints in every face. Lines from a vertex to the midpoint of the opposite edge are
+        omitted: with them, splitting the edges of a path one by one would not always turn the lines
+        of the path into edges. Boundary edges have no arcs, because a path along the boundary would
+        separate the surface.
         """
         vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
         checkpoint()
@@ -252,15 +258,15 @@ class LegSearch:
         )
 
     def _free(self, patch: Patch, obstacles: BlockedElements, ends: IntArray) -> BoolArray:
-        """Nodes that a leg between two ends may use: not on the boundary or on obstacles."""
+        """Whether a leg may use each node: its ends, and nodes off the boundary and obstacles."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
-        # A boundary vertex where fans of faces meet may be the only connection between them.
+        # A boundary vertex at which several fans meet may be the only connection between them.
         free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.places(obstacles.vertices)] = False
         if len(obstacles.edges):
-            # A leg through the midpoint of an edge of a path would cross the path.
+            # A leg through the midpoint of an edge of another leg would cross that leg.
             size = self._split.n_vertices
             keys = patch.vertices[patch.edges] @ [size, 1]
             on_path = np.isin(keys, np.sort(obstacles.edges, axis=1) @ [size, 1])
@@ -280,10 +286,12 @@ class LegSearch:
         return factor
 
     def _nonmanifold_here(self, patch: Patch) -> IntArray:
+        """Nodes of a patch that are non-manifold vertices of the input mesh."""
         n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
         return np.flatnonzero(self._nonmanifold[patch.vertices[:n_input]])
 
     def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
+        """φ_fea at vertices of the split mesh, interpolated at inserted vertices."""
         assert self._phi_fea is not None
         n_input = len(self._mesh.vertices)
         result = self._phi_fea[np.minimum(vertices, n_input - 1)]
@@ -293,9 +301,9 @@ class LegSearch:
         return result
 
     def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:
-        """Shorten a path that runs along an edge and also passes its midpoint.
+        """Shorten a path that both runs along an edge and passes the midpoint of that edge.
 
-        Such a path may be the shortest where the penalty beside other legs varies strongly.
+        Such a path may be the cheapest where the penalty beside other legs varies strongly.
         """
         at = {place: number for number, place in enumerate(places)}
         for place in places:
@@ -315,9 +323,9 @@ class LegSearch:
 def _closeness(
     graph: sparse.csr_array, taken: IntArray, ends: IntArray, clearance: float
 ) -> FloatArray:
-    """Closeness of each node to blocked nodes: 1 beside them, 0 from the clearance on.
+    """Closeness of each node to blocked nodes: 1 at distance 0, and 0 from the clearance on.
 
-    Around an end of the path, only nodes whose nearest blocked node is not the end itself count as
+    Near an end of the path, only nodes whose nearest blocked node is not the end itself count as
     close. So the curve continues through its control points instead of turning back.
     """
     checkpoint()

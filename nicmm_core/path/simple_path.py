@@ -1,8 +1,8 @@
-"""A simple path through points in their order: the shortest of several tries.
+"""A simple path through points in a given order: the shortest of several attempts.
 
-Every leg passes around earlier legs, so the sequence in which legs are found determines how often
-the path winds around itself. With many points in an order that jumps back and forth, the length
-varies many times over, and no rule finds the best sequence.
+Every leg has to go around the legs found before it, so the sequence in which legs are found
+determines how often the path winds around itself. With many points in an order that jumps back and
+forth, the length varies by a large factor, and no rule finds the best sequence.
 """
 
 from __future__ import annotations
@@ -20,25 +20,28 @@ from .legs import CrossingError, Legs
 from .virtual_splits import SplitMesh
 
 STRAND_CLEARANCE = 0.1
-"""Distance, in square roots of the component's area, within which a path avoids earlier ones."""
+"""Distance within which a leg avoids earlier legs, in square roots of the component's area."""
 
 ROOMY = 25
-"""Number of points above which that distance decreases with the spacing of the points."""
+"""Number of points above which `STRAND_CLEARANCE` is reduced, with the spacing of the points."""
 
 LONG = 1.3
-"""Length of a path, relative to its legs without the others, above which more are tried."""
+"""Length of a path, relative to the sum of its legs found alone, above which attempts go on."""
 
 MOST_TRIES = 6
-"""Most paths tried to find a shorter one."""
+"""Maximum number of attempts to find a shorter path."""
 
 MOST_TRIES_WHILE_CROSSING = 14
-"""Most paths tried while each has crossing legs."""
+"""Maximum number of attempts as long as no path has been found because legs would cross."""
 
 MOST_SPLITS_TO_TRY = 40_000
-"""Total virtual splits of all tries after which no other path is tried."""
+"""Total number of virtual splits, over all attempts, above which no further attempt is made."""
 
 SHUFFLE, SHUFFLE_WHILE_CROSSING = 0.35, 1.0
-"""Random change of the sequence of legs: standard deviation of the logarithm of lengths."""
+"""Standard deviations of the random change of the legs' log lengths, which reorders the legs.
+
+The second one is used as long as no path has been found because legs would cross.
+"""
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,11 @@ class Path:
     ----------
     split : SplitMesh
     vertices : list of int
-        The first vertex of a closed path is not repeated.
+        Vertices of the path in order; the first vertex of a closed path is not repeated.
     waypoints : (k,) int array
-        Vertices of the points, in order.
+        Vertices of the given points, in order.
     length : float
-        Weighted by φ_fea.
+        Length of the path, weighted by φ_fea.
     """
 
     split: SplitMesh
@@ -63,10 +66,11 @@ class Path:
 
 
 def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
-    """A simple path through points in their order, with virtual splits of the mesh.
+    """Find a simple path through points in their order, with virtual splits of the mesh.
 
-    Legs are found in the order of the points first. If the path is much longer than its legs have
-    to be, short legs come first, then random variations of that sequence are tried.
+    The first attempt finds the legs in the order of the points. If it fails, or if the path is much
+    longer than the sum of its legs found alone, the second attempt finds short legs first, and
+    further attempts vary this sequence at random.
 
     Parameters
     ----------
@@ -74,15 +78,22 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
     points : SurfacePoints
         Distinct points on one component.
     phi_fea : (V,) float array or None
-        φ_fea at the input vertices; lengths are weighted by its square.
+        φ_fea at the input vertices, which weights lengths (`leg_search.length_factor`).
     closed : bool
+        Whether the path returns from the last point to the first.
+
+    Returns
+    -------
+    Path
+        The shortest path found.
 
     Raises
     ------
     CrossingError
-        If a leg would cross the others.
+        If every attempt has a leg that would cross other legs.
     UnreachableError
-        If every path has too many windings.
+        If no attempt succeeds, and one of them fails because the path winds around itself too often
+        or its strands are too close for this mesh.
     """
     component = mesh.face_component == mesh.face_component[points.faces[0]]
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
@@ -102,7 +113,8 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
         try:
             done = legs.find_all(sequence, np.inf if best is None else best.length)
         except UnreachableError as error:
-            # A path with too many windings exists; after a crossing, perhaps none does.
+            # Too many windings are reported rather than a crossing: they show that a path exists,
+            # whereas after a crossing perhaps none does.
             if failure is None or not isinstance(error, CrossingError):
                 failure = error
         if done:
@@ -125,7 +137,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
 
 
 def separate(split: SplitMesh, waypoints: IntArray) -> None:
-    """Split edges between waypoints, so that no two waypoints are neighbours."""
+    """Split every edge between two waypoints, so that no two waypoints are neighbours."""
     wanted = {int(waypoint) for waypoint in waypoints}
     for waypoint in sorted(wanted):
         for face in sorted(split.faces_around(waypoint)):

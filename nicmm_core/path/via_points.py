@@ -1,7 +1,7 @@
-"""Via points: they steer the initial path between consecutive control points.
+"""Via points, which steer the initial path between consecutive control points.
 
 They select the homotopy class of the curve, such as the side of a limb or the direction around a
-handle. Only the initial path passes through them; the curve does not interpolate them.
+handle. Only the initial path passes through them; the final curve does not interpolate them.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from ..geometry.surface_points import (
 )
 
 ViaPoints = Mapping[int, ArrayLike | SurfacePoints]
-"""From the index of a control point to the points between it and the next one."""
+"""Mapping from the index of a control point to the via points on the leg that starts there."""
 
 OFF_BOUNDARY = 0.2
-"""Share by which a via point on the boundary is moved towards the centroid of its face."""
+"""Fraction by which a via point on the boundary is moved towards the centroid of its face."""
 
 LocatedViaPoints = dict[int, SurfacePoints]
-"""The same, checked, as faces and barycentric coordinates."""
+"""The same mapping after the checks, with points as faces and barycentric coordinates."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,11 @@ class Waypoints:
     Attributes
     ----------
     points : SurfacePoints
+        All k waypoints.
     is_control : (k,) bool array
+        Whether each waypoint is a control point.
     names : list of PointName
-        Their names in messages.
+        Names of the waypoints in messages.
     """
 
     points: SurfacePoints
@@ -54,7 +56,7 @@ class Waypoints:
 def located_via_points(
     mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
 ) -> LocatedViaPoints:
-    """Via points as faces and barycentric coordinates, by the index of the control point before.
+    """Check via points and convert them to faces and barycentric coordinates.
 
     Parameters
     ----------
@@ -62,18 +64,25 @@ def located_via_points(
     points : SurfacePoints
         Control points.
     via_points : mapping
-        From the index of a control point to points in any form that control points may have.
+        Mapping from the index of a control point to points, in any form accepted for control
+        points.
     order : str
-        Via points need "given": otherwise the legs are not known in advance.
+        Order of the control points. Via points need "given", since otherwise the legs are not known
+        in advance.
     closed : bool
-        The last control point of an open path has no leg.
+        Whether the curve is closed. On an open curve no leg starts at the last control point.
+
+    Returns
+    -------
+    dict of int to SurfacePoints
+        Via points by the index of the control point at which their leg starts.
 
     Raises
     ------
     ArgumentError
         If ``via_points`` is not a mapping from indices of legs, or the order is not "given".
     ControlPointError
-        If a via point is out of range or off the surface.
+        If a via point is out of range or not on the surface.
     """
     if not isinstance(via_points, Mapping):
         raise ArgumentError(
@@ -101,16 +110,22 @@ def located_via_points(
 def with_via_points(
     mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
 ) -> Waypoints:
-    """Merge via points with control points, and check them.
+    """Merge via points with control points in the order of the path, and check them.
 
-    Arguments and errors are those of `located_via_points`, and:
+    The arguments are those of `located_via_points`. Its errors are raised too, in addition to those
+    below.
+
+    Returns
+    -------
+    Waypoints
+        Control points and via points; via points on the boundary are moved into their faces.
 
     Raises
     ------
     ControlPointError
         If a via point coincides with another point.
     UnreachableError
-        If a via point lies on another component.
+        If not all points lie on the same component.
     """
     located = located_via_points(mesh, points, via_points, order, closed)
     controls = control_point_names(np.arange(len(points)))
@@ -128,9 +143,9 @@ def with_via_points(
 
 
 def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> SurfacePoints:
-    """Move some of the points off the boundary, into their faces.
+    """Move the selected points that lie on the boundary into the interior of their faces.
 
-    The path must not touch the boundary at a via point.
+    The path may touch the boundary at control points, but not at via points.
     """
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
     on_rim[mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]] = True
@@ -141,12 +156,17 @@ def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> Su
 
 
 def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
-    """Parse the via points of the command line, ``"1:57,80"`` for each leg.
+    """Parse the via points of the command line, one text such as ``"1:57,80"`` for each leg.
+
+    Returns
+    -------
+    dict of int to list of int
+        Vertices of the via points by the index of the control point at which their leg starts.
 
     Raises
     ------
     ArgumentError
-        If a text has another form, or a leg is named twice.
+        If a text has another form, or two texts are for the same leg.
     """
     via_points: dict[int, list[int]] = {}
     for text in texts:

@@ -1,8 +1,8 @@
 """Virtual splits (section 3.1, Fig. 1): the mesh M' that has every control point as a vertex.
 
-The input mesh is never changed. `SplitMesh` adds vertices and faces to it, and `SplitMesh.assemble`
-returns one connected component as arrays, with the location of every vertex and face in the input
-mesh.
+The input mesh is never changed. `SplitMesh` stores the additional vertices and faces, and
+`SplitMesh.assemble` returns one connected component as arrays, with the location of every vertex
+and face in the input mesh.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 
 Weights = dict[int, float]
-"""A point of the surface as weights of input vertices; absent vertices have weight 0."""
+"""A point of the surface as weights of input vertices; vertices not listed have weight 0."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class WorkingMesh:
     vertices : (n, 3) float array
     faces : (m, 3) int array
     parent_face : (m,) int array
-        The input face that each face lies in.
+        The input face that contains each face.
     interpolation : (n, V) sparse array
         Row i holds the weights of the input vertices at vertex i, so that
         ``vertices == interpolation @ mesh.vertices``.
@@ -49,6 +49,7 @@ class WorkingMesh:
 
     @cached_property
     def _unique_edges(self) -> tuple[IntArray, IntArray]:
+        """Edges, and the number of faces at each."""
         return unique_edges(self.faces)
 
     @property
@@ -68,7 +69,7 @@ class WorkingMesh:
 
     @cached_property
     def on_boundary(self) -> BoolArray:
-        """Vertices of edges with only one face, shape (n,)."""
+        """Whether each vertex belongs to an edge with only one face, shape (n,)."""
         edges, count = self._unique_edges
         result = np.zeros(len(self.vertices), dtype=bool)
         result[edges[count == 1]] = True
@@ -82,10 +83,11 @@ class WorkingMesh:
 
 
 class SplitMesh:
-    """The input mesh under virtual splits of faces and edges.
+    """The input mesh with virtual splits of faces and edges.
 
-    Vertices and faces keep their input indices, and new ones follow. The cost depends on the number
-    of splits, not on the size of the mesh.
+    Vertices and faces of the input mesh keep their indices; new ones are appended. A face is living
+    until a split or a flip replaces it. The cost of a split does not depend on the size of the
+    mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -107,7 +109,7 @@ class SplitMesh:
         return int(a), int(b), int(c)
 
     def weights(self, vertex: int) -> Weights:
-        """A vertex as weights of input vertices."""
+        """Position of a vertex as weights of input vertices."""
         n_input = len(self._mesh.vertices)
         return self._new_weights[vertex - n_input] if vertex >= n_input else {vertex: 1.0}
 
@@ -136,21 +138,21 @@ class SplitMesh:
 
     @property
     def n_vertices(self) -> int:
-        """Vertices of the input mesh and new ones."""
+        """Number of vertices, those of the input mesh included."""
         return len(self._mesh.vertices) + len(self._new_weights)
 
     @property
     def n_faces(self) -> int:
-        """Faces of the input mesh and new ones, living or not."""
+        """Number of faces, living or not, those of the input mesh included."""
         return len(self._mesh.faces) + len(self._new_faces)
 
     def living_faces(self, inside: BoolArray) -> IntArray:
-        """Corners of the faces that lie in some of the input faces, shape (m, 3).
+        """Corners of the living faces inside selected input faces, shape (m, 3).
 
         Parameters
         ----------
         inside : (F,) bool array
-            Which of the input faces.
+            Selection of input faces.
         """
         new, parents = self._living_new_faces()
         return np.concatenate([self._mesh.faces[inside & self._alive], new[inside[parents]]])
@@ -177,17 +179,19 @@ class SplitMesh:
         )
 
     def split_edge(self, start: int, end: int) -> int:
-        """Insert the midpoint of an edge and bisect the faces at it."""
+        """Insert the midpoint of an edge, bisect the faces at the edge, return the new vertex."""
         middle = _centroid([self.weights(start), self.weights(end)])
         return self._split_edge_at(start, end, middle)
 
     def join(self, first: int, second: int) -> bool:
-        """Join two vertices opposite a common edge inside an input face by flipping that edge.
+        """Join two vertices by an edge, if possible.
+
+        If they are opposite a common edge inside an input face, that edge is flipped.
 
         Returns
         -------
         bool
-            Whether they are joined by an edge afterwards.
+            Whether an edge joins the vertices afterwards.
         """
         if second in self.neighbours(first):
             return True
@@ -204,17 +208,19 @@ class SplitMesh:
         return False
 
     def split_face(self, face: int) -> int:
-        """Insert the centroid of a face, which becomes three faces."""
+        """Insert the centroid of a face, split the face into three, return the new vertex."""
         return self._split_face_at(face, _centroid([self.weights(v) for v in self.corners(face)]))
 
     def assemble(self, component: int) -> tuple[WorkingMesh, IntArray]:
-        """Arrays of one connected component of the input mesh, with its splits.
+        """Return one connected component of the input mesh, with all splits, as arrays.
+
+        All splits have to lie on that component.
 
         Returns
         -------
         WorkingMesh
-        (number of vertices,) int array
-            The working vertex of each vertex of this mesh, or -1 on another component.
+        (n_vertices,) int array
+            Index in the working mesh of each vertex of this mesh, or -1 on other components.
         """
         mesh = self._mesh
         kept = np.flatnonzero(self._alive & (mesh.face_component == component))
@@ -238,6 +244,7 @@ class SplitMesh:
         return working, renumbered
 
     def _interpolation(self, used: IntArray) -> sparse.csr_array:
+        """Matrix of the weights of input vertices, with one row for each vertex in ``used``."""
         n_input = len(self._mesh.vertices)
         kept = used[used < n_input]
         new = [self._new_weights[vertex - n_input] for vertex in used[len(kept) :]]
@@ -250,6 +257,7 @@ class SplitMesh:
         return matrix
 
     def _insert_point(self, input_face: int, barycentric: FloatArray) -> int:
+        """Make a point of an input face a vertex, and return the vertex."""
         corners = self.corners(input_face)
         weights = {
             corner: float(weight)
@@ -270,7 +278,7 @@ class SplitMesh:
     def _locate(
         self, input_face: int, input_corners: tuple[int, int, int], barycentric: FloatArray
     ) -> tuple[int, FloatArray]:
-        """The living face inside an input face that contains a point, and its coordinates there."""
+        """The living face that contains a point of an input face, and its barycentrics there."""
         if self._alive[input_face]:
             return input_face, barycentric
         n_input = len(self._mesh.faces)
@@ -279,7 +287,8 @@ class SplitMesh:
             for child, parent in enumerate(self._new_parents)
             if parent == input_face and self._new_alive[child]
         ]
-        # Columns: the corners of each child in the input face's barycentric coordinates.
+        # One matrix per child face; its columns are the corners of the child in barycentric
+        # coordinates of the input face.
         matrices = [
             [[self.weights(corner).get(vertex, 0.0) for corner in self.corners(face)]
              for vertex in input_corners]
@@ -291,6 +300,7 @@ class SplitMesh:
         return inside[best], local[best]
 
     def _split_edge_at(self, start: int, end: int, weights: Weights) -> int:
+        """Insert a vertex on an edge and bisect the faces at the edge."""
         middle = self._add_vertex(weights)
         for face in sorted(self.faces_around(start) & self.faces_around(end)):
             corners = self.corners(face)
@@ -302,19 +312,21 @@ class SplitMesh:
         return middle
 
     def _split_face_at(self, face: int, weights: Weights) -> int:
+        """Insert a vertex in a face and split the face into three."""
         middle = self._add_vertex(weights)
         a, b, c = self.corners(face)
         self._replace_face(face, [(a, b, middle), (b, c, middle), (c, a, middle)])
         return middle
 
     def _living_new_faces(self) -> tuple[IntArray, IntArray]:
-        """Corners and input faces of the living faces created by splits."""
+        """Corners of the living faces created by splits, and the input faces that contain them."""
         new = np.flatnonzero(np.frombuffer(bytes(self._new_alive), dtype=bool))
         faces = np.array(self._new_faces, dtype=np.int64).reshape(-1, 3)
         parents = np.array(self._new_parents, dtype=np.int64)
         return faces[new], parents[new]
 
     def _add_vertex(self, weights: Weights) -> int:
+        """Append a vertex without faces, and return its index."""
         checkpoint()
         vertex = self.n_vertices
         self._new_weights.append(weights)
@@ -324,11 +336,12 @@ class SplitMesh:
         return vertex
 
     def _parent(self, face: int) -> int:
-        """The input face that a face lies in."""
+        """The input face that contains a face."""
         n_input = len(self._mesh.faces)
         return face if face < n_input else self._new_parents[face - n_input]
 
     def _replace_face(self, face: int, children: list[tuple[int, ...]]) -> None:
+        """Replace a living face by new faces, given by their corners, in the same input face."""
         n_input = len(self._mesh.faces)
         parent = self._parent(face)
         if face < n_input:
@@ -346,7 +359,7 @@ class SplitMesh:
 
 
 def _centroid(points: Sequence[Weights]) -> Weights:
-    """The centroid of some points."""
+    """The centroid of points."""
     share = 1.0 / len(points)
     centroid: Weights = {}
     for point in points:

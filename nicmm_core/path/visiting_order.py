@@ -1,7 +1,7 @@
-"""The order in which a loop visits its control points: a short cyclic or open tour.
+"""The order in which a curve visits its control points: a short closed or open tour.
 
-The shortest tour may be impossible where points lie on boundaries; `order_along_boundaries` gives
-a possible one.
+If points lie on boundaries, no simple curve may exist for the shortest tour.
+`order_along_boundaries` gives a tour for which one exists.
 """
 
 from __future__ import annotations
@@ -14,30 +14,32 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 
 EXACT_UP_TO = 9
-"""Tours of more points are improved by exchanges instead of being optimal."""
+"""Largest number of points with an optimal tour; longer tours are improved by exchanges."""
 
 LONGEST_MOVE = 3
-"""Most consecutive points moved together to another position in the tour."""
+"""Largest number of consecutive points moved together to another position in the tour."""
 
 
 def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
-    """Order that makes the tour through all points short.
+    """Find an order that makes the tour through all points short.
 
-    It starts at the point that is farthest from all others, and goes to the nearer of its
-    neighbours first: the numbers of the points make no difference.
+    A closed tour starts at the most remote point, the one with the largest sum of distances to all
+    others, and goes to the nearer of its two neighbours first. An open tour starts at the more
+    remote of its two ends. So the order does not depend on the numbering of the points.
 
     Parameters
     ----------
     distance : (k, k) float array
         Symmetric distances along the surface.
     closed : bool
-        Whether the tour returns to its start. An open tour may start anywhere.
+        Whether the tour returns to its start. An open tour may start at any point.
 
     Returns
     -------
     (k,) int array
-        Optimal for up to `EXACT_UP_TO` points. Beyond, the nearest-neighbour
-        tour, improved until no reversal of a section (2-opt, Croes 1958) and no move of up to three
+        Indices of the points in the order visited. The tour is optimal for up to `EXACT_UP_TO`
+        points, or one fewer for an open tour. For more points it is the nearest-neighbour tour,
+        improved until no reversal of a section (2-opt, Croes 1958) and no move of up to three
         points (Or 1976) shortens it.
     """
     by_remoteness = np.argsort(-distance.sum(axis=1), kind="stable")
@@ -55,32 +57,33 @@ def shortest_order(distance: FloatArray, closed: bool) -> IntArray:
 
 
 def _tour(distance: FloatArray) -> IntArray:
-    """A short cyclic tour through all points, starting at point 0."""
+    """A short closed tour through all points, starting at point 0."""
     if len(distance) <= EXACT_UP_TO:
         return _shortest(distance)
     return _improved(distance, _nearest_neighbour(distance))
 
 
 def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: bool) -> IntArray:
-    """A short order in which a simple curve can visit points, some of which lie on boundaries.
+    """Find a short order in which a simple curve can visit points even if some lie on boundaries.
 
     The boundary of a thin strip around a tree through all points is a simple curve. Where the tree
-    reaches a boundary of the surface, the curve can follow it and visit the points there in the
-    direction of the boundary.
+    reaches a boundary of the surface, the curve can follow that boundary and visit its points in
+    their order along it.
 
     Parameters
     ----------
     distance : (k, k) float array
         Symmetric distances along the surface.
     loops : list of (b,) int array
-        Points on each boundary loop in its direction, with the surface on the same side of all
-        loops if it is orientable.
+        Points on each boundary loop, in the direction of the loop. If the surface is orientable, it
+        lies on the same side of all loops.
     closed : bool
         Whether the tour returns to its start.
 
     Returns
     -------
     (k,) int array
+        Indices of the points in the order visited.
     """
     inner = np.setdiff1d(np.arange(len(distance)), np.concatenate([*loops, np.zeros(0, np.int64)]))
     chains = [loop for loop in loops if len(loop)] + [np.array([point]) for point in inner]
@@ -95,8 +98,8 @@ def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: 
 
 
 def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArray:
-    """A tour with a cyclic chain of points inserted as a whole where it costs least."""
-    last = np.roll(chain, 1)  # of the chain that starts at each of its points
+    """Insert a cyclic chain of points into a closed tour, as a whole and where it costs least."""
+    last = np.roll(chain, 1)  # the last point of the chain if it starts at chain[i] is last[i]
     following = np.roll(tour, -1)
     cost = distance[np.ix_(tour, chain)] + distance[np.ix_(following, last)]
     cost -= distance[tour, following][:, None]
@@ -106,11 +109,11 @@ def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArr
 
 
 def _shortest(distance: FloatArray) -> IntArray:
-    """The shortest cyclic tour of at most `EXACT_UP_TO` points, by trying all."""
+    """The shortest closed tour of at most `EXACT_UP_TO` points, by comparing all tours."""
     if len(distance) <= 3:
         return np.arange(len(distance))
     checkpoint()
-    # Of tours of equal length, the one that ends at the first points.
+    # Reversed, so that of several shortest tours the one that ends with the first points is taken.
     others = np.array(list(itertools.permutations(range(1, len(distance)))))[:, ::-1]
     tours = np.pad(others, ((0, 0), (1, 0)))
     lengths = np.cumsum(distance[tours, np.roll(tours, -1, axis=1)], axis=1)[:, -1]
@@ -118,6 +121,7 @@ def _shortest(distance: FloatArray) -> IntArray:
 
 
 def _nearest_neighbour(distance: FloatArray) -> IntArray:
+    """The tour from point 0 that always goes on to the nearest unvisited point."""
     tour, unvisited = [0], list(range(1, len(distance)))
     while unvisited:
         checkpoint()
@@ -126,8 +130,8 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
 
 
 def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
-    """The tour after repeated best exchanges, starting at point 0."""
-    # Gains below rounding could make exchanges cycle.
+    """Improve a closed tour by the best exchange until none shortens it; start at point 0."""
+    # Exchanges with gains below rounding errors could cycle.
     least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
     while True:
         checkpoint()
@@ -142,7 +146,7 @@ def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
 
 
 def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, int]:
-    """The best gain of reversing the section from i + 1 to j, with i and j."""
+    """The largest gain from reversing a section of the tour from i + 1 to j, and i and j."""
     following = np.roll(tour, -1)
     leg = distance[tour, following]
     gain = leg[:, None] + leg[None] - distance[np.ix_(tour, tour)]
@@ -153,11 +157,11 @@ def _best_reversal(distance: FloatArray, tour: IntArray) -> tuple[float, int, in
 
 
 def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
-    """The best gain of moving a few points to another leg, and the tour after it."""
+    """The largest gain from moving a few consecutive points to another leg, and the new tour."""
     k = len(tour)
     best, moved = 0.0, tour
     for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
-        # Row i: move points i … i + count - 1; column j: to the leg after point j.
+        # Row i is for moving the points i … i + count - 1, column j for the leg after point j.
         checkpoint()
         before, first = np.roll(tour, 1), tour
         last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
