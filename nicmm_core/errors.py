@@ -50,7 +50,7 @@ class ArgumentError(NicmmError):
 
 
 class CurveError(NicmmError):
-    """A curve cannot be used for this: it is not on the mesh, meets itself or bounds no region."""
+    """A curve cannot be used as asked: it is not on the mesh, meets itself or bounds no region."""
 
 
 class MissingPackageError(NicmmError):

@@ -109,7 +109,7 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     ------
     CurveError
         If the start is not one curve through its control points on the original, enters faces that
-        curves may not enter, or passes a non-manifold edge where the repair has cut it.
+        curves may not enter, or cannot be mapped at a non-manifold edge.
     """
     if isinstance(start, Design):
         resumable = start.resumable

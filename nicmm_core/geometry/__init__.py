@@ -1,5 +1,5 @@
 """Meshes, points and polylines on them, traces over their faces, and the tolerances.
 
-Read `mesh` and `surface_points` first. Of the modules outside, it imports only `errors`, `options`
-and `progress`.
+Read `mesh` and `surface_points` first. From outside this folder, its modules import only `errors`,
+`options` and `progress`.
 """

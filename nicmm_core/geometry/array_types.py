@@ -12,4 +12,4 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 Array = Any
-"""A NumPy array or a tensor, in functions that take both."""
+"""A NumPy array or a PyTorch tensor, in functions that accept both."""

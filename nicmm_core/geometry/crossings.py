@@ -1,7 +1,7 @@
 """Finds where a polyline on a mesh crosses or touches itself, face by face.
 
-Every segment lies in one face. So two strands can meet only inside a face that both pass, at a
-point of an edge between their faces, or at a vertex.
+Every segment lies in one face. So two strands can meet only inside a face through which both run,
+at a point of an edge between their faces, or at a vertex.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .surface_points import SurfacePoints, weights_at
 
 TOUCHING = 1e-12
-"""Distance in barycentric coordinates at which strands touch. If they cross on an edge, rounding
-may place the crossing on the near side of the edge in both faces."""
+"""Distance in barycentric coordinates up to which strands touch. If strands cross on an edge,
+rounding may place the crossing on the near side of the edge in both faces."""
 
 
 def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool) -> IntArray:
@@ -24,8 +24,9 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     all_faces : (F, 3) int array
         Faces of the mesh.
     polyline : SurfacePoints
-        Each point in the face of the segment after it.
+        Points of the polyline, each in the face of the segment that begins there.
     closed : bool
+        Whether the last point is joined to the first.
     """
     n = len(polyline)
     n_segments = n if closed else n - 1
@@ -53,19 +54,20 @@ def overlapping_segments(
     Parameters
     ----------
     group : (s,) int array
-        The face of each segment.
+        Index of the group of each segment. All segments of a group lie in one face.
     start, end : (s, 2) float array
-        Barycentric coordinates in this face.
+        First two barycentric coordinates of the ends of each segment in this face.
     """
-    # Not `grouped`, which may cancel: a curve is tested after its relaxation was cancelled.
+    # Not `grouped`, which has checkpoints. A curve is tested even after its relaxation has been
+    # cancelled, and a checkpoint would then raise an error.
     order = np.argsort(group, kind="stable")
     in_order = group[order]
     begins = np.flatnonzero(np.append(True, in_order[1:] != in_order[:-1])[: len(group)])
     count = np.append(begins[1:], len(group))[: len(begins)] - begins
     first, second = _pairs_in_groups(count)
     first, second = order[first], order[second]
-    # Boxes first: they rule out most pairs, and collinear segments pass the other tests even if
-    # they are disjoint.
+    # Bounding boxes rule out most pairs. They are also necessary, since collinear segments pass the
+    # other tests even if they are disjoint.
     low, high = np.minimum(start, end), np.maximum(start, end) + TOUCHING
     for axis in range(2):
         overlap = low[first, axis] <= high[second, axis]
@@ -77,7 +79,7 @@ def overlapping_segments(
 def segments_meet(
     start: FloatArray, end: FloatArray, first: IntArray, second: IntArray
 ) -> BoolArray:
-    """Whether pairs of overlapping segments, (p,) each, have a common point."""
+    """Whether the segments of each pair have a common point, (p,); their boxes must overlap."""
     a, b, c, d = start[first], end[first], start[second], end[second]
     return _reaches_across(a, b, c, d) & _reaches_across(c, d, a, b)
 
@@ -85,7 +87,7 @@ def segments_meet(
 def _vertices_passed_twice(
     all_faces: IntArray, polyline: SurfacePoints, n_segments: int
 ) -> IntArray:
-    """Pairs of segments that begin at the same vertex in different strands, shape (p, 2)."""
+    """Pairs of segments of different strands that begin at the same vertex, shape (p, 2)."""
     n = len(polyline)
     here = polyline.barycentric > 0.0
     place = np.flatnonzero(here.sum(axis=1) == 1)
@@ -102,14 +104,14 @@ def _pairs_in_groups(count: IntArray) -> tuple[IntArray, IntArray]:
     """All pairs of positions within consecutive groups of the given sizes."""
     ends = np.cumsum(count).repeat(count)
     position = np.arange(len(ends))
-    after = ends - position - 1  # positions in the same group
+    after = ends - position - 1  # number of later positions in the same group
     first = position.repeat(after)
     begins = np.cumsum(after) - after
     return first, first + 1 + np.arange(len(first)) - begins.repeat(after)
 
 
 def _reaches_across(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:
-    """Whether c and d lie on different sides of the line ab, or one of them lies on it."""
+    """Whether c and d lie on different sides of the line ab, or at least one lies on it."""
     one, other = _turn(a, b, c), _turn(a, b, d)
     width = TOUCHING * np.linalg.norm(b - a, axis=1)
     return (np.minimum(one, other) <= width) & (np.maximum(one, other) >= -width)

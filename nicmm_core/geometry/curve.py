@@ -1,4 +1,8 @@
-"""A curve on a mesh: a polyline each of whose segments lies in one face."""
+"""Curves on a mesh: polylines in which every segment lies in one face.
+
+`SurfaceCurve` is the curve that a design returns. The functions build, check, measure and resample
+such curves.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ from .surface_points import SurfacePoints, in_faces
 from .tolerances import BARYCENTRIC_SUM
 
 ROUNDING = 1e-12
-"""Barycentric coordinates up to this are zero up to rounding."""
+"""Barycentric coordinates up to this value are zero up to rounding."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +36,8 @@ class SurfaceCurve:
         Positions, ``sum_j barycentric[:, j] * vertices[faces[:, j]]``. Two consecutive points
         lie on one common face.
     control_index : (k,) int array
-        The index of each control point among the points, in the order visited; -1 for one that
-        this curve does not pass (never if the design has converged).
+        Index among the points of each control point, in the order visited; -1 for a control point
+        that this curve does not pass, which never occurs if the design has converged.
     """
 
     closed: bool
@@ -65,7 +69,7 @@ class SurfaceCurve:
 def curve_on_mesh(
     mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray, control_index: IntArray
 ) -> SurfaceCurve:
-    """Build a curve from its faces and barycentrics."""
+    """Build a curve from faces and barycentric coordinates."""
     corners = mesh.vertices[mesh.faces[faces]]
     points = (barycentric[:, :, None] * corners).sum(axis=1)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
@@ -79,7 +83,7 @@ def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
 
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
-    """The point at a share of a segment of a curve, in a face that contains the segment."""
+    """The point at the fraction ``share`` of a segment, in a face that contains the segment."""
     curve, segment_faces = checked_curve(mesh, curve)
     ends = np.array([segment, (segment + 1) % len(curve.faces)])
     there = segment_faces[[segment, segment]]
@@ -89,19 +93,28 @@ def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float
 
 
 def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
-    """The index of the control point at which the leg of a segment begins."""
+    """Index of the control point at which the leg that contains a segment begins."""
     order = np.argsort(curve.control_index)
-    # A segment before all control points belongs to the last leg, which closes the curve.
+    # On a closed curve, a segment before the first control point belongs to the last leg.
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
 def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArray]:
-    """A curve on a mesh with arrays of the right types, and faces of its segments, (n,).
+    """Check that a curve lies on a mesh, and find a face of each segment.
+
+    Returns
+    -------
+    SurfaceCurve
+        The curve with arrays of the right types, without barycentric coordinates that are zero up
+        to rounding.
+    (n,) int array
+        A face that contains each point and the next one. For an open curve, the last entry is
+        meaningless.
 
     Raises
     ------
     CurveError
-        If the curve does not lie on this mesh.
+        If an array has the wrong shape or type, or the curve does not lie on this mesh.
     """
     curve = _readable(curve)
     faces, barycentric = curve.faces, curve.barycentric
@@ -123,7 +136,7 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArr
 
 
 def _readable(curve: SurfaceCurve) -> SurfaceCurve:
-    """The curve with arrays of the right types and shapes, or a CurveError."""
+    """The curve with arrays of the right types; raises CurveError if that is impossible."""
     if not isinstance(curve.closed, bool | np.bool_):
         raise CurveError(f"curve.closed is {curve.closed!r}; pass True or False")
     values: dict[str, FloatArray] = {}
@@ -153,7 +166,7 @@ def _readable(curve: SurfaceCurve) -> SurfaceCurve:
 
 
 def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
-    """Set coordinates up to a margin to zero, and scale the others to the sum 1."""
+    """Set barycentric coordinates up to a margin, (n,), to zero, and scale the rest to sum 1."""
     kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
     return kept / kept.sum(axis=1, keepdims=True)
 
@@ -164,7 +177,7 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = T
     Parameters
     ----------
     points : (n, 3) float array
-        Evenly spaced, see `resample`; otherwise the values at short segments are noise.
+        Evenly spaced points, see `resample`. Otherwise the values at short segments are noise.
     normals : (n, 3) float array
         Unit surface normals at the points.
     closed : bool, default True
@@ -173,9 +186,9 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = T
     Returns
     -------
     (n,) float array
-        Signed, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i). Positive
-        where the curve turns left, seen from the tip of the normal. Zero at the ends of an open
-        polyline.
+        Signed curvature, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i).
+        It is positive where the curve turns left, seen from the tip of the normal, and zero at the
+        ends of an open polyline.
     """
     if not closed:
         return np.pad(_turns(points[:-2], points[1:-1], points[2:], normals[1:-1]), 1)
@@ -185,7 +198,7 @@ def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = T
 def _turns(
     previous: FloatArray, points: FloatArray, following: FloatArray, normals: FloatArray
 ) -> FloatArray:
-    """Geodesic curvature at points, each with two neighbours."""
+    """Geodesic curvature at points that have two neighbours each, (n,)."""
     before, after = previous - points, following - points
     before -= (before * normals).sum(axis=1, keepdims=True) * normals
     after -= (after * normals).sum(axis=1, keepdims=True) * normals
@@ -196,14 +209,17 @@ def _turns(
 
 
 def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[FloatArray, IntArray]:
-    """Points at equal distances along a polyline, and the segment of each.
+    """Sample points at equal distances along a polyline.
 
-    The first one is the first point of the polyline; on an open polyline the last one is its last.
+    The samples begin at the first point of the polyline. If the polyline is open, they end at its
+    last point.
 
     Returns
     -------
     (count, 3) float array
+        Positions of the samples.
     (count,) int array
+        Index of the segment that contains each sample.
     """
     line = np.concatenate([points, points[:1]]) if closed else points
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -214,7 +230,7 @@ def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[Float
 
 
 def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray) -> IntArray:
-    """A face that holds each point and the next one, shape (n,)."""
+    """A face that contains each point and the next one, shape (n,)."""
     n = len(faces)
     following = (np.arange(n) + 1) % n
     support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
@@ -238,6 +254,6 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
 
 
 def _holds(corners: IntArray, support: IntArray) -> BoolArray:
-    """Whether faces have all vertices of a support, which is padded with -1."""
+    """Whether each face has all vertices of its row of ``support``, which is padded with -1."""
     found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
     return (found | (support < 0)).all(axis=1)

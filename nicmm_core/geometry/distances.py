@@ -1,8 +1,8 @@
-"""Distances on a surface, propagated from where they are known.
+"""Propagates distances over a surface from the vertices at which they are known.
 
 Kimmel and Sethian's update ("Computing geodesic paths on manifolds", 1998), a plane wave across
-each triangle, is repeated on all faces at the last changes instead of vertex by vertex. The cost
-depends on the part that is reached, not on the mesh.
+each triangle, is not applied vertex by vertex, but repeatedly to all faces at the vertices that
+have just changed. The cost depends on the part of the surface that is reached, not on its size.
 """
 
 from __future__ import annotations
@@ -16,27 +16,30 @@ from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-6
-"""Decreases of a distance below this, in edge lengths, are not propagated."""
+"""Decreases of a distance by less than this, in edge lengths, are not propagated."""
 
 OFTEN = 100
 """Number of decreases of a distance after which only smaller distances may lower it.
 
-At most 50 occurred on the SHREC16 meshes with virtual splits. In a ring of needles, each may lower
-the next by ever smaller amounts for thousands of rounds.
+At most 50 occurred on the SHREC16 meshes with virtual splits. In a ring of needles, each distance
+may lower the next one by ever smaller amounts for thousands of rounds.
 """
 
 
 @dataclass(frozen=True)
 class DistanceSurface:
-    """A mesh for distances: n vertices, m faces.
+    """A mesh over which distances are propagated.
 
     Attributes
     ----------
     vertices : (n, 3) float array
+        Positions of the vertices.
     faces : (m, 3) int array
+        Corner indices of each triangle.
     faces_around : (n, m) sparse array
-        1 where a face has a vertex.
+        Incidence of vertices and faces: 1 where a face has a vertex.
     edge_length : float
+        Typical length of an edge, the unit of `SETTLED`.
     """
 
     vertices: FloatArray
@@ -48,7 +51,7 @@ class DistanceSurface:
 def build_distance_surface(
     vertices: FloatArray, faces: IntArray, edge_length: float
 ) -> DistanceSurface:
-    """Index the faces of each vertex."""
+    """Build a `DistanceSurface`, with an index of the faces around each vertex."""
     entries = (np.ones(faces.size), (faces.ravel(), np.repeat(np.arange(len(faces)), 3)))
     around = sparse.csr_array(sparse.coo_array(entries, shape=(len(vertices), len(faces))))
     return DistanceSurface(vertices, faces, around, edge_length)
@@ -63,15 +66,25 @@ def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray)
 
 
 def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
-    """Propagate finite distances over the surface, in place, up to the limit."""
-    settled = np.isfinite(distance)  # at the curve they are exact
+    """Propagate distances over a surface, in place.
+
+    Parameters
+    ----------
+    surface : DistanceSurface
+    distance : (n,) float array
+        Distance of each vertex, in the unit of the positions, infinite where it is unknown. Finite
+        values count as exact and are not changed.
+    limit : float
+        Distances of at least this value are not propagated further.
+    """
+    settled = np.isfinite(distance)
     changed = np.flatnonzero(settled)
     least_gain = SETTLED * surface.edge_length
     times_lowered = np.zeros(len(distance), dtype=np.int64)
     while len(changed):
         checkpoint()
         faces = surface.faces[np.unique(surface.faces_around[changed].indices)]
-        # Each corner in turn is reached from the other two.
+        # Each corner in turn is reached from the other two corners.
         reached, first, second = (np.roll(faces, k, axis=1).ravel() for k in range(3))
         moving = ~settled[reached]
         reached, first, second = reached[moving], first[moving], second[moving]
@@ -93,11 +106,12 @@ def _wave_arrival(
     second: IntArray,
     waits: BoolArray,
 ) -> FloatArray:
-    """Distance at a corner from those at the other two, inf where neither is finite.
+    """Distance at a corner of each face from those at the other two, inf where neither is finite.
 
-    With linear distances on the opposite edge the wave is plane. Where it would have to enter
-    through another edge, the shorter path along an edge counts. At an obtuse angle a corner may be
-    nearer than the farther of the other two, but not one that waits.
+    Distances that are linear on the opposite edge belong to a plane wave. Where this wave would
+    have to enter through another edge, the shorter of the paths along the two edges counts. At an
+    obtuse angle, the distance of a corner may be less than the greater of the other two distances;
+    corners in `waits` do not get such a distance.
     """
     side = vertices[second] - vertices[first]
     length = np.linalg.norm(side, axis=1)

@@ -1,4 +1,7 @@
-"""Sorting, grouping and connected components of arrays of the size of a mesh."""
+"""Sorts and groups arrays as large as a mesh, and finds connected components.
+
+These functions have checkpoints, so a design can be cancelled while they run.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,20 @@ from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 
 LARGE = 2_000_000
-"""Keys sorted at once. This takes a fifth of a second, in which a design cannot be cancelled."""
+"""Maximum number of keys sorted in one call.
+
+Sorting them takes a fifth of a second, during which a design cannot be cancelled.
+"""
 
 SAMPLED = 64
-"""Sampled keys for each part, to divide them into parts of about equal size."""
+"""Number of keys sampled per part, to divide all keys into parts of about equal size."""
 
 
 def stable_order(keys: IntArray | FloatArray) -> IntArray:
     """Indices that sort the keys, (n,); equal keys stay in their order.
 
-    The same as ``np.argsort(keys, kind="stable")`` of keys without NaN. Many keys are divided into
-    ranges of values that are sorted one after the other.
+    The same as ``np.argsort(keys, kind="stable")`` for keys without NaN. If there are more than
+    `LARGE` keys, they are divided into ranges of values, which are sorted one after another.
     """
     checkpoint()
     n_parts = -(-len(keys) // LARGE)
@@ -39,19 +45,19 @@ def stable_order(keys: IntArray | FloatArray) -> IntArray:
 
 
 def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Sort keys into groups of equal ones.
+    """Sort keys into groups of equal keys.
 
     Parameters
     ----------
     keys : (n,) array
-        Without NaN.
+        Keys without NaN.
 
     Returns
     -------
     (n,) int array
         Indices that sort the keys; equal keys stay in their order.
     (g,) int array
-        Where each group begins in that order.
+        Position in that order at which each group begins.
     (g,) int array
         Number of keys in each group.
     """
@@ -63,21 +69,22 @@ def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
 
 
 def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
-    """The first of each set of equal rows, and the set of each row.
+    """Group equal rows.
 
-    The same as ``return_index`` and ``return_inverse`` of ``np.unique(rows, axis=0)``, but many
-    times faster.
+    The results are those of ``return_index`` and ``return_inverse`` in ``np.unique(rows, axis=0)``.
+    This function is many times faster.
 
     Parameters
     ----------
     rows : (n, d) array
-        Without NaN.
+        Rows without NaN.
 
     Returns
     -------
     (g,) int array
-        Indices, in the lexicographic order of the rows.
+        Index of the first row of each group; the groups are in the lexicographic order of the rows.
     (n,) int array
+        Index of the group of each row.
     """
     first = number = np.zeros(len(rows), dtype=np.int64)
     for column in rows.T:
@@ -87,7 +94,7 @@ def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def _distinct(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
-    """The first index of each distinct key, ascending by key, and the rank of each key."""
+    """Index of the first occurrence of each distinct key, by ascending key; rank of every key."""
     order, start, count = grouped(keys)
     number = np.empty(len(keys), dtype=np.int64)
     number[order] = np.repeat(np.arange(len(start)), count)
@@ -102,14 +109,14 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     size : int
         Number of nodes.
     one, other : (m,) int array
-        The nodes at the ends of each arc.
+        Nodes at the two ends of each arc.
 
     Returns
     -------
     int
         Number of components.
     (size,) int array
-        The component of each node, numbered by their first nodes.
+        Index of the component of each node; components are in the order of their first nodes.
     """
     checkpoint()
     arcs = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
@@ -122,7 +129,7 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
 
 
 def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -> list[int]:
-    """Nodes of a shortest path, from the predecessors that a search from its start has found."""
+    """Nodes of a shortest path, from the predecessors that a search from ``start`` has found."""
     path = [end]
     while path[-1] != start:
         path.append(int(previous[path[-1]]))

@@ -1,4 +1,4 @@
-"""The input mesh: checked once and immutable."""
+"""Triangle meshes: `Mesh`, which is checked once and immutable, and functions on face arrays."""
 
 from __future__ import annotations
 
@@ -16,13 +16,17 @@ from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped, stable_order
 
 LARGEST, SMALLEST = 1e50, 1e-50
-"""Bounds on coordinates and the mesh's diagonal, so that powers of lengths stay representable."""
+"""Upper bound on coordinates and lower bound on the diagonal of the mesh, so that powers of lengths
+stay representable."""
 
 BLOCK = 32_768
-"""Faces or edges of which arithmetic is done at once."""
+"""Number of faces or edges in a block, see `blocks`."""
 
 FACES_OF_A_TREE = 100_000
-"""At most. A tree of this size takes a tenth of a second, in which a design cannot be cancelled."""
+"""Maximum number of faces in a bounding-box tree.
+
+Building a tree of this size takes a tenth of a second, during which a design cannot be cancelled.
+"""
 
 
 class Mesh:
@@ -45,8 +49,9 @@ class Mesh:
     Raises
     ------
     MeshError
-        If an array has the wrong shape or type, a position is not finite, an index is out of
-        range, a face has one vertex twice, there are no faces, or all have the same position.
+        If an array has the wrong shape or type, a position is not finite or too large, an index is
+        out of range, a face has a vertex twice, there are no faces, or all vertices of faces have
+        the same position.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
@@ -77,7 +82,7 @@ class Mesh:
 
     @cached_property
     def face_normals(self) -> FloatArray:
-        """Unit normal of each face, shape (F, 3); zero if it has no area."""
+        """Unit normal of each face, shape (F, 3); zero if the face has no area."""
         normals = _area_vectors(self.vertices, self.faces)
         for block in blocks(len(normals)):
             length = _lengths(normals[block])
@@ -86,9 +91,10 @@ class Mesh:
 
     @property
     def opposite_sides(self) -> IntArray:
-        """The same edge as a side of the face beyond, for side 3 f + j opposite corner j of face f.
+        """For each side, the same edge as a side of the adjacent face, shape (3 F,).
 
-        The side itself at a boundary edge, or at an edge of more than two faces; shape (3 F,).
+        Side 3 f + j is opposite corner j of face f. At a boundary edge, or at an edge of more than
+        two faces, the entry is the side itself.
         """
         return self._adjacency[0]
 
@@ -96,19 +102,19 @@ class Mesh:
     def face_neighbours(self) -> IntArray:
         """The face across the side opposite each corner, shape (F, 3).
 
-        -1 at a boundary edge, or at an edge of more than two faces.
+        The entry is -1 at a boundary edge, or at an edge of more than two faces.
         """
         beyond, face = self.opposite_sides.reshape(-1, 3) // 3, np.arange(len(self.faces))[:, None]
         return np.where(beyond == face, -1, beyond)
 
     @property
     def unoriented_vertices(self) -> IntArray:
-        """Vertices of edges that two faces have in the same direction, ascending."""
+        """Vertices of edges that two faces traverse in the same direction, ascending."""
         return self._adjacency[1]
 
     @cached_property
     def _adjacency(self) -> tuple[IntArray, IntArray]:
-        """`opposite_sides` and `unoriented_vertices`; both need the sides sorted by edges."""
+        """`opposite_sides` and `unoriented_vertices`; both need the sides sorted by edge."""
         order, first, count = grouped(side_keys(self.faces))
         one, other = order[first[count == 2]], order[first[count == 2] + 1]
         checkpoint()
@@ -136,7 +142,7 @@ class Mesh:
 
     @cached_property
     def unpaired_edges(self) -> tuple[IntArray, IntArray]:
-        """Edges of one face or of more than two, and their number; (e, 2) and (e,), ascending."""
+        """Sorted edges without exactly two faces, (e, 2), and their numbers of faces, (e,)."""
         face, corner = np.nonzero(self.face_neighbours < 0)
         start, end = self.faces[face, corner - 2], self.faces[face, corner - 1]
         size = len(self.vertices)
@@ -149,12 +155,12 @@ class Mesh:
 
     @cached_property
     def is_oriented(self) -> bool:
-        """Whether no two faces have an edge in the same direction."""
+        """Whether no two faces traverse an edge in the same direction."""
         return not len(self.unoriented_vertices)
 
     @cached_property
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:
-        """Bounding-box trees for parts of the faces, each with the range of its faces."""
+        """Bounding-box trees over parts of the faces, each with the range of its faces."""
         trees = []
         for first in range(0, len(self.faces), FACES_OF_A_TREE):
             checkpoint()
@@ -180,7 +186,7 @@ class Mesh:
         return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
 
     def faces_at(self, vertices: IntArray) -> IntArray:
-        """Faces at any of the given vertices, ascending."""
+        """Faces that have at least one of the given vertices, ascending."""
         return np.unique(self.vertex_faces[vertices].indices).astype(np.int64)
 
     def faces_with(self, vertices: IntArray) -> IntArray:
@@ -191,28 +197,28 @@ class Mesh:
 
     @cached_property
     def face_component(self) -> IntArray:
-        """The connected component of each face, shape (F,).
+        """Index of the connected component of each face, shape (F,).
 
-        Faces are connected if they share a vertex.
+        Faces that share a vertex are connected.
         """
         one, other = self.faces[:, :2].T.ravel(), self.faces[:, 1:].T.ravel()
         return components(len(self.vertices), one, other)[1][self.faces[:, 0]]
 
     @cached_property
     def referenced(self) -> BoolArray:
-        """Which vertices belong to at least one face, shape (V,)."""
+        """Whether each vertex belongs to at least one face, shape (V,)."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces] = True
         return used
 
 
 def real_array(values: ArrayLike) -> FloatArray:
-    """A copy as floats.
+    """Copy values to an array of floats.
 
     Raises
     ------
     TypeError, ValueError
-        If values cannot be converted: complex numbers, text, ragged lists.
+        If the values cannot be converted, for example complex numbers, text or ragged lists.
     """
     given = np.array(values)
     if np.iscomplexobj(given):
@@ -229,7 +235,7 @@ def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Normals with twice the areas as their lengths, shape (F, 3)."""
+    """Normals whose lengths are twice the areas of the faces, shape (F, 3)."""
     vectors = np.empty(faces.shape)
     for block in blocks(len(faces)):
         origin, one, other = (np.take(vertices, corner, axis=0) for corner in faces[block].T)
@@ -241,7 +247,10 @@ def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def blocks(count: int) -> Iterator[slice]:
-    """Ranges of items whose arrays fit into the processor's cache, so arithmetic is faster."""
+    """Ranges of at most `BLOCK` items.
+
+    Arrays of this size fit into the processor's cache, which makes arithmetic faster.
+    """
     for first in range(0, count, BLOCK):
         checkpoint()
         yield slice(first, first + BLOCK)
@@ -266,20 +275,20 @@ def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Undirected edges of the faces, and the number of faces of each.
+    """Undirected edges of the faces, and the number of faces at each edge.
 
     Returns
     -------
     (E, 2) int array
-        Smaller index first, sorted.
+        Vertices of each edge, the smaller index first. The edges are sorted.
     (E,) int array
-        1 on the boundary, 2 inside, more at non-manifold edges.
+        Number of faces: 1 on the boundary, 2 inside, more at non-manifold edges.
     """
     return _edges(side_keys(faces), int(faces.max()) + 1)
 
 
 def corners_differ(faces: IntArray) -> BoolArray:
-    """Which faces have three different corners, shape (F,)."""
+    """Whether each face has three different corners, shape (F,)."""
     one, other, third = faces.T
     return (one != other) & (other != third) & (third != one)
 
@@ -287,7 +296,7 @@ def corners_differ(faces: IntArray) -> BoolArray:
 def side_keys(faces: IntArray, size: int | None = None) -> IntArray:
     """A key for the side opposite each corner, shape (3 F,), equal for the sides of one edge.
 
-    ``size`` is above all vertex indices; by default it is taken from the faces.
+    ``size`` has to exceed all vertex indices; by default it is computed from the faces.
     """
     size = int(faces.max(initial=0)) + 1 if size is None else size
     keys = np.empty(faces.shape, dtype=np.int64)
@@ -298,7 +307,7 @@ def side_keys(faces: IntArray, size: int | None = None) -> IntArray:
 
 
 def adjacent_sides(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Pairs of sides at the same edge, both (p,); k - 1 pairs at an edge with k faces.
+    """Pairs of sides at the same edge, as two (p,) arrays; k - 1 pairs at an edge with k faces.
 
     Side 3 f + j is opposite corner j of face f.
     """
@@ -310,13 +319,13 @@ def adjacent_sides(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def sides_among(faces: IntArray, edges: IntArray) -> BoolArray:
-    """Whether the side opposite each corner is one of some edges (e, 2), shape (3 F,)."""
+    """Whether the side opposite each corner is one of the given edges, (e, 2); shape (3 F,)."""
     size = int(max(faces.max(initial=0), edges.max(initial=0))) + 1
     return np.isin(side_keys(faces, size), edge_keys(edges[:, 0], edges[:, 1], size))
 
 
 def side_corners(faces: IntArray) -> IntArray:
-    """Indices of the corners at the ends of each side, smaller vertex first, shape (3 F, 2)."""
+    """Indices 3 f + j of the corners at the ends of each side, smaller vertex first, (3 F, 2)."""
     corner = np.arange(faces.size).reshape(-1, 3)
     ends = np.stack([corner[:, [1, 2, 0]], corner[:, [2, 0, 1]]], axis=2).reshape(-1, 2)
     turned = faces.ravel()[ends[:, 0]] > faces.ravel()[ends[:, 1]]
@@ -325,14 +334,21 @@ def side_corners(faces: IntArray) -> IntArray:
 
 
 def joined_corners(faces: IntArray, one: IntArray, other: IntArray) -> tuple[IntArray, IntArray]:
-    """Groups of corners of faces that pairs of them, both (p,), connect.
+    """Group the corners of faces, given pairs of corners that are connected.
+
+    Parameters
+    ----------
+    faces : (F, 3) int array
+        Corner indices of each triangle.
+    one, other : (p,) int array
+        Pairs of corners, as indices 3 f + j of corner j of face f.
 
     Returns
     -------
     (F, 3) int array
-        The group of each corner.
+        Index of the group of each corner.
     (number of groups,) int array
-        The vertex of each group.
+        Vertex of each group; if its corners have different vertices, that of the last corner.
     """
     n_groups, group = components(faces.size, one, other)
     vertex = np.zeros(n_groups, dtype=np.int64)
@@ -341,19 +357,19 @@ def joined_corners(faces: IntArray, one: IntArray, other: IntArray) -> tuple[Int
 
 
 def edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
-    """One key for each edge, which sorts several times faster than rows of two columns."""
+    """One integer key for each edge; keys sort several times faster than rows of two columns."""
     return np.minimum(start, end) * size + np.maximum(start, end)
 
 
 def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
-    """Distinct edges of some keys, (E, 2), and how often each occurs, (E,)."""
+    """Distinct edges among the given keys, (E, 2), and how often each occurs, (E,)."""
     order, first, count = grouped(keys)
     distinct = keys[order[first]]
     return np.stack([distinct // size, distinct % size], axis=1), count
 
 
 def _sides_in_one_direction(faces: IntArray, sides: IntArray) -> IntArray:
-    """Those of some sides of faces that have another one's ends in the same order."""
+    """One side of each set of given sides that traverse an edge in the same direction."""
     start, end = (faces[sides // 3, sides % 3 - k] for k in (2, 1))
     order, first, count = grouped(start * (int(faces.max()) + 1) + end)
     return sides[order[first[count > 1]]]
@@ -387,7 +403,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
         given = np.array(faces)
         if given.size and not np.issubdtype(given.dtype, np.integer):
             given = real_array(given)
-            # From 2^53 on, floats do not represent all integers, and no mesh has so many vertices.
+            # Floats represent all integers only below 2^53, and no mesh has that many vertices.
             if not (np.abs(given) < 2.0**53).all() or (given != np.round(given)).any():
                 raise ValueError("some are not whole numbers")
         checked = given.astype(np.int64)
@@ -417,7 +433,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
 def check_indices(
     name: str, rows: IntArray, n_vertices: int, error: type[NicmmError] = ArgumentError
 ) -> None:
-    """Raise an error if rows of indices, (n, m), are not those of vertices."""
+    """Raise an error if a row of indices, (n, m), refers to a vertex that does not exist."""
     outside = ((rows < 0) | (rows >= n_vertices)).any(axis=1)
     if outside.any():
         first = int(outside.argmax())

@@ -1,4 +1,4 @@
-"""Normals of the surface at its vertices."""
+"""Computes normals of a surface at its vertices, and finds folded faces."""
 
 from __future__ import annotations
 
@@ -20,25 +20,26 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def unsigned_normals(mesh: Mesh) -> FloatArray:
-    """Unit normals at the vertices, up to their signs, shape (V, 3).
+    """Unit normals at the vertices, up to sign, shape (V, 3).
 
-    Weighted by corner angle. At corners of folded faces, as beside a vertex pushed over an edge,
-    they are weighted by signed area instead, which does not change when a vertex moves within the
-    plane of its neighbours. Where faces of opposite orientation meet, as on a Möbius strip, normals
-    would cancel; there the normal is the principal direction of the face normals.
+    Face normals are weighted by corner angle. At corners of folded faces, for example beside a
+    vertex pushed across an edge, they are weighted by area instead, since their sum then does not
+    change when a vertex moves within the plane of its neighbours. Where faces of opposite
+    orientation meet, as on a Möbius strip, normals would cancel; there the normal is the principal
+    direction of the face normals.
     """
     return normals_and_folds(mesh)[0]
 
 
 def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
-    """`unsigned_normals`, and the folded faces, (F,); None if no face is folded.
+    """`unsigned_normals`, and whether each face is folded, (F,), or None if no face is.
 
-    A folded face points against the normals of its corners. Faces at vertices where opposite
-    orientations meet never count: signs have no meaning there.
+    A folded face faces away from the normals of its corners. Faces at vertices where opposite
+    orientations meet never count as folded, since signs have no meaning there.
     """
     normals = vertex_normals(mesh.vertices, mesh.faces)
     mixed = mesh.unoriented_vertices
-    against = _facing(mesh, normals) <= 0.0  # a normal of zero counts too
+    against = _facing(mesh, normals) <= 0.0  # a zero normal counts too
     if not len(mixed) and not against.any():
         return normals, None
     folded = np.setdiff1d(mesh.faces[against.any(axis=1)], mixed)
@@ -59,7 +60,7 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
 
 
 def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
-    """Cosines between the normals of faces and of their corners, (F, 3)."""
+    """Cosines between the normal of each face and the normals of its corners, (F, 3)."""
     facing = np.empty(mesh.faces.shape)
     for block in blocks(len(mesh.faces)):
         for corner in range(3):
@@ -69,7 +70,7 @@ def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Faces around some vertices: the index of the vertex, the normal and the area of each."""
+    """For all faces around given vertices: index into ``vertices``, face normal and face area."""
     incidence = mesh.vertex_faces[vertices]
     owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
     return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]

@@ -1,10 +1,11 @@
-"""A canonical copy of a mesh: numbered by position, with coordinates in its principal frame.
+"""Canonical copies of meshes: numbered by position, with coordinates in the principal frame.
 
-Which path is found among several of about the same length depends on the order in which vertices
-and faces are visited. Here they are sorted by their places in the principal frame of the surface,
-mirrored if that makes the surface reach farther along each axis. So a mesh that is renumbered,
-rotated, moved, scaled or mirrored has the same copy, up to rounding and scale, unless the surface
-has no such frame, as a ball.
+Which of several paths of about the same length is found depends on the order in which vertices and
+faces are visited. In the copy, both are sorted by position in the principal frame of the surface.
+Each axis of this frame points to where the surface reaches farther, even if the frame is then
+left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has the same copy
+up to rounding and scale. Surfaces without a unique principal frame, such as a ball, are an
+exception.
 """
 
 from __future__ import annotations
@@ -21,10 +22,13 @@ from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
 RESOLUTION = 1e-7
-"""Unit of the coordinates compared, in square roots of the area; far coarser than rounding."""
+"""Unit to which coordinates are rounded before they are compared, in square roots of the area.
+
+It is far coarser than rounding errors.
+"""
 
 FARTHEST = 2.0**60
-"""Bound at which coordinates are clipped."""
+"""Bound at which coordinates are clipped, in units of `RESOLUTION`."""
 
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface counts as symmetric in that direction."""
@@ -32,22 +36,24 @@ SYMMETRIC = 1e-6
 
 @dataclass(frozen=True)
 class Renumbered:
-    """A mesh and its copy.
+    """A mesh and its canonical copy.
 
     Attributes
     ----------
     original : Mesh
+        The given mesh.
     mesh : Mesh
         The copy.
     number : (V,) int array
-        The number that each original vertex has in the copy.
+        Index in the copy of each original vertex.
     face : (F,) int array
-        The original face of each face of the copy.
+        Original face of each face of the copy.
     corner : (F, 3) int array
-        Which corner of that face each corner is.
+        Index, in the original face, of each corner of each face of the copy.
     centre : (3,) float array
+        Origin of the copy's coordinates, in the space of the original.
     axes : (3, 3) float array
-        Of the frame; the copy's coordinates are along the columns, from the centre.
+        Axes of the copy's coordinates, one in each column.
     """
 
     original: Mesh
@@ -59,11 +65,11 @@ class Renumbered:
     axes: FloatArray
 
     def in_original(self, positions: FloatArray) -> FloatArray:
-        """Positions on the copy as positions on the original, (n, 3)."""
+        """Map positions on the copy, (n, 3), to the original."""
         return positions @ self.axes.T + self.centre
 
     def points(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the original on the copy, each in the face of lowest index there."""
+        """Map points of the original to the copy, each in the first face that contains it."""
         place = np.empty(len(self.face), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
         faces = place[points.faces]
@@ -71,7 +77,7 @@ class Renumbered:
         return in_first_faces(self.mesh, SurfacePoints(faces, weights))
 
     def values(self, values: FloatArray | None) -> FloatArray | None:
-        """Values at the vertices of the original, (V,), at those of the copy."""
+        """Map values at the vertices of the original, (V,), to the vertices of the copy."""
         if values is None:
             return None
         result = np.empty_like(values)
@@ -79,13 +85,13 @@ class Renumbered:
         return result
 
     def original_points(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the copy on the original."""
+        """Map points of the copy to the original."""
         barycentric = np.empty_like(points.barycentric)
         np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
         return SurfacePoints(self.face[points.faces], barycentric)
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
-        """A curve on the copy as one on the original."""
+        """Map a curve on the copy to the original."""
         there = self.original_points(SurfacePoints(curve.faces, curve.barycentric))
         return curve_on_mesh(
             self.original, curve.closed, there.faces, there.barycentric, curve.control_index
@@ -93,14 +99,14 @@ class Renumbered:
 
 
 def renumbered(mesh: Mesh) -> Renumbered:
-    """The canonical copy of a mesh."""
+    """Make the canonical copy of a mesh."""
     centre, axes, places = _in_frame(mesh)
     order = np.lexsort(_rounded(mesh, places).T[::-1])
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
     corner = np.tile(np.arange(3), (len(mesh.faces), 1))
     if np.linalg.det(axes) < 0.0:
-        corner = corner[:, ::-1]  # in mirrored coordinates faces have the other orientation
+        corner = corner[:, ::-1]  # mirrored coordinates reverse the orientation of faces
     first = np.take_along_axis(number[mesh.faces], corner, axis=1).argmin(axis=1)
     corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
     faces = np.take_along_axis(number[mesh.faces], corner, axis=1)
@@ -115,7 +121,7 @@ def frame_coordinates(mesh: Mesh) -> IntArray:
 
 
 def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The centre, (3,), the signed axes, (3, 3), and the vertices in that frame, (V, 3)."""
+    """Centre, (3,), and signed axes, (3, 3), of the principal frame; vertices in it, (V, 3)."""
     frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
     checkpoint()
     axes = frame.signed_axes()
@@ -126,7 +132,7 @@ def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _rounded(mesh: Mesh, places: FloatArray) -> IntArray:
-    """Coordinates in units of `RESOLUTION`."""
+    """Coordinates rounded to integers in units of `RESOLUTION`."""
     unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
     with np.errstate(over="ignore"):
         return np.round((places / unit).clip(-FARTHEST, FARTHEST)).astype(np.int64)
@@ -139,12 +145,13 @@ class PrincipalFrame:
     Attributes
     ----------
     centre : (3,) float array
+        Centroid of the surface.
     deviation : float
         Root mean square distance of the surface from the centroid.
     axes : (3, 3) float array
-        One axis in each column, with arbitrary sign.
+        Unit vectors along the axes, one in each column, with arbitrary sign.
     skewness : (3,) float array
-        Along each axis; positive if the surface extends farther in its direction.
+        Skewness along each axis; positive if the surface reaches farther in the axis's direction.
     """
 
     centre: FloatArray
@@ -155,8 +162,7 @@ class PrincipalFrame:
     def signed_axes(self) -> FloatArray:
         """The axes, each pointing to where the surface reaches farther, shape (3, 3).
 
-        Where the surface is symmetric along an axis, that points to where its largest coordinate
-        grows.
+        If the surface is symmetric along an axis, the largest component of this axis is positive.
         """
         largest = self.axes[np.abs(self.axes).argmax(axis=0), np.arange(3)]
         signs = np.where(np.abs(self.skewness) > SYMMETRIC, self.skewness, largest)
@@ -166,7 +172,7 @@ class PrincipalFrame:
 def principal_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> PrincipalFrame:
-    """The frame of a surface, computed from the centroids and areas of its faces."""
+    """Compute the principal frame of a surface from the centroids and areas of its faces."""
     offset = np.empty(faces.shape)
     for block in blocks(len(faces)):
         first, second, third = (np.take(vertices, corner, axis=0) for corner in faces[block].T)

@@ -1,4 +1,4 @@
-"""Midpoint subdivision: more vertices on the same surface."""
+"""Midpoint subdivision of a mesh, which adds vertices and does not change the surface."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ POINTS = np.concatenate([np.eye(3), 0.5 * (1.0 - np.eye(3))])
 """Barycentric coordinates of the corners of a face and of the midpoints opposite them."""
 
 PARTS = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]])
-"""Which of these points are the corners of each part of a face."""
+"""Corners of each of the four parts of a face, as indices into `POINTS`."""
 
 
 @dataclass(frozen=True)
 class Refined:
-    """A mesh whose faces are divided into equal parts.
+    """A mesh with faces divided into equal parts, and its map to the original mesh.
 
     Attributes
     ----------
     mesh : Mesh
+        The divided mesh, with f faces and v vertices.
     parent : (f,) int array
-        The original face of each face.
+        Original face of which each face is a part, ascending.
     corners : (f, 3, 3) float array
-        Barycentric coordinates of the corners in that face.
+        Barycentric coordinates of the corners of each face in its original face.
     interpolation : (v, V) sparse array
-        Weights of the original vertices at each vertex.
+        Matrix that interpolates values at the original vertices to all vertices.
     """
 
     mesh: Mesh
@@ -40,12 +41,12 @@ class Refined:
     interpolation: sparse.csr_array
 
     def in_parents(self, points: SurfacePoints) -> SurfacePoints:
-        """Points as points of the original faces."""
+        """Map points of the divided mesh to the original mesh."""
         barycentric = np.einsum("pc,pcd->pd", points.barycentric, self.corners[points.faces])
         return SurfacePoints(self.parent[points.faces], barycentric)
 
     def in_parts(self, points: SurfacePoints) -> SurfacePoints:
-        """Points of the original as points of the parts."""
+        """Map points of the original mesh to the divided mesh."""
         begin = np.searchsorted(self.parent, points.faces)
         parts = begin[:, None] + np.arange(len(self.parent) // (self.parent[-1] + 1))
         matrix = self.corners[parts].transpose(0, 1, 3, 2)
@@ -58,7 +59,7 @@ class Refined:
 
 
 def refined(mesh: Mesh, times: int) -> Refined:
-    """Divide every face into four equal parts, several times."""
+    """Divide every face into four equal parts, ``times`` times in succession."""
     count = len(mesh.vertices)
     faces, weights = mesh.faces, sparse.eye_array(count, format="csr")
     corners = np.broadcast_to(np.eye(3), (len(faces), 3, 3))

@@ -1,4 +1,7 @@
-"""Vertices about evenly spread over a surface."""
+"""Samples vertices that are about evenly spread over a surface.
+
+They become the seeds of the coarse mesh and the cells of the hop graph.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,16 @@ from .array_types import FloatArray, IntArray
 from .mesh import Mesh
 
 CANDIDATES = 8
-"""Candidate vertices per seed."""
+"""Number of candidate vertices per seed."""
 
 PACKING = 0.84
 """Least distance between two seeds, relative to the square root of the area per seed."""
 
 NORMAL_WEIGHT = 0.6
-"""Weight of the difference of two unit normals in the distance, in least distances of seeds.
+"""Weight of the difference of two unit normals in the distance, in least distances between seeds.
 
-Opposite normals differ by 2, which counts as more than the least distance; so the two sides of a
-plate or of a thin limb get separate seeds.
+Opposite normals differ by 2, which with this weight exceeds the least distance. So the two sides of
+a plate or of a thin limb get separate seeds.
 """
 
 
@@ -33,9 +36,32 @@ def spread_vertices(
     distance: float,
     normal_weight: float = NORMAL_WEIGHT,
 ) -> IntArray:
-    """Vertices at least a distance apart, ascending; ``chance`` is a number in (0, 1) for each."""
+    """Choose vertices that are at least a distance apart.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    normals : (V, 3) float array
+        Unit normals at the vertices.
+    areas : (V,) float array
+        Area of the surface around each vertex. Vertices without area are never chosen.
+    chance : (V,) float array
+        Random numbers in (0, 1), which determine the candidates.
+    n_candidates : int
+        Number of candidates, which are sampled with probabilities in proportion to their areas.
+    distance : float
+        Least distance between two chosen vertices, in mesh units.
+    normal_weight : float
+        Weight of the difference of normals, in units of ``distance``; see `NORMAL_WEIGHT`.
+
+    Returns
+    -------
+    (n,) int array
+        The chosen vertices, ascending.
+    """
     there = np.flatnonzero(areas > 0.0)
-    # The smallest exponential times: a sample weighted by area, without replacement.
+    # The vertices with the smallest exponentially distributed times are a sample without
+    # replacement, weighted by area.
     times = -np.log(chance[there]) / areas[there]
     checkpoint()
     candidates = there[np.argsort(times)[:n_candidates]]

@@ -1,4 +1,8 @@
-"""Control points: vertices, points in space or faces with barycentrics, converted to one form."""
+"""Points on a mesh, each as a face and barycentric coordinates.
+
+`locate_control_points` and `locate_points` convert all forms in which callers give points, and
+check them. `nearest_points` and `first_hits` project positions and rays onto the mesh.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,7 @@ class SurfacePoints:
     Attributes
     ----------
     faces : (k,) int array
-        The face in which each point lies.
+        Face in which each point lies.
     barycentric : (k, 3) float array
         Coordinates in that face, in the order of its corners; not negative, with sum 1.
     """
@@ -45,7 +49,7 @@ class SurfacePoints:
         return f"<SurfacePoints: {len(self)} points>"
 
     def __getitem__(self, index: IntArray | BoolArray | slice) -> SurfacePoints:
-        """Some of the points, by an array of indices, a mask or a slice."""
+        """A subset of the points, by an array of indices, a mask or a slice."""
         if isinstance(index, slice):
             return SurfacePoints(self.faces[index], self.barycentric[index])
         which = np.flatnonzero(index) if index.dtype == bool else index
@@ -53,47 +57,47 @@ class SurfacePoints:
 
 
 def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
-    """Vectors at vertices, (V, 3), taken at the corners of faces, (3, 3, k).
+    """Gather vectors at vertices, (V, 3), at the corners of faces, (3, 3, k).
 
-    The axes are corner, component and face.
+    The axes of the result are corner, component and face.
     """
     return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
 
 
 def corners_of(mesh: Mesh, faces: IntArray) -> FloatArray:
-    """Positions of the corners of some faces, (3, 3, k): corner, component, face."""
+    """Positions of the corners of the given faces, (3, 3, k): corner, component, face."""
     return at_corners(mesh, faces, mesh.vertices)
 
 
 def interpolated(at_corners: FloatArray, barycentric: FloatArray) -> FloatArray:
-    """Vectors, (3, k), at coordinates, (3, k), between those at corners, (3, 3, k)."""
+    """Interpolate vectors at corners, (3, 3, k), with barycentric coordinates, (3, k); (3, k)."""
     return dot(barycentric[:, None], at_corners)
 
 
 def locate_control_points(
     mesh: Mesh, control_points: ArrayLike | SurfacePoints, closed: bool, connected: bool = True
 ) -> SurfacePoints:
-    """Convert any accepted form of control points to faces and barycentrics, and check them.
+    """Convert any accepted form of control points to `SurfacePoints`, and check them.
 
     Parameters
     ----------
     mesh : Mesh
     control_points : (k,) int array_like, (k, 3) float array_like or SurfacePoints
-        Vertex indices, points on the surface, or faces with barycentrics.
+        Vertex indices, points on the surface, or faces with barycentric coordinates.
     closed : bool
-        Whether the curve is closed; it needs three points, an open one two.
+        Whether the curve is closed. A closed curve needs three points, an open curve two.
     connected : bool
         Whether points on different components of the mesh are refused.
 
     Returns
     -------
     SurfacePoints
-        With coordinates below `tolerances.SNAP` set to exactly zero.
+        The points, with coordinates below `tolerances.SNAP` set to exactly zero.
 
     Raises
     ------
     ControlPointError
-        If there are too few points, or one is repeated, out of range or off the surface.
+        If there are too few points, or a point is repeated, out of range or off the surface.
     UnreachableError
         If the points lie on different components of the mesh.
     """
@@ -106,29 +110,30 @@ def locate_control_points(
 
 
 def control_point_names(controls: IntArray) -> list[PointName]:
-    """Names of control points in messages, by their indices."""
+    """Names of control points in error messages, from their indices."""
     return [PointName("control_points", index) for index in controls.tolist()]
 
 
 def check_connected(mesh: Mesh, points: SurfacePoints) -> None:
-    """Refuse control points on different components."""
+    """Raise UnreachableError if control points lie on different components."""
     check_one_component(mesh, points, control_point_names(np.arange(len(points))))
 
 
 def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> SurfacePoints:
-    """Convert any number of points to faces and barycentrics, and check each of them.
+    """Convert any number of points to `SurfacePoints`, and check each of them.
 
     Parameters
     ----------
     mesh : Mesh
     given : (k,) int array_like, (k, 3) float array_like or SurfacePoints
+        Vertex indices, points on the surface, or faces with barycentric coordinates.
     name : str
-        Name of the argument, for messages.
+        Name of the argument in error messages.
 
     Returns
     -------
     SurfacePoints
-        With coordinates below `tolerances.SNAP` set to exactly zero.
+        The points, with coordinates below `tolerances.SNAP` set to exactly zero.
 
     Raises
     ------
@@ -174,7 +179,7 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> Surf
             "one row a face"
         )
     _check_range(f"{name}.faces", faces, len(mesh.faces), "faces")
-    with np.errstate(over="ignore", invalid="ignore"):  # of values that are refused below
+    with np.errstate(over="ignore", invalid="ignore"):  # such values are refused below
         sums = barycentric.sum(axis=1)
     bad = (
         ~np.isfinite(barycentric).all(axis=1)
@@ -211,8 +216,8 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
     if bad.any():
         first = PointName(name, int(bad.argmax()))
         raise ControlPointError(f"{first} is NaN or infinite; pass finite positions", first)
-    # A point far from the bounding box is far from the surface. Its squared distances might
-    # overflow, and no nearest point would be found.
+    # A point far outside the bounding box is far from the surface. Its nearest point is not
+    # computed, since its squared distances might overflow.
     corners = mesh.vertices[mesh.referenced]
     beyond = np.maximum(corners.min(axis=0) - positions, positions - corners.max(axis=0))
     distance = beyond.max(axis=1)
@@ -234,7 +239,7 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
 
 
 def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
-    """Barycentrics of the nearest point of a triangle without area, on its longest edge."""
+    """Barycentric coordinates of the nearest point on the longest edge of a degenerate triangle."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     start = int(lengths.argmax())
     end = (start + 1) % 3
@@ -250,21 +255,22 @@ def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
 def nearest_points(
     mesh: Mesh, positions: FloatArray, among: IntArray | None = None
 ) -> tuple[SurfacePoints, FloatArray]:
-    """The points of a mesh nearest to positions.
+    """Find the points of a mesh nearest to positions.
 
     Parameters
     ----------
     mesh : Mesh
     positions : (k, 3) float array
+        Positions in space.
     among : (q,) int array, optional
-        The faces to search, by default all.
+        Faces to search, by default all.
 
     Returns
     -------
     SurfacePoints
-        Coordinates are NaN in a face without area.
+        Nearest points. In a face without area, their coordinates are NaN.
     (k,) float array
-        Distances.
+        Distances, in mesh units.
     """
     faces = mesh.faces if among is None else mesh.faces[among]
     if among is None:
@@ -297,19 +303,20 @@ def _nearest_of_all(mesh: Mesh, positions: FloatArray) -> tuple[FloatArray, IntA
 def first_hits(
     mesh: Mesh, origins: FloatArray, directions: FloatArray
 ) -> tuple[SurfacePoints, FloatArray]:
-    """First intersections of rays with a mesh, from either side of its faces.
+    """Find the first intersections of rays with a mesh, from either side of its faces.
 
     Parameters
     ----------
     mesh : Mesh
     origins, directions : (k, 3) float array
+        Starting points and directions of the rays.
 
     Returns
     -------
     SurfacePoints
-        The face is -1 if a ray misses the mesh.
+        Points hit; the face is -1 if a ray misses the mesh.
     (k,) float array
-        Ray parameters, in lengths of the direction; infinite if a ray misses the mesh.
+        Distances along the rays, in lengths of their directions; infinite if a ray misses the mesh.
     """
     rays = [np.ascontiguousarray(ends, dtype=np.float64) for ends in (origins, directions)]
     faces, along = np.full(len(origins), -1), np.full(len(origins), np.inf)
@@ -351,11 +358,11 @@ def _snapped(points: SurfacePoints) -> SurfacePoints:
 
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
-    """Refuse coincident points."""
+    """Raise ControlPointError if two points coincide."""
     if len(points) < 2:
         return
     tolerance = tolerances.COINCIDENT * mesh.diagonal
-    # The second of the two nearest, since the nearest one is the point itself.
+    # The nearest point is the point itself, so two are requested.
     distance, nearest = cKDTree(points.positions(mesh)).query(points.positions(mesh), k=2)
     same = distance[:, 1] <= tolerance
     if same.any():
@@ -370,7 +377,7 @@ def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) ->
 
 
 def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
-    """Refuse points on different components."""
+    """Raise UnreachableError if points lie on different components."""
     component = mesh.face_component[points.faces]
     other = component != component[0]
     if other.any():
@@ -385,7 +392,7 @@ def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName
 
 
 def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
-    """Concatenate sets of points."""
+    """Concatenate sequences of points."""
     return SurfacePoints(
         np.concatenate([np.zeros(0, np.int64), *(part.faces for part in parts)]),
         np.concatenate([np.zeros((0, 3)), *(part.barycentric for part in parts)]),
@@ -410,19 +417,21 @@ def in_first_faces(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:
 
 
 def weights_at(corners: IntArray, barycentric: FloatArray, others: IntArray) -> FloatArray:
-    """Barycentric coordinates with respect to other vertices.
+    """Barycentric coordinates of points with respect to other vertices.
 
     Parameters
     ----------
     corners : (n, 3) int array
+        Vertices of a face that contains each point.
     barycentric : (n, 3) float array
-        Coordinates with respect to the corners.
+        Coordinates with respect to these vertices.
     others : (n, m) int array
+        Vertices for which coordinates are wanted.
 
     Returns
     -------
     (n, m) float array
-        Zero at vertices that are not among the corners.
+        Coordinates with respect to ``others``; zero at vertices that are not among the corners.
     """
     same = corners.T[:, None] == others.T
     return dot(barycentric.T[:, None], same).T

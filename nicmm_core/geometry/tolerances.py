@@ -1,6 +1,6 @@
 """The tolerances of the package, each relative to a length of the mesh or a pure number.
 
-Lengths are never absolute: a mesh in micrometres and one in kilometres get the same curve.
+Lengths are never absolute, so a mesh has the same curve in micrometres and in kilometres.
 """
 
 import numpy as np
@@ -9,55 +9,57 @@ ON_SURFACE = 1e-4
 """Greatest distance of a control point from the surface, in bounding-box diagonals."""
 
 SNAP = 1e-6
-"""Barycentric coordinates below this count as zero: the point is on an edge or a vertex."""
+"""Barycentric coordinates below this value count as zero: the point is on an edge or a vertex."""
 
 COINCIDENT = 1e-9
 """Two control points closer than this, in bounding-box diagonals, are the same point."""
 
 BARYCENTRIC_SUM = 1e-6
-"""Greatest difference from 1 of the sum of barycentric coordinates given by a caller."""
+"""Greatest deviation from 1 of the sum of barycentric coordinates that a caller passes."""
 
 INSIDE = 1e-6
 """Least barycentric coordinate of a point strictly inside its face."""
 
 FLAT = 1e-6
-"""Curvature up to which a surface is a plane, in one over bounding-box diagonals."""
+"""Curvature up to which a surface counts as a plane, times the bounding-box diagonal."""
 
 WITHOUT_AREA = 1e-4
-"""Sine between the longest and the shortest edge of a face below which it counts as without area.
+"""Sine of the angle between the longest and the shortest edge up to which a face is degenerate.
 
-Cotangents are computed from edge lengths, which cannot resolve sines below 1e-8, and a bending
-energy with the cotangents of such small angles does not describe the surface.
+Cotangents are computed from edge lengths, which cannot resolve sines below 1e-8. Moreover, a
+bending energy with the cotangents of such small angles does not describe the surface.
 """
 
 SAME_CURVE = 1e-6
-"""Distance, in bounding-box diagonals, up to which points belong to the same curve."""
+"""Greatest distance between a point of a curve and the position given by its face and barycentric
+coordinates, in bounding-box diagonals; beyond it, the curve belongs to another mesh."""
 
 AT_ONE_PLACE = 1e-12
-"""Length of an edge, in bounding-box diagonals, up to which its ends coincide."""
+"""Distance, in bounding-box diagonals, up to which two points coincide, such as the two ends of an
+edge."""
 
 MOVED = 1e-3
-"""How far vertices of faces without area are moved, in lengths of their shortest edge."""
+"""Greatest move of a vertex of a degenerate face along each axis, relative to its shortest edge."""
 
 ROUNDED = 1e-12
-"""Barycentric coordinates below this are zero up to rounding, after conversion of a point to a part
-of its face."""
+"""Barycentric coordinates below this value are zero up to rounding, after a point has been
+converted to a part of its face."""
 
 SAME_COST = 1e-9
-"""Difference of two costs of paths, relative to the least cost, that is a rounding error."""
+"""Differences between path costs up to this, relative to the least cost, are rounding errors."""
 
 CLEAN_CURVE = 1e-4
-"""Greatest distance of a clean version of a curve from the curve, in bounding-box diagonals."""
+"""Greatest distance between a clean version of a curve and the curve, in bounding-box diagonals."""
 
 CLEAN_TUBE = 0.1
-"""That distance in radii, if a tube is shown around the curve."""
+"""The same bound in radii of the tube, if the curve is shown as a tube."""
 
 TINY = float(np.finfo(np.float64).tiny)
-"""Least divisor, where the dividend is zero too."""
+"""Least divisor, for quotients whose dividend is zero whenever the divisor is."""
 
 
 def of_clean_curve(diagonal: float, radius: float = 0.0) -> float:
-    """Greatest distance of a clean version of a curve from the curve, in mesh units.
+    """Greatest distance between a clean version of a curve and the curve, in mesh units.
 
     Parameters
     ----------

@@ -1,12 +1,13 @@
-"""Straight traces over the faces of a mesh: between two points, or from a point over a length.
+"""Straight traces over the faces of a mesh: between two points, or of a given length from a point.
 
-A trace is a normal section: the intersection of the surface with a plane that contains its normal.
-It is followed from face to face by the sides of the plane on which the corners lie, so it cannot
-get lost between two faces. All traces of a call advance together, a few faces at a time: first the
-sides that they cross, then the lengths between these, then where each trace ends. Two consecutive
-points of a trace lie in one face, which is the face of the first of them.
+A trace is a normal section: the intersection of the surface with a plane that contains the surface
+normal. The signs of the corners' heights above this plane decide which side of a face is crossed
+next, so a trace cannot get lost between two faces. Two consecutive points of a trace lie in one
+face, which is the face stored with the first of them.
 
-The cost depends on the number of faces passed, not on the size of the mesh.
+All traces of a call advance together, a few faces at a time: first the sides that they cross are
+found, then the lengths between these sides, then where each trace ends. The cost depends on the
+number of faces passed, not on the size of the mesh.
 """
 
 from __future__ import annotations
@@ -23,28 +24,31 @@ from .surface_points import SurfacePoints, corners_of, interpolated
 from .vectors import cross, dot, lengths
 
 MOST_FACES = 4096
-"""Most faces of a trace; a longer one runs round the surface and is not a short connection."""
+"""Maximum number of faces of a trace. A longer trace runs round the surface and is not a short
+connection."""
 
 SIDES_AT_ONCE, FEWEST_AT_ONCE, MOST_AT_ONCE = 800, 3, 16
-"""Sides that all traces together cross before it is asked which of them have ended, and the least
-and the greatest number for each."""
+"""Number of sides that all traces together cross between two tests for traces that have ended, and
+the least and the greatest number for a single trace."""
 
 FOLDS = 4.0
-"""Extra length allowed to a trace over folded faces, in mean edge lengths."""
+"""Extra length allowed to a trace before backward parts over folded faces are subtracted, in mean
+edge lengths."""
 
 
 @dataclass(frozen=True)
 class Traces:
-    """Traces between m pairs of points, without their ends.
+    """Traces between m pairs of points; the points themselves are not included.
 
     Attributes
     ----------
     reached : (m,) bool array
-        Whether the trace reached its end. The others have no crossings.
+        Whether each trace reached its end. Traces that failed have no crossings.
     pair : (q,) int array
-        The pair of each crossing with an edge, ascending.
+        Index of the pair to which each crossing belongs, ascending.
     crossings : SurfacePoints
-        Crossings with edges, in order, each in the face that the trace enters there.
+        Crossings with edges, in order along each trace. Each is given in the face that the trace
+        enters there.
     """
 
     reached: BoolArray
@@ -63,8 +67,8 @@ def trace_between(
 ) -> Traces:
     """Trace from points inside faces to other points nearby.
 
-    A trace over folded faces runs forward, backward and forward again; the backward part is
-    subtracted from its length.
+    A trace over folded faces runs forward, backward and forward again. The length of the backward
+    part is subtracted.
 
     Parameters
     ----------
@@ -72,16 +76,17 @@ def trace_between(
     start : SurfacePoints
         m points, each strictly inside its face.
     end : SurfacePoints
-        m points anywhere; a vertex counts as reached in every face round it.
+        m points anywhere. A point on an edge or at a vertex is reached in every face that contains
+        it.
     normals : (m, 3) float array
-        Directions that the planes contain.
+        Vectors that the planes contain, besides those from the starts to the ends.
     longest : (m,) float array
-        Greatest lengths.
+        Greatest length of each trace up to the face of its end, in mesh units.
     folded : (F,) bool array, optional
-        Which faces of the mesh are folded back.
+        Whether each face of the mesh is folded back over its neighbours.
     ahead : (m, 3) float array, optional
-        Directions in which the traces leave; by default towards the ends. Round the edge of a thin
-        part the trace may begin in another direction.
+        Directions in which the traces leave their starts; by default towards the ends. Round the
+        edge of a thin part, a trace may have to begin in another direction.
     """
     origin, goal = start.positions(mesh).T, end.positions(mesh).T
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
@@ -125,7 +130,7 @@ def trace_between(
 
 
 def _last_of_each_vertex(mesh: Mesh, pair: IntArray, crossings: SurfacePoints) -> IntArray:
-    """Crossings with only the last of consecutive ones of a trace at the same vertex."""
+    """Crossings to keep: of consecutive crossings of a trace at one vertex, only the last."""
     inside = crossings.barycentric.T > 0.0
     place = np.flatnonzero(inside.sum(axis=0) == 1)
     vertex = mesh.faces[crossings.faces[place], inside[:, place].argmax(axis=0)]
@@ -143,10 +148,13 @@ def trace_from(
     length: FloatArray,
     folded: BoolArray | None = None,
 ) -> tuple[SurfacePoints, BoolArray, int]:
-    """Move points along the surface.
+    """Move points straight along the surface.
 
-    Over folded faces a trace runs backward, so its remaining length grows there and it ends beyond
-    the fold. An exception is a point that starts in a fold.
+    Over folded faces a trace runs backward, so the length that remains grows there, and the trace
+    ends beyond the fold. This does not apply to a point that starts in a folded face.
+
+    A point stays where it is if its trace returns to its first face, or passes more than
+    `MOST_FACES` faces.
 
     Parameters
     ----------
@@ -156,25 +164,26 @@ def trace_from(
     direction : (m, 3) float array
         Unit vectors, nearly tangent to the faces.
     length : (m,) float array
-        Not negative.
+        Distances to move, in mesh units; not negative.
     folded : (F,) bool array, optional
-        Which faces of the mesh are folded back.
+        Whether each face of the mesh is folded back over its neighbours.
 
     Returns
     -------
     SurfacePoints
-        Strictly inside their faces.
+        The moved points, strictly inside their faces.
     (m,) bool array
-        Which points stopped at a boundary or a non-manifold edge.
+        Whether each point stopped at a boundary or a non-manifold edge.
     int
-        Greatest number of faces passed by a point, which is the cost of the call.
+        Greatest number of faces that any point passed; it determines the cost of the call.
     """
     corners, weights = corners_of(mesh, start.faces), start.barycentric.T
     origin = interpolated(corners, weights)
     across = cross(mesh.face_normals.take(start.faces, axis=0).T, direction.T)
     offset = corners - origin
     height = dot(offset.swapaxes(0, 1), across[:, None])
-    # Most points stay in their faces: there the coordinates change by the differences of heights.
+    # Most points stay in their faces. There, barycentric coordinates change linearly, in proportion
+    # to the differences of the corners' heights above the plane.
     change = height.take(FIRST_END, axis=0) - height.take(SECOND_END, axis=0)
     speed = lengths(interpolated(offset, change))
     inside = weights + length / np.where(speed > 0.0, speed, 1.0) * change
@@ -206,7 +215,7 @@ def trace_from(
         row = last[column]
         here = row, column
         to_go = left[column] - covered[here] + signed[here]
-        # The side over which the trace has entered its last face; in the first one, any.
+        # The side through which the trace has entered its last face; unused in its first face.
         crossed = np.where(row > 0, strip.sides[row - 1, column], fronts.crossed[column])
         share = np.where(row > 0, strip.shares[row - 1, column], fronts.share[column])
         ends.append(
@@ -232,32 +241,36 @@ def trace_from(
 
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:
-    """Coordinates moved away from the sides and corners of their faces by `tolerances.INSIDE`."""
+    """Barycentric coordinates, (n, 3), moved off the sides and corners of their faces.
+
+    Coordinates below `tolerances.INSIDE` are raised to it, up to the scaling to sum 1.
+    """
     moved = np.maximum(barycentric, tolerances.INSIDE).T
     return (moved / (moved[0] + moved[1] + moved[2])).T
 
 
 @dataclass(frozen=True)
 class _Fronts:
-    """Traces in progress, each in its plane, about to cross a side of its present face.
+    """Traces in progress, each about to cross a side of its current face.
 
-    Side 3 f + j of the mesh lies opposite corner j of face f, from corner j + 1 to j + 2. One of
-    its ends lies above the plane or in it, the other below.
+    Side 3 f + j of the mesh is opposite corner j of face f and runs from corner j + 1 to corner
+    j + 2. Of the side that is crossed next, one end lies above the plane of the trace or in it, and
+    the other end lies below.
     """
 
-    index: IntArray  # (w,) of the caller's traces
-    start: IntArray  # (w,) first faces
-    origin: FloatArray  # (3, w)
+    index: IntArray  # (w,) indices of the traces in the call
+    start: IntArray  # (w,) first faces of the traces
+    origin: FloatArray  # (3, w) start points of the traces
     across: FloatArray  # (3, w) normals of the planes
-    side: IntArray  # (w,) sides ahead
-    first: FloatArray  # (w,) heights of their two ends above the planes
-    second: FloatArray
-    crossed: IntArray  # (w,) sides crossed last, and where
-    share: FloatArray
-    position: FloatArray  # (3, w) there
+    side: IntArray  # (w,) sides that are crossed next
+    first: FloatArray  # (w,) heights of their first ends above the planes
+    second: FloatArray  # (w,) heights of their second ends
+    crossed: IntArray  # (w,) sides crossed last; before the first crossing, meaningless
+    share: FloatArray  # (w,) crossings with them, as fractions from the first end to the second
+    position: FloatArray  # (3, w) positions of these crossings; before the first, start points
 
     def taken(self, which: IntArray) -> _Fronts:
-        """Some of the traces."""
+        """A subset of the traces, by indices."""
         if len(which) == len(self.index):
             return self
         return _Fronts(
@@ -270,14 +283,14 @@ class _Fronts:
 
 @dataclass(frozen=True)
 class _Strip:
-    """The next s sides that w traces cross, (s, w) each."""
+    """The next s sides that w traces cross; all arrays have shape (s, w)."""
 
-    sides: IntArray  # of the face before
-    entered: IntArray  # the face beyond; the face before if `blocked`
-    shares: FloatArray  # of the way from the first end of the side to the second
-    lengths: FloatArray  # in the face before
-    blocked: BoolArray  # no face, or several, are beyond
-    closed: BoolArray  # the face beyond is the first one
+    sides: IntArray  # sides of the faces that the traces leave
+    entered: IntArray  # faces beyond the sides; the faces that are left where `blocked`
+    shares: FloatArray  # crossings, as fractions from the first end of the side to the second
+    lengths: FloatArray  # lengths of the traces in the faces that they leave
+    blocked: BoolArray  # whether no face, or more than one, lies beyond the side
+    closed: BoolArray  # whether the face beyond is the first face of the trace
 
 
 def _fronts(
@@ -288,19 +301,21 @@ def _fronts(
     offset: FloatArray,
     forward: FloatArray,
 ) -> _Fronts:
-    """Traces at their starts, except where a plane does not cross the face.
+    """Traces at their starts, without those whose plane does not cross their first face.
 
     Parameters
     ----------
-    index, start : (w,) int arrays
+    index, start : (w,) int array
+        Indices of the traces in the call, and their first faces.
     origin, across, forward : (3, w) float array
+        Start points, normals of the planes, and directions in which the traces leave.
     offset : (3, 3, w) float array
-        From the origins to the corners of the faces.
+        Vectors from the start points to the corners of the faces: corner, component, trace.
     """
     corners = offset.swapaxes(0, 1)
     height, along = dot(corners, across[:, None]), dot(corners, forward[:, None])
     first, second = height.take(FIRST_END, axis=0), height.take(SECOND_END, axis=0)
-    # Two sides are crossed, one of them ahead.
+    # The plane crosses two sides. The trace leaves through the side farther along `forward`.
     crossed = (first >= 0.0) != (second >= 0.0)
     shares = first / np.where(crossed, first - second, 1.0)
     along, ends = along.take(FIRST_END, axis=0), along.take(SECOND_END, axis=0)
@@ -316,9 +331,10 @@ def _fronts(
 
 
 def _advanced(mesh: Mesh, fronts: _Fronts) -> tuple[_Strip, _Fronts]:
-    """Traces followed over the next faces, and their fronts there.
+    """Follow traces over the next faces; returns the sides crossed, and the fronts after these.
 
-    Beyond a blocked side a trace goes on in the face before, which means nothing.
+    After a blocked side a trace continues in the face that it should have left. These entries are
+    meaningless, and the caller ignores them.
     """
     at_once = SIDES_AT_ONCE // max(1, len(fronts.index))
     count = min(max(at_once, FEWEST_AT_ONCE), MOST_AT_ONCE)
@@ -329,12 +345,12 @@ def _advanced(mesh: Mesh, fronts: _Fronts) -> tuple[_Strip, _Fronts]:
     for row in range(count):
         beyond = mesh.opposite_sides.take(side)
         sides[row], entered[row], shares[row] = side, beyond, first / (first - second)
-        # Faces of one orientation have a common side in opposite directions.
+        # Consistently oriented faces traverse their common side in opposite directions.
         before, after = second, first
         if not mesh.is_oriented:
             same = vertex.take(_ends(side)[0]) == vertex.take(_ends(beyond)[0])
             before, after = np.where(same, first, second), np.where(same, second, first)
-        # The trace leaves between the third corner and the end on the other side of the plane.
+        # The next side joins the third corner and the end on the other side of the plane from it.
         position = mesh.vertices.take(vertex.take(beyond), axis=0).T
         height = dot(position - fronts.origin, fronts.across)
         like_before = (height >= 0.0) == (before >= 0.0)
@@ -358,21 +374,24 @@ def _advanced(mesh: Mesh, fronts: _Fronts) -> tuple[_Strip, _Fronts]:
 
 
 FIRST_END, SECOND_END = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""Corners at the ends of the side opposite each corner."""
+"""Corners at the first and the second end of the side opposite each corner."""
 
 TURNS = np.stack([SECOND_END, FIRST_END], axis=1) - np.arange(3)[:, None]
-"""From each side to the sides opposite its second and its first end."""
+"""Differences in index from each side to the sides opposite its second and its first end."""
 
 
 def _ends(side: IntArray) -> tuple[IntArray, IntArray]:
-    """Corners at which sides begin and end, as indices of all corners; also the sides opposite."""
+    """Indices 3 f + j of the corners at the first and the second end of sides.
+
+    They are also the indices of the sides opposite these corners.
+    """
     corner = side % 3
     face = side - corner
     return face + FIRST_END.take(corner), face + SECOND_END.take(corner)
 
 
 def _first(events: BoolArray) -> tuple[IntArray, BoolArray]:
-    """The row of the first event of each column, the last row without one; and which have none."""
+    """Row of the first event in each column, or the last row; and whether a column has no event."""
     row = events.argmax(axis=0)
     none = ~events[row, np.arange(events.shape[1])]
     row[none] = len(events) - 1
@@ -380,14 +399,20 @@ def _first(events: BoolArray) -> tuple[IntArray, BoolArray]:
 
 
 def _on_sides(mesh: Mesh, faces: IntArray, sides: IntArray, shares: FloatArray) -> FloatArray:
-    """Coordinates in faces, (p, 3), of points at a share of some of their sides."""
+    """Barycentric coordinates in faces, (p, 3), of points on sides of these or adjacent faces.
+
+    ``shares`` are fractions from the first end of each side to the second.
+    """
     vertex, corners = mesh.faces.ravel(), mesh.faces.take(faces, axis=0).T
     first, second = (vertex.take(end) for end in _ends(sides))
     return ((corners == first) * (1.0 - shares) + (corners == second) * shares).T
 
 
 def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
-    """Whether each point lies in the faces of its column, (s, m); a vertex lies in all round it."""
+    """Whether each point lies in the faces of its column, (s, m).
+
+    A point on an edge or at a vertex lies in all faces that contain it.
+    """
     holds = faces == points.faces
     on_side = np.flatnonzero((points.barycentric.T == 0.0).any(axis=0))
     if len(on_side):

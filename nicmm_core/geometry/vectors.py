@@ -1,7 +1,7 @@
-"""Products and lengths of many vectors at once.
+"""Products and lengths of arrays of vectors.
 
-Components are the first axis, since operations along a long last axis are several times as fast as
-along an axis of three. Rows of vectors, (n, 3), are passed transposed.
+The first axis holds the components, since operations along a long last axis are several times as
+fast as along an axis of length three. Callers transpose arrays of row vectors, (n, 3).
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Readers of mesh files: they convert bytes to arrays and raise `FormatError` for invalid files.
+"""Reads and writes mesh files, and writes curves.
 
-Counts in a file are checked, so that memory and time are bounded by the size of the file.
+`files` has the functions for callers. The other modules convert between bytes and arrays, one
+module for each format that is read. Readers raise `FormatError` for invalid files. They check the
+counts in a file, so memory and time are bounded by the size of the file.
 """

@@ -1,4 +1,4 @@
-"""Reading meshes and writing curves."""
+"""Reads meshes from files, and writes meshes and curves, in the format of the file extension."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ CURVE_FORMATS = (".obj", ".json", ".csv")
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """Read a triangle mesh from OBJ, OFF, PLY or STL.
+    """Read a triangle mesh from an OBJ, OFF, PLY or STL file.
 
-    Larger faces are triangulated, and faces that have a vertex twice are left out, so face indices
-    may differ from those in the file; vertex indices do not. In an STL file, which stores every
-    triangle separately, corners with equal positions are joined.
+    Larger faces are triangulated, and triangles that have a vertex twice are left out. So face
+    indices may differ from those in the file, but vertex indices do not. In an STL file, which
+    stores every triangle separately, corners with equal positions become one vertex.
 
     Raises
     ------
     MeshError
-        If the file is missing, its extension is not supported, or it contains no mesh.
+        If the file cannot be opened, its extension is not supported, or it contains no usable mesh.
     """
     path = _supported(path, MESH_FORMATS, MeshError, "of a mesh file")
     try:
@@ -47,7 +47,7 @@ def read_mesh(path: str | Path) -> Mesh:
     except OSError as error:
         raise MeshError(f"{path} cannot be opened ({error}); check its permissions") from error
     try:
-        # Positions that are not finite are refused below, without a warning here.
+        # Positions that are not finite need no warning here, since `Mesh` refuses them below.
         with np.errstate(invalid="ignore", over="ignore"):
             polygons = _READERS[path.suffix.lower()](data)
             triangles = polygons.triangles()
@@ -76,8 +76,8 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
 def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
     """Write a curve as OBJ, JSON or CSV, by the extension of the path.
 
-    OBJ contains a polyline; JSON faces, barycentrics, points and control indices; CSV one row for
-    each point (face, three barycentrics, three coordinates).
+    An OBJ file contains a polyline. A JSON file contains all attributes of the curve. A CSV file
+    contains a row for each point: its face, three barycentric coordinates and three coordinates.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def write_curve(path: str | Path, curve: SurfaceCurve) -> None:
 
 
 def check_curve_path(path: str | Path) -> Path:
-    """Raise ArgumentError for an unusable output path, before any work is done."""
+    """Check the path of a curve file before any work is done; raises ArgumentError if unusable."""
     return _checked_output(path, CURVE_FORMATS)
 
 
@@ -110,7 +110,7 @@ def _checked_output(path: str | Path, formats: tuple[str, ...]) -> Path:
 def _supported(
     path: str | Path, formats: tuple[str, ...], error: type[NicmmError], purpose: str
 ) -> Path:
-    """A path with one of some extensions, or an error of the given type."""
+    """The path, if it has one of the given extensions; otherwise raises an ``error``."""
     try:
         path = Path(path)
     except TypeError as cause:
@@ -123,7 +123,7 @@ def _supported(
 def _write(path: Path, data: bytes) -> None:
     try:
         path.write_bytes(data)
-    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+    except (OSError, ValueError) as error:  # ValueError: an invalid file name
         raise ArgumentError(
             f"{path} cannot be written ({error}); choose another file or folder"
         ) from error

@@ -1,4 +1,4 @@
-"""Parses numbers in text."""
+"""Parses numbers in text files."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ..geometry.array_types import FloatArray, IntArray
 from .polygons import FormatError
 
 LARGEST = 2**31
-"""Larger counts and indices are refused, since such a file would not fit into memory."""
+"""Counts and indices of this size or more are refused: such a file would not fit into memory."""
 
 
 def floats(tokens: Sequence[bytes]) -> FloatArray:
-    """Tokens as floats.
+    """Convert tokens to floats.
 
     Raises
     ------
     FormatError
-        If one is not a number.
+        If a token is not a number.
     """
     try:
         return np.array([float(token) for token in tokens], dtype=np.float64)
@@ -28,7 +28,7 @@ def floats(tokens: Sequence[bytes]) -> FloatArray:
 
 
 def whole(token: bytes) -> int:
-    """A token as an integer with absolute value below `LARGEST`."""
+    """Convert a token to an integer of absolute value below `LARGEST`, or raise FormatError."""
     try:
         value = int(token)
     except ValueError as error:
@@ -39,10 +39,10 @@ def whole(token: bytes) -> int:
 
 
 def wholes(tokens: Sequence[bytes]) -> IntArray:
-    """Tokens as integers, see `whole`."""
+    """Convert tokens to integers, see `whole`."""
     return np.array([whole(token) for token in tokens], dtype=np.int64)
 
 
 def shown(token: bytes) -> str:
-    """A token shortened and escaped for a message."""
+    """A token, shortened and escaped for an error message."""
     return ascii(token[:24].decode("latin-1"))

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions and faces; everything else is ignored."""
+"""Reads positions and faces from Wavefront OBJ files; everything else is ignored."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def read_obj(data: bytes) -> Polygons:
     Raises
     ------
     FormatError
-        If one of them cannot be parsed.
+        If one of these lines cannot be parsed.
     """
     positions: list[bytes] = []
     corners: list[int] = []
@@ -50,6 +50,7 @@ def read_obj(data: bytes) -> Polygons:
 
 
 def _counted_back(count: int, index: int, number: int) -> int:
+    """The vertex to which a negative index in line ``number`` refers, after ``count`` vertices."""
     if count + index < 0:
         raise FormatError(f"line {number} counts back {-index} vertices, of {count} so far")
     return count + index

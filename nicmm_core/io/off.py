@@ -1,4 +1,7 @@
-"""Object File Format, as text; colours, normals and texture coordinates are ignored."""
+"""Reads text files in the Object File Format (OFF).
+
+Colours, normals and texture coordinates are ignored.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ _HEADER = re.compile(rb"(ST)?C?N?OFF")
 
 
 def read_off(data: bytes) -> Polygons:
-    """Read one vertex or face from each line.
+    """Read a text file that has one vertex or face in each line.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Polygon File Format: text and binary, properties of any type, faces or triangle strips."""
+"""Reads PLY files: text and binary, properties of any type, faces or triangle strips."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 @dataclass(frozen=True)
 class _Property:
-    """One column of an element; ``count_type`` where it holds a list."""
+    """A property of an element; ``count_type`` is the type of list lengths, None for one value."""
 
     name: str
     type: str
@@ -43,19 +43,20 @@ class _Element:
 
 
 Fields = list[tuple[str, int]]
-"""The type and the number of values of each field of a row."""
+"""Type and number of values of each field of a row."""
 
 Columns = dict[str, tuple[FloatArray, IntArray]]
-"""For each property, all values, row by row, and the number of values in each row."""
+"""For each property, all its values, row by row, and the number of values in each row."""
 
 
 def read_ply(data: bytes) -> Polygons:
-    """Read the elements "vertex" and "face" or "tristrips"; others are ignored.
+    """Read the element "vertex" and "face" or "tristrips"; other elements are ignored.
 
     Raises
     ------
     FormatError
-        If the header cannot be parsed, or the body is too short for it.
+        If the header cannot be parsed, the body is too short for it, or vertices or faces are
+        missing or invalid.
     """
     byte_order, elements, start = _header(data)
     body = _Binary(data, start, byte_order) if byte_order else _Text(data[start:])
@@ -111,17 +112,17 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
 
 
 class _Text:
-    """The body of a text file, read from a position on."""
+    """The body of a text file, read from ``position``, an index of tokens, onwards."""
 
     def __init__(self, body: bytes) -> None:
         self._tokens, self.position = body.split(), 0
 
     def room(self, fields: Fields) -> int:
-        """Number of rows with some fields that the rest has room for."""
+        """Number of rows with the given fields for which the rest of the body has room."""
         return (len(self._tokens) - self.position) // max(sum(size for _, size in fields), 1)
 
     def rows(self, fields: Fields, count: int) -> list[FloatArray]:
-        """The next rows: for each field an array (count, size)."""
+        """Read the next ``count`` rows: for each field, an array (count, size)."""
         sizes = [size for _, size in fields]
         begin, self.position = self.position, self.position + count * sum(sizes)
         table = floats(self._tokens[begin : self.position]).reshape(count, sum(sizes))
@@ -129,17 +130,17 @@ class _Text:
 
 
 class _Binary:
-    """The body of a binary file, read from a position on."""
+    """The body of a binary file, read from ``position``, an index of bytes, onwards."""
 
     def __init__(self, data: bytes, position: int, byte_order: str) -> None:
         self._data, self.position, self._byte_order = data, position, byte_order
 
     def room(self, fields: Fields) -> int:
-        """Number of rows with some fields that the rest has room for."""
+        """Number of rows with the given fields for which the rest of the body has room."""
         return (len(self._data) - self.position) // max(self._row(fields).itemsize, 1)
 
     def rows(self, fields: Fields, count: int) -> list[FloatArray]:
-        """The next rows: for each field an array (count, size)."""
+        """Read the next ``count`` rows: for each field, an array (count, size)."""
         row = self._row(fields)
         found = np.frombuffer(self._data, row, count, self.position)
         self.position += found.nbytes
@@ -151,7 +152,7 @@ class _Binary:
 
 
 def _read(element: _Element, body: _Text | _Binary) -> Columns:
-    """Read an element: all rows at once if their lists have the same lengths."""
+    """Read an element, as one table if its lists have the same lengths in all rows."""
     begin = body.position
     first = _row_by_row(element, min(element.count, 1), body)
     body.position = begin
@@ -210,7 +211,7 @@ def _corners(columns: Columns) -> tuple[IntArray, IntArray]:
     if name is None:
         raise FormatError("its faces have no list of vertex_indices")
     values, sizes = columns[name]
-    # NaN compares false; larger numbers are not indices and would not fit.
+    # Written so that NaN fails too. Larger numbers are not indices, and might overflow.
     if not (np.abs(values) < 2.0**53).all():
         raise FormatError("its faces have corners that are not indices")
     if (values != np.round(values)).any():
@@ -219,7 +220,7 @@ def _corners(columns: Columns) -> tuple[IntArray, IntArray]:
 
 
 def _unrolled(corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
-    """Triangles of strips; a corner -1 ends a strip inside a list."""
+    """Corners and sizes of the triangles of strips; a corner of -1 ends a strip within a list."""
     n_corners = len(corners)
     begins = np.zeros(n_corners, dtype=bool)
     begins[(np.cumsum(sizes) - sizes)[sizes > 0]] = True

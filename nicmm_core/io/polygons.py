@@ -1,4 +1,4 @@
-"""The result of every reader: positions and faces with any number of corners; triangulation."""
+"""Polygon meshes, which all readers return, and their triangulation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 
 MOST_STARTS = 64
-"""Limit on the corners of a polygon that are tried as the common corner of its triangles."""
+"""Maximum number of corners of a polygon that are tried as the common corner of its triangles."""
 
 
 class FormatError(ValueError):
@@ -23,7 +23,7 @@ class Polygons:
     Attributes
     ----------
     vertices : (V, 3) float array
-        Not checked: positions may be NaN or infinite.
+        Positions, not checked; they may be NaN or infinite.
     corners : (c,) int array
         Vertex indices of all faces, one face after the other; not checked.
     sizes : (F,) int array
@@ -35,12 +35,17 @@ class Polygons:
     sizes: IntArray
 
     def triangles(self) -> IntArray:
-        """Triangulate each face as a fan from one corner; returns (T, 3) in the order of the faces.
+        """Triangulate each face as a fan from one of its corners.
 
         Repeated consecutive corners are dropped. Faces with fewer than three corners, and triangles
         that have a vertex twice, are left out: they have no area and do not connect other faces.
-        The common corner is the first one, unless that inverts a triangle, as in a non-convex quad;
-        then it is the corner with the least inversion.
+        The common corner of the triangles is the first one, unless that inverts a triangle, as in a
+        non-convex quad; then it is the corner with the least inversion.
+
+        Returns
+        -------
+        (T, 3) int array
+            Triangles, in the order of the faces.
 
         Raises
         ------
@@ -78,7 +83,7 @@ class Polygons:
         return triangles[~repeated]
 
     def _without_repetition(self) -> tuple[IntArray, IntArray]:
-        """Corners and sizes without corners that repeat the one before in their face."""
+        """Corners and sizes, without corners that repeat the corner before them in a face."""
         face = np.repeat(np.arange(len(self.sizes)), self.sizes)
         before = np.roll(self.corners, 1)
         first = (np.cumsum(self.sizes) - self.sizes)[self.sizes > 0]
@@ -88,10 +93,10 @@ class Polygons:
 
 
 def _from_best_corner(vertices: FloatArray, polygons: IntArray) -> IntArray:
-    """Polygons of one size, with corners shifted so that a fan from the first one inverts least."""
+    """Polygons of one size, rotated so that a fan from the first corner has the least inversion."""
     position = vertices[polygons]
     size = polygons.shape[1]
-    # The vector area; a triangle of the fan is inverted if its vector area points against it.
+    # A triangle of the fan is inverted if its vector area points against that of the polygon.
     onward = np.roll(position, -1, axis=1)
     with np.errstate(all="ignore"):  # positions that are not finite are refused later
         whole = np.cross(position, onward).sum(axis=1)

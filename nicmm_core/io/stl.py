@@ -1,4 +1,7 @@
-"""STL, binary and text. Triangles do not share vertices, so equal positions are joined."""
+"""Reads STL files, binary and text.
+
+Triangles in STL do not share vertices, so corners with equal positions become one vertex.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +15,22 @@ from .numbers import floats
 from .polygons import FormatError, Polygons
 
 HEADER_BYTES = 84
-"""80 bytes of any content, then the number of triangles."""
+"""Size of the header of a binary file: 80 arbitrary bytes, then the number of triangles."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""Layout of a triangle in a binary file."""
 
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> Polygons:
-    """Read a binary or text file; a binary one may also begin with "solid".
+    """Read a binary or text file. A binary file, too, may begin with "solid".
 
     Raises
     ------
     FormatError
-        If it is neither.
+        If the file is truncated, or cannot be parsed as binary or as text.
     """
     count = int.from_bytes(data[HEADER_BYTES - 4 : HEADER_BYTES], "little")
     room = max(len(data) - HEADER_BYTES, 0) // TRIANGLE.itemsize

@@ -1,5 +1,5 @@
 """Repairs meshes with defects so that every stage works on them, and maps curves back.
 
-`mapped_mesh` is the map, `nonmanifold` and `degenerate_faces` repair, and `free_surface` removes
-obstacles.
+`mapped_mesh` maps between a repaired mesh and the original, `nonmanifold` and `degenerate_faces`
+repair meshes, and `free_surface` removes the faces inside obstacles.
 """

@@ -1,4 +1,4 @@
-"""Degenerate faces: finds faces without area and moves their corners to give them one."""
+"""Finds degenerate faces, which have no area, and moves their corners to give them one."""
 
 from __future__ import annotations
 
@@ -11,27 +11,30 @@ from ..geometry.mesh import blocks, edge_lengths, triangle_areas, unique_edges
 from ..progress import checkpoint
 
 ATTEMPTS = 4
-"""Attempts at moving vertices until every face has an area."""
+"""Maximum number of attempts to move vertices so that every face has an area."""
 
 SEED = 0
 """Seed of the random moves, so that the same mesh always gets the same moves."""
 
 
 def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> BoolArray:
-    """Which faces have no area: two corners coincide, or one lies on the opposite edge.
+    """Find faces without area, in which two corners coincide or one lies on the opposite edge.
 
-    A needle has an area, however thin it is, since its shortest edge is transverse to the longest.
+    A needle has an area, however thin it is, since its shortest edge is transverse to its longest.
 
     Parameters
     ----------
     vertices : (v, 3) float array
+        Positions of the vertices.
     faces : (f, 3) int array
+        Corner indices of each triangle.
     short : float
-        Length up to which the ends of an edge coincide.
+        Length up to which the ends of an edge coincide, in the unit of the positions.
 
     Returns
     -------
     (f,) bool array
+        Whether each face is degenerate.
     """
     flat = np.empty(len(faces), dtype=bool)
     for block in blocks(len(faces)):
@@ -57,22 +60,28 @@ def with_areas(
     flat: BoolArray,
     moving: BoolArray | None = None,
 ) -> FloatArray:
-    """Move vertices so that every face has an area where possible; return them, shape (v, 3).
+    """Move vertices so that every face has an area if possible.
 
-    Corners of flat faces are moved by a thousandth of their shortest edge with a length, each in a
-    random direction.
+    Corners of degenerate faces are moved randomly, along each axis by at most a thousandth of their
+    shortest edge of non-zero length.
 
     Parameters
     ----------
     vertices : (v, 3) float array
-        Near the origin; far from it, rounding would remove small moves.
+        Positions near the origin; far from it, rounding would remove small moves.
     faces : (f, 3) int array
+        Corner indices of each triangle.
     short : float
-        Length up to which the ends of an edge coincide.
+        Length up to which the ends of an edge coincide, in the unit of the positions.
     flat : (f,) bool array
-        The result of `degenerate_faces`.
+        Result of `degenerate_faces`.
     moving : (v,) bool array, optional
-        Vertices that are always moved.
+        Whether each vertex is moved in any case.
+
+    Returns
+    -------
+    (v, 3) float array
+        New positions.
     """
     start, still = vertices, flat
     checkpoint()
@@ -94,7 +103,7 @@ def with_areas(
 def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> FloatArray:
     """Length of the shortest edge longer than ``short`` at each vertex, shape (v,).
 
-    Vertices joined by shorter edges count as one. Zero if no edge is longer.
+    Vertices joined by shorter edges count as one vertex. The length is 0 if no edge is longer.
     """
     edges, _ = unique_edges(faces)
     lengths = edge_lengths(vertices, edges)

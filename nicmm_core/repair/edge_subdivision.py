@@ -1,4 +1,4 @@
-"""Subdivides the sides of faces into segments, so that each segment can join another face."""
+"""Subdivides sides of faces into segments, so that each can be joined to a different face."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from ..progress import checkpoint
 
 @dataclass(frozen=True)
 class SubdividedFaces:
-    """Triangles with sides subdivided into segments, each joined to the centroid by a triangle.
+    """Faces, some divided into triangles that join each segment of their sides to the centroid.
 
     Attributes
     ----------
     faces : (m, 3) int array
-        Undivided faces first. New vertices are points on edges, then centroids.
+        Corner indices of each triangle, undivided faces first. New vertices are numbered after the
+        given ones, first the points on edges, then the centroids.
     parent : (m,) int array
-        The face that each is a part of.
+        Given face of which each triangle is a part.
     corners : (m, 3, 3) float array
-        Barycentric coordinates of the corners in the parent.
+        Barycentric coordinates of the corners of each triangle in its parent.
     first_child : (3 f,) int array
-        The child at the first segment of each side, -1 for sides of undivided faces. The children
-        at the other segments have the following numbers. The segment is opposite corner 2 of its
-        child.
+        Triangle at the first segment of each side of the given faces; -1 for sides of undivided
+        faces. The triangles at the other segments of the side follow it. The segment is opposite
+        corner 2 of its triangle.
     """
 
     faces: IntArray
@@ -42,15 +43,17 @@ def subdivided(
     segments: IntArray,
     n_vertices: int,
 ) -> SubdividedFaces:
-    """Subdivide edges into segments of equal length, alike in all faces of an edge.
+    """Subdivide edges into segments of equal length, in the same way in all faces of an edge.
 
     Parameters
     ----------
     faces : (f, 3) int array
+        Corner indices of each triangle.
     low, high : (3 f,) int array
-        The corner (3 face + place) at either end of each side; sides of one edge agree.
+        Corners (3 face + place) at the two ends of each side, in the same order for all sides of an
+        edge. Segments are counted from ``low``.
     edge_of_side : (3 f,) int array
-        The edge of each side, -1 for sides that are not subdivided.
+        Index of the edge of each side, -1 for sides that are not subdivided.
     segments : (e,) int array
         Number of segments of each edge, at least 2.
     n_vertices : int
@@ -65,11 +68,11 @@ def subdivided(
     first = np.cumsum(count) - count
     row = np.repeat(np.arange(len(side)), count)
     step = np.arange(len(row)) - first[row]
-    inner = np.cumsum(segments - 1) - (segments - 1)  # new vertices of edges before this one
+    inner = np.cumsum(segments - 1) - (segments - 1)  # number of new vertices on earlier edges
     n_points = int((segments - 1).sum())
 
     def end(number: IntArray) -> tuple[IntArray, FloatArray]:
-        """Vertex and barycentrics of the points after a number of segments, on each row's side."""
+        """Vertex and barycentric coordinates of each point after ``number`` segments of a side."""
         share = number / count[row]
         here, there = low[side[row]], high[side[row]]
         at_edge = n_vertices + inner[edge[row]] + number - 1

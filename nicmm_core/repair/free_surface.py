@@ -1,9 +1,10 @@
 """The part of the surface outside obstacles of weight 1, which curves never enter.
 
-Faces whose three corners have weight 1 are removed, and with a clearance all faces near them. The
-remaining faces are a surface with boundaries, which every stage handles: paths avoid boundaries,
-coarse cells end there, and nodes that reach one stay there. So obstacles need no additional energy
-terms, and a curve that cannot avoid them is detected before anything is solved.
+Faces whose three corners have weight 1 are removed, and with a clearance also all faces near them.
+The remaining faces form a surface with boundaries, which every stage handles: paths avoid
+boundaries, coarse cells end there, and nodes that reach a boundary stop there. So obstacles need no
+additional energy terms, and obstacles that no curve can avoid are detected before anything is
+solved.
 """
 
 from __future__ import annotations
@@ -18,19 +19,25 @@ from .mapped_mesh import MappedMesh
 from .nonmanifold import welded_vertices
 
 HARD = 1.0
-"""Weight of an obstacle that curves must not enter; smaller weights cost in proportion."""
+"""Weight of an obstacle that curves must not enter. Lower weights add a cost in proportion."""
 
 
 def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> IntArray:
-    """Faces that are neither inside obstacles nor closer to them than the clearance, ascending.
+    """Faces that are neither inside obstacles of weight 1 nor closer to them than the clearance.
 
     Parameters
     ----------
     mapped : MappedMesh
-        A map of all faces; distances are measured on its mesh.
+        Map of a manifold made from all faces. Distances are measured on this manifold.
     obstacles : (V,) float array
+        Weights of the obstacles at the vertices of the original.
     clearance : float
         Distance along the surface, in mesh units, that curves keep from obstacles of weight 1.
+
+    Returns
+    -------
+    (u,) int array
+        Free faces of the original, ascending.
 
     Raises
     ------
@@ -38,7 +45,7 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
         If no face is free.
     """
     faces = mapped.original.faces
-    # Only one of several coincident vertices, as along a seam, may be marked.
+    # Of several coincident vertices, for example on a seam, the caller may have marked only one.
     place = welded_vertices(mapped.original)
     hard_places = np.zeros(len(place), dtype=bool)
     hard_places[place[obstacles >= HARD]] = True
@@ -56,10 +63,10 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
 
 
 def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArray:
-    """Distance of each vertex of the original from obstacles, (V,), up to `farthest`."""
+    """Distance of each vertex of the original from obstacles, (V,), computed up to ``farthest``."""
     mesh = mapped.mesh
     here = mapped.weights(hard.astype(np.float64))
-    assert here is not None  # as there are weights
+    assert here is not None  # since weights are given
     distance = np.where(here >= HARD, 0.0, np.inf)
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
     spread(surface, distance, farthest)
@@ -67,14 +74,14 @@ def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArr
 
 
 def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
-    """Raise UnreachableError if obstacles contain points, or separate them.
+    """Raise UnreachableError if points lie inside obstacles or are separated by them.
 
     Parameters
     ----------
     free : MappedMesh
-        The map of the faces outside obstacles.
+        Map of a manifold made from the faces outside obstacles.
     named : dict of str to SurfacePoints
-        Points by the name of their argument.
+        Points of the original by the name of their argument.
     """
     component: dict[PointName, set[int]] = {}
     for argument, points in named.items():

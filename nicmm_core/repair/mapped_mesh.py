@@ -1,7 +1,7 @@
 """A repaired mesh on which curves are computed, and the map between it and the original.
 
-Each of its faces is a face of the original or a part of one. So points and curves on it are points
-and curves on the original, which is not changed. `nonmanifold` creates such meshes.
+Each face of the repaired mesh is a face of the original or a part of one. So its points and curves
+are points and curves on the original, which is not changed. `nonmanifold` creates such meshes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..progress import checkpoint
 from .strand_separation import separated
 
 Holding = list[SurfacePoints]
-"""For each of some points, its representations in all faces of the mapped mesh that contain it."""
+"""For each of several points, its representations in all faces of the mesh that contain it."""
 
 
 @dataclass(frozen=True)
@@ -32,19 +32,20 @@ class MappedMesh:
     Attributes
     ----------
     original : Mesh
+        The given mesh.
     mesh : Mesh
-        The same object as the original if nothing differs.
+        The repaired mesh; the same object as the original if nothing differs.
     face : (f,) int array
-        The original face of each face of the mesh.
+        Original face of each face of the mesh.
     corners : (f, 3, 3) float array or None
-        Barycentric coordinates of the corners in that face; None if no face is divided and the
-        corners have the same order.
+        Barycentric coordinates of the corners of each face in its original face. None if no face is
+        divided and the corners have the same order.
     place : (v,) int array
-        Equal for vertices that are one point of the original.
+        Index of the place of each vertex, equal for vertices that are one point of the original.
     original_place : (V,) int array
-        The same for the original's vertices.
+        Index of the place of each vertex of the original.
     origin : (3,) float array
-        The mesh's origin in the space of the original.
+        Origin of the mesh's coordinates, in the space of the original.
     """
 
     original: Mesh
@@ -61,7 +62,10 @@ class MappedMesh:
         return self.mesh is not self.original
 
     def holding(self, points: SurfacePoints) -> Holding:
-        """Representations of points of the original; parts of a point's own face come first."""
+        """Map points of the original to all faces of the mesh that contain them.
+
+        Of the representations of a point, those in parts of its given face come first.
+        """
         found = []
         around = _faces_holding(self.original, points)
         for face, barycentric, faces in zip(points.faces, points.barycentric, around, strict=True):
@@ -70,7 +74,7 @@ class MappedMesh:
         return found
 
     def _parts_with(self, faces: IntArray, weights: dict[int, float]) -> SurfacePoints:
-        """A point, given by its weights at vertices, in the parts of some faces that contain it."""
+        """Map a point, given by weights at vertices, to the parts of ``faces`` that contain it."""
         parts = [self._parts_of(face) for face in faces.tolist()]
         parent = np.repeat(faces, [len(part) for part in parts])
         part = np.concatenate(parts)
@@ -87,19 +91,22 @@ class MappedMesh:
         return SurfacePoints(part, local)
 
     def common_component(self, holding: Holding) -> int | None:
-        """The largest component of the mesh that contains all points, or None."""
+        """The component of largest area that contains all points, or None if there is none."""
         component = self.mesh.face_component
         common = set.intersection(*(set(component[point.faces].tolist()) for point in holding))
         areas = np.bincount(component, weights=self.mesh.face_areas)
         return max(common, key=lambda label: float(areas[label]), default=None)
 
     def points(self, holding: Holding, component: int) -> SurfacePoints:
-        """The points in faces of one component."""
+        """Choose the first representation of each point in one component."""
         there = self.mesh.face_component == component
         return joined([point[np.flatnonzero(there[point.faces])[:1]] for point in holding])
 
     def weights(self, weights: FloatArray | None) -> FloatArray | None:
-        """Weights at the vertices of the mesh; the greatest one where vertices are joined."""
+        """Map weights at vertices of the original, (V,), to the mesh.
+
+        Where vertices are joined, the greatest weight counts.
+        """
         if weights is None or not self.differs:
             return weights
         checkpoint()
@@ -115,7 +122,7 @@ class MappedMesh:
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a simple curve on the mesh to a simple curve on the original.
 
-        Strands that pass different copies of one vertex, or of one point of an edge, are separated
+        Strands that pass different copies of a vertex, or of a point on an edge, are separated
         there.
         """
         if not self.differs:
@@ -135,7 +142,7 @@ class MappedMesh:
         )
 
     def carried(self, curve: SurfaceCurve) -> SurfaceCurve | None:
-        """Map a curve on the original to the mesh; None if the mesh lacks a part of it."""
+        """Map a curve on the original to the mesh; None if the mesh lacks a part of the curve."""
         if not self.differs:
             return curve
         if self.corners is None:
@@ -149,7 +156,7 @@ class MappedMesh:
         return curve_on_mesh(self.mesh, curve.closed, faces, barycentric, curve.control_index)
 
     def _parts_of_segments(self, curve: SurfaceCurve) -> tuple[IntArray, FloatArray]:
-        """The part that contains each point and the next, or -1, and the point's coordinates."""
+        """Face of the mesh that contains each point and the next one, or -1; coordinates in it."""
         n = len(curve.faces)
         faces, barycentric = np.full(n, -1), np.zeros((n, 3))
         points = SurfacePoints(curve.faces, curve.barycentric)
@@ -164,9 +171,10 @@ class MappedMesh:
         return faces, barycentric
 
     def field(self, values: FloatArray) -> FloatArray:
-        """Level-set values at the vertices of the original, from the copy nearest to the curve.
+        """Map level-set values at the vertices of the mesh, (v,), to the original.
 
-        Vertices that the mesh lacks get the greatest value.
+        Of several copies of a vertex, the one nearest to the curve counts. Vertices that the mesh
+        lacks get the greatest value.
         """
         used = np.flatnonzero(self.mesh.referenced)
         order = used[np.argsort(-np.abs(values[used]), kind="stable")]
@@ -178,7 +186,7 @@ class MappedMesh:
 
     @cached_property
     def _has_copies(self) -> bool:
-        """Whether several vertices are one point of the original."""
+        """Whether any point of the original corresponds to several vertices of the mesh."""
         return bool((np.bincount(self.place) > 1).any())
 
     def _parts_of(self, face: int) -> IntArray:
@@ -188,14 +196,14 @@ class MappedMesh:
 
     @cached_property
     def _by_original(self) -> tuple[IntArray, IntArray]:
-        """Faces of the mesh sorted by original face, and the start index of each original face."""
+        """Faces of the mesh sorted by original face, and where each original face begins."""
         order = stable_order(self.face)
         counts = np.bincount(self.face, minlength=len(self.original.faces))
         return order, np.cumsum([0, *counts])
 
 
 def _faces_holding(mesh: Mesh, points: SurfacePoints) -> list[IntArray]:
-    """The faces that contain each point, its own face first."""
+    """The faces that contain each point, the given face first."""
     found = []
     for face, barycentric in zip(points.faces, points.barycentric, strict=True):
         shared = mesh.faces_with(mesh.faces[face][barycentric > 0.0])

@@ -1,15 +1,17 @@
-"""Manifolds made from non-manifold meshes, for computing curves; the mesh itself is not changed.
+"""Makes manifolds, on which curves are computed, from meshes with defects.
 
-- Of faces with the same three corners only the first is used.
-- At an edge of more than two faces, the faces are joined in pairs, and a remaining face is
+The given mesh is not changed.
+
+- Of several faces with the same three corners, only the first is used.
+- At an edge of more than two faces, the faces are joined in pairs, and a face that is left over is
   detached. Parts of the surface that have only a vertex in common are separated. The vertices
   there are duplicated.
-- If that separates points, such an edge is divided into pieces, on which different pairs of its
-  faces are joined, so that all of its faces are connected.
-- If points are still separated, open edges with the same end positions are joined to one edge:
-  the triangles of a soup, or the two sides of a seam. Their vertices are welded.
-- Vertices of faces with no area, or almost none, are moved by a thousandth of their shortest edge
-  with a length, each in a random direction, so that every face has an area.
+- If that separates control points, such an edge is divided into pieces, on which different pairs of
+  its faces are joined, so that all of its faces are connected.
+- If control points are still separated, open edges with the same end positions become one edge, as
+  between the triangles of a soup or the two sides of a seam. Their vertices are welded.
+- Vertices of faces with no area, or almost none, are moved in random directions by about a
+  thousandth of their shortest edge of non-zero length, so that every face has an area.
 """
 
 from __future__ import annotations
@@ -28,36 +30,37 @@ from .edge_subdivision import SubdividedFaces, subdivided
 from .mapped_mesh import MappedMesh
 
 REPAIRS = 4
-"""Number of methods of joining faces, which are tried in turn."""
+"""Number of repair methods, which are tried in turn."""
 
 SEGMENTS = 2
-"""Segments of each piece of an edge. The point between them belongs to one pair of faces only, so
-no two edges of the result have the same ends."""
+"""Number of segments of each piece of an edge. Each copy of the point between them belongs to only
+one pair of faces, so no two edges of the result have the same ends."""
 
 MOST_FACES = 100
-"""Faces at a vertex up to which a mesh is checked for defects by walking round its vertices."""
+"""Number of faces at a vertex up to which `is_manifold` walks round the vertices of a mesh."""
 
 MOST_COMPARED = 32
-"""Faces at an edge up to which all pairs are compared to find the straightest one."""
+"""Number of faces at an edge up to which all pairs are compared to find the straightest one."""
 
 
 def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
-    """A manifold made from faces of a mesh.
+    """Make a manifold from faces of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
     number : int
-        Method, below `REPAIRS`; later ones connect more of the surface. 0: at an edge of more than
-        two faces, the straightest pairs are joined. 1: all faces at an edge are connected. 2 and 3:
-        the same as 0 and 1, and open edges with the same end positions are joined.
+        Index of the method, below `REPAIRS`. Later methods connect more of the surface. Method 0
+        joins the straightest pairs of faces at an edge of more than two faces. Method 1 connects
+        all faces at such an edge. Methods 2 and 3 do the same as 0 and 1, and also join open edges
+        with the same end positions.
     usable : (u,) int array
         Faces that may be used, ascending.
 
     Returns
     -------
     MappedMesh or None
-        None if the method joins no more than the previous ones.
+        The manifold with its map; None if the method joins no more than the previous ones.
     """
     connected = number % 2 == 1
     welded = np.arange(len(mesh.vertices))
@@ -89,7 +92,7 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
     new = parts.faces >= len(mesh.vertices)
     corners = mesh.vertices[mesh.faces[face]]
     vertices[parts.faces[new]] = np.einsum("fcd,fdk->fck", parts.corners, corners)[new]
-    centroid = new[:, 2]  # no other new vertex is the last corner of a face
+    centroid = new[:, 2]  # a new vertex is the last corner of a face only if it is a centroid
     vertices[parts.faces[centroid, 2]] = corners[centroid].mean(axis=1)
     place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
     pieces = _Sides(parts.faces, place)
@@ -102,10 +105,11 @@ def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
 
 
 def is_manifold(mesh: Mesh) -> bool:
-    """Whether a mesh is surely an oriented manifold, whose faces need no pairing.
+    """Whether a mesh is certainly an oriented manifold, so that its faces need no pairing.
 
-    Edges have at most two faces, of one orientation and with different corners, and the faces at
-    each vertex are one fan. False too where a vertex has more than `MOST_FACES` faces.
+    At every edge there are at most two faces, which are consistently oriented and differ in a
+    corner, and the faces at each vertex form one fan. The result is False, too, if a vertex has
+    more than `MOST_FACES` faces.
     """
     if not mesh.is_oriented or mesh.has_nonmanifold_edges or _has_lone_twins(mesh):
         return False
@@ -113,7 +117,8 @@ def is_manifold(mesh: Mesh) -> bool:
     degree = np.bincount(faces.ravel(), minlength=len(mesh.vertices))
     if degree.max() > MOST_FACES:
         return False
-    # From one corner of each vertex, at an open fan the last one, the faces before it in turn.
+    # Walk round each vertex, from the last face of its fan if the fan is open, otherwise from any
+    # face, and count the faces on the way.
     face = np.zeros(len(mesh.vertices), dtype=np.int64)
     for corner in range(3):
         checkpoint()
@@ -136,7 +141,7 @@ def is_manifold(mesh: Mesh) -> bool:
 
 
 def welded_vertices(mesh: Mesh) -> IntArray:
-    """The first vertex at the position of each vertex of an open edge, shape (V,).
+    """For each vertex of an open edge, the first such vertex at the same position, shape (V,).
 
     Other vertices keep their indices. Only exactly equal positions are welded. Edges with two faces
     are not open, so closed surfaces that touch each other stay separate.
@@ -152,25 +157,25 @@ def welded_vertices(mesh: Mesh) -> IntArray:
 
 
 def _has_lone_twins(mesh: Mesh) -> bool:
-    """Whether two faces have the same three corners and their edges have no other faces."""
+    """Whether two faces have the same corners, and at least two of their edges no other faces."""
     one, other, third = mesh.face_neighbours.T
     alike = ((one == other) & (one >= 0)) | ((other == third) & (other >= 0))
     return bool((alike | ((third == one) & (third >= 0))).any())
 
 
 def _without_twins(faces: IntArray) -> IntArray:
-    """Indices of the faces without duplicates of earlier faces, ascending."""
+    """Indices of the faces that do not have the same corners as an earlier face, ascending."""
     return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
 
 
 Joins = list[IntArray]
-"""For each piece of an edge, the pairs of its sides that are joined there, (p, 2)."""
+"""For each piece of an edge, the pairs of sides that are joined there, (p, 2)."""
 
 
 def _piece_pairs(
     nonmanifold_edges: list[IntArray], joins: list[Joins], parts: SubdividedFaces
 ) -> IntArray:
-    """Pairs of joined sides of the subdivided faces at edges of more than two faces, (p, 2)."""
+    """Pairs of sides of the subdivided faces joined at edges of more than two faces, (p, 2)."""
     pairs = []
     for at_edge, pieces in zip(nonmanifold_edges, joins, strict=True):
         checkpoint()
@@ -182,15 +187,16 @@ def _piece_pairs(
 
 
 class _Sides:
-    """The sides of faces, three for each face, grouped by edges.
+    """The sides of faces, three for each face, grouped by edge.
 
-    Side 3 f + j lies opposite corner j of face f.
+    Side 3 f + j is opposite corner j of face f.
 
     Parameters
     ----------
     faces : (f, 3) int array
+        Corner indices of each triangle.
     welded : (V,) int array
-        The vertex that represents each vertex when faces are joined.
+        Vertex that represents each vertex when faces are joined.
     """
 
     def __init__(self, faces: IntArray, welded: IntArray) -> None:
@@ -218,7 +224,7 @@ class _Sides:
 
     @cached_property
     def plain_pairs(self) -> IntArray:
-        """Sides of edges with two faces, shape (p, 2)."""
+        """The two sides of each edge with two faces, shape (p, 2)."""
         first = self._first[self._count == 2]
         return np.stack([self._order[first], self._order[first + 1]], axis=1)
 
@@ -232,11 +238,11 @@ class _Sides:
         ]
 
     def joins(self, at_edge: IntArray, vertices: FloatArray, connected: bool) -> Joins:
-        """How the sides of one edge are joined, as positions in `at_edge`.
+        """Pairs in which the sides of one edge are joined, as positions in `at_edge`.
 
-        On the first piece of the edge the straightest pairs are joined. If all sides are to be
-        connected, the resulting groups are joined on further pieces, like the corners of a
-        hypercube along its axes: q faces need about log₂ q pieces.
+        On the first piece of the edge, the straightest pairs are joined. If all sides are to be
+        connected, further pieces join these pairs with one another, like the corners of a
+        hypercube, along a different axis on each piece. So q faces need about log₂ q pieces.
         """
         checkpoint()
         straight = self._straightest(at_edge, vertices)
@@ -257,7 +263,7 @@ class _Sides:
         return pieces
 
     def subdivided(self, segments: list[int], n_vertices: int) -> SubdividedFaces:
-        """The faces with edges of more than two faces divided into segments."""
+        """Subdivide the edges of more than two faces into the given numbers of segments."""
         edge_of_side = np.full(self._faces.size, -1)
         for number, at_edge in enumerate(self.nonmanifold_edges):
             edge_of_side[at_edge] = number
@@ -265,7 +271,10 @@ class _Sides:
         return subdivided(self._faces, self._low, self._high, edge_of_side, counts, n_vertices)
 
     def _straightest(self, sides: IntArray, vertices: FloatArray) -> IntArray:
-        """Pairs of the sides of one edge, the straightest first; at most one side is left over."""
+        """Pairs of positions in ``sides``, which belong to one edge, the straightest pair first.
+
+        At most one side is left over.
+        """
         corner = self._faces.ravel()
         start, end = vertices[corner[self._low[sides]]], vertices[corner[self._high[sides]]]
         edge = end - start
@@ -286,21 +295,21 @@ class _Sides:
         return np.array(pairs)
 
     def cut(self, pairs: IntArray, n_vertices: int) -> tuple[IntArray, IntArray]:
-        """Faces that share vertices only where pairs of sides join them.
+        """Duplicate vertices so that faces share them only where pairs of sides join the faces.
 
         Returns
         -------
         (f, 3) int array
-            Corners.
+            New corner indices of each triangle.
         (v,) int array
-            The original vertex of each vertex.
+            Original vertex of each vertex.
         """
         one, other = pairs.T
         checkpoint()
         rows = np.concatenate([self._low[one], self._high[one]])
         columns = np.concatenate([self._low[other], self._high[other]])
         group, source = joined_corners(self._faces, rows, columns)
-        # One of the copies keeps the number of the vertex.
+        # One of the copies keeps the index of the vertex.
         order, begin, _ = grouped(source)
         new = np.delete(np.arange(len(source)), order[begin])
         checkpoint()
@@ -310,7 +319,7 @@ class _Sides:
 
 
 def _opposite(outward: FloatArray) -> IntArray:
-    """Pairs of opposite directions about a line, (q, 3), by the order of their angles."""
+    """Pairs of about opposite directions round a line, (q, 3), by the order of their angles."""
     axes = np.linalg.svd(outward, full_matrices=False)[2][:2]
     order = np.argsort(np.arctan2(outward @ axes[1], outward @ axes[0]), kind="stable")
     half = len(order) // 2
@@ -326,11 +335,11 @@ def _with_areas(
     corners: FloatArray | None,
     place: IntArray,
 ) -> MappedMesh:
-    """The map to a mesh with these faces, in which every face has an area where possible.
+    """Build a mapped mesh, with vertices moved so that every face has an area if possible.
 
     Copies of a vertex of the original are moved apart.
     """
-    # A side with both ends welded to one vertex has no length, so its face is left out.
+    # If both ends of a side are welded into one vertex, its face is left out.
     whole = corners_differ(faces)
     if not whole.all():
         faces, face = faces[whole], face[whole]
@@ -341,7 +350,8 @@ def _with_areas(
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
     origin = np.zeros(3)
-    # Straight traces from one copy of a vertex would pass exactly through the others.
+    # Copies of a vertex are moved, since a straight trace from one would pass exactly through
+    # another.
     doubled = np.ones(len(vertices), dtype=bool)
     order, first, _ = grouped(place)
     doubled[order[first]] = False

@@ -1,9 +1,10 @@
 """Separates strands of a curve that touch on the original mesh but not on the mapped one.
 
-A curve that is simple on the mapped mesh passes each of its vertices once, but two of them may be
-one vertex of the original. One strand is then routed round its copy, across the edges that meet
-there. The same applies to copies of an edge: if strands cross them at the same point, one point is
-moved along the edge, and a strand that runs along one is bent into the adjacent face.
+A curve that is simple on the mapped mesh passes each vertex of that mesh at most once, but two of
+these vertices may be copies of one vertex of the original. One strand is then routed round its
+copy, across the edges that meet there. Copies of an edge are treated similarly. If strands cross
+them at the same point, the point of one strand is moved along the edge. A strand that runs along a
+copy is bent into the adjacent face.
 """
 
 from __future__ import annotations
@@ -19,45 +20,50 @@ from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, joined, weights_at
 
 REACH = 0.05
-"""Greatest distance at which a strand passes a vertex, in lengths of the edges there."""
+"""Greatest distance by which a strand is moved, in lengths of the edges there."""
 
 SHARE = 0.5
-"""Greatest distance relative to that of the nearest other point of the curve."""
+"""Greatest such distance, relative to that of the nearest other point of the curve."""
 
 SMALLER = 0.1
 """Factor on the distance for the next attempt, if the moved strand touches another one."""
 
 ATTEMPTS = 8
+"""Maximum number of attempts to move one point."""
 
 ROUNDS = 4
-"""Rounds of moves: strands round copies of one vertex may meet on copies of an edge."""
+"""Maximum number of rounds. Strands moved round copies of one vertex may then meet on copies of an
+edge."""
 
 SAME_POINT = 1e-9
-"""Difference of weights up to which points on copies of one edge coincide."""
+"""Difference of barycentric weights up to which points on copies of one edge coincide."""
 
 
 def separated(
     mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool, fixed: IntArray
 ) -> tuple[SurfacePoints, IntArray]:
-    """Move strands apart that meet at copies of a vertex or of a point of an edge.
+    """Move strands apart that meet at copies of a vertex or of a point on an edge.
 
     Parameters
     ----------
     mesh : Mesh
         The mapped mesh.
     place : (v,) int array
-        Equal for vertices that are one point of the original.
+        Index of the place of each vertex, equal for vertices that are one point of the original.
     polyline : SurfacePoints
-        Simple on the mesh; each point in the face of the segment after it.
+        n points of a polyline that is simple on the mesh, each in the face of the segment that
+        begins there.
     closed : bool
+        Whether the last point is joined to the first.
     fixed : (k,) int array
-        Points that stay.
+        Indices of points that must not move.
 
     Returns
     -------
     SurfacePoints
+        The polyline with its strands moved apart.
     (n,) int array
-        The new index of each old point; -1 for those that are replaced.
+        New index of each given point, or -1 if the point was replaced.
     """
     number = np.arange(len(polyline))
     for _ in range(ROUNDS):
@@ -79,7 +85,7 @@ def separated(
 def _passed_segments(
     mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool
 ) -> list[int]:
-    """Segments along an edge, copies of which contain points of other strands, ascending."""
+    """Segments along an edge, if other strands have points on copies of this edge, ascending."""
     n = len(polyline)
     here = polyline.barycentric > 0.0
     corners = mesh.faces[polyline.faces]
@@ -102,7 +108,7 @@ def _passed_segments(
 
 
 def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntArray) -> list[int]:
-    """Points, none of them fixed, that coincide with another point on the original, ascending."""
+    """Points, except fixed ones, that coincide with another point on the original, ascending."""
     stays = np.zeros(len(polyline), dtype=bool)
     stays[fixed] = True
     here = polyline.barycentric > 0.0
@@ -114,7 +120,7 @@ def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntAr
     on_mesh = here.sum(axis=1) < 3
     first: dict[tuple[int, ...], list[int]] = {}
     found = []
-    # Fixed points first, so that the others are moved.
+    # Fixed points come first, so the points that coincide with them are moved.
     for point in np.lexsort((np.arange(len(stays)), ~stays)).tolist():
         if not on_mesh[point]:
             continue
@@ -135,7 +141,11 @@ def _moved(
     closed: bool,
     move: Callable[[Mesh, SurfacePoints, int, float], tuple[SurfacePoints, IntArray]],
 ) -> tuple[SurfacePoints, IntArray]:
-    """Move one point as far as the polyline stays simple; if none works, return it unchanged."""
+    """Move one point, by less at every attempt until the polyline is simple.
+
+    Returns the polyline and the new index of each point. If no attempt succeeds, the polyline is
+    unchanged.
+    """
     share = 1.0
     for _ in range(ATTEMPTS):
         changed, number = move(mesh, polyline, point, share)
@@ -148,7 +158,7 @@ def _moved(
 def _round_vertex(
     mesh: Mesh, polyline: SurfacePoints, point: int, share: float
 ) -> tuple[SurfacePoints, IntArray]:
-    """Replace a point at a vertex by points on the edges round it."""
+    """Replace a point at a vertex by points on the edges that meet there."""
     n, faces = len(polyline), polyline.faces
     vertex = int(mesh.faces[faces[point]][polyline.barycentric[point].argmax()])
     fan = _faces_between(mesh, vertex, int(faces[point - 1]), int(faces[point]))
@@ -156,7 +166,7 @@ def _round_vertex(
     near[point] = 0.0
     reach = share * min(REACH, SHARE * (1.0 - float(near.max())))
     corners = mesh.faces[fan]
-    # Each new point is on the edge from the vertex that a face shares with the one before.
+    # Each new point is on the edge that a face shares with the face before it.
     common = (corners[1:, :, None] == corners[:-1, None, :]).any(axis=2)
     weights = np.where(corners[1:] == vertex, 1.0 - reach, np.where(common, reach, 0.0))
     around = SurfacePoints(np.array(fan[1:], dtype=np.int64), weights)
@@ -183,7 +193,7 @@ def _along_edge(
 def _into_face(
     mesh: Mesh, polyline: SurfacePoints, point: int, share: float
 ) -> tuple[SurfacePoints, IntArray]:
-    """Insert a point into a segment along an edge, inside the face of the segment."""
+    """Insert a point into a segment along an edge, which bends it into the face of the segment."""
     n, face = len(polyline), int(polyline.faces[point])
     following = (point + 1) % n
     corners = mesh.faces[polyline.faces[following]]
@@ -198,7 +208,7 @@ def _into_face(
 
 
 def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
-    """The shortest chain of adjacent faces about a vertex from one face to another."""
+    """The shortest chain of adjacent faces round a vertex from one face to another."""
     previous = {start: start}
     queue = [start]
     for face in queue:
