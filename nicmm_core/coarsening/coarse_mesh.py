@@ -1,9 +1,10 @@
-"""A coarse mesh of the same surface: the dual of geodesic Voronoi cells.
+"""Builds a coarse mesh of the same surface: the dual of geodesic Voronoi cells.
 
-Some vertices of the fine mesh are chosen as seeds, about evenly spread. Every vertex belongs to the
-cell of its nearest seed along edges, and three seeds whose cells meet in a face make a coarse face.
-Distances are measured along the surface, so two sheets that come close stay separate. The mesh only
-has to be connected. Dijkstra's algorithm finds the cells, on a large mesh slab by slab.
+Some vertices of the fine mesh are chosen as seeds, spread about evenly. Every vertex belongs to the
+cell of the seed that is nearest to it along edges. Three seeds whose cells meet in a face form a
+coarse face. Distances are measured along the surface, so two sheets that come close stay separate.
+The only requirement on the mesh is that it is connected. Dijkstra's algorithm finds the cells, on a
+large mesh slab by slab.
 """
 
 from __future__ import annotations
@@ -27,19 +28,19 @@ from ..progress import checkpoint
 from ..repair.degenerate_faces import degenerate_faces, with_areas
 
 TIE_BREAK = 1e-6
-"""Greatest change of an edge's length, relative to it, for each of its ends."""
+"""Greatest relative change of the length of an edge due to each of its ends."""
 
 SLAB = 150_000
-"""Vertices of a slab; a run of Dijkstra's algorithm over them takes about 0.1 s.
+"""Number of vertices in a slab, over which Dijkstra's algorithm takes about 0.1 s.
 
 It holds Python's global lock and cannot be cancelled while it runs.
 """
 
 MARGIN = 4.0
-"""Overlap of a slab with its neighbours on either side, in least distances of seeds.
+"""Overlap of a slab with its neighbours on either side, in least distances between seeds.
 
-Candidates are about half a distance apart, so hardly any vertex is farther than two distances from
-its nearest seed; paths along edges are a little longer.
+Candidates are about half a least distance apart, so hardly any vertex is farther than two least
+distances from its nearest seed; paths along edges are slightly longer.
 """
 
 
@@ -50,11 +51,11 @@ class CoarseMesh:
     Attributes
     ----------
     mesh : Mesh
-        n vertices.
+        The coarse mesh, with n vertices.
     seed : (n,) int array
-        The fine vertex of each coarse vertex.
+        The fine vertex at which each coarse vertex lies.
     cell : (V,) int array
-        The nearest coarse vertex of each fine vertex, -1 on other components.
+        The coarse vertex nearest to each fine vertex along edges, -1 on other components.
     """
 
     mesh: Mesh
@@ -63,29 +64,31 @@ class CoarseMesh:
 
     @cached_property
     def _by_cell(self) -> tuple[IntArray, IntArray]:
-        """Fine vertices sorted by cell, and the start of each cell."""
+        """Fine vertices sorted by cell, and the index at which each cell starts."""
         order = np.argsort(self.cell, kind="stable")
         return order, np.searchsorted(self.cell[order], np.arange(len(self.seed) + 1))
 
     def faces_of_cells(self, fine: Mesh, vertices: IntArray) -> IntArray:
-        """Fine faces at the vertices of some cells, ascending."""
+        """Fine faces at the fine vertices in the cells of coarse vertices, ascending."""
         order, begin = self._by_cell
         parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
         return fine.faces_at(np.concatenate(parts))
 
     def cells_around(self, vertices: IntArray) -> IntArray:
-        """Some cells and their neighbours, ascending."""
+        """The cells of coarse vertices and their neighbours, as ascending coarse vertices."""
         return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
 
     def greatest_in_cells(self, values: FloatArray) -> FloatArray:
-        """The greatest of the values at fine vertices, (V,), in each cell, shape (n,)."""
+        """The greatest value in each cell, shape (n,), of values at fine vertices, (V,)."""
         greatest = np.full(len(self.seed), -np.inf)
         inside = self.cell >= 0
         np.maximum.at(greatest, self.cell[inside], values[inside])
         return greatest
 
     def nearest_points(self, fine: Mesh, points: SurfacePoints) -> SurfacePoints:
-        """Project points of the fine mesh to the coarse mesh, within the cells that they lie in.
+        """Project points of the fine mesh to the coarse mesh.
+
+        Each point is projected to the nearest coarse face at its cell or at a neighbouring cell.
 
         Raises
         ------
@@ -108,7 +111,7 @@ class CoarseMesh:
 def build_coarse_mesh(
     mesh: Mesh, vertex_normals: FloatArray, component: int, count: int
 ) -> CoarseMesh:
-    """The dual of about ``count`` Voronoi cells of one component.
+    """Build the dual of about ``count`` Voronoi cells of one component.
 
     Parameters
     ----------
@@ -116,8 +119,9 @@ def build_coarse_mesh(
     vertex_normals : (V, 3) float array
         Unit vectors.
     component : int
+        Index of the component.
     count : int
-        Strongly curved regions get more cells.
+        Approximate number of cells; strongly curved regions get more.
 
     Raises
     ------
@@ -131,7 +135,7 @@ def build_coarse_mesh(
     areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
-    # Hashes of positions replace random numbers, so that the numbering makes no difference.
+    # Hashes of positions replace random numbers, so the result does not depend on the numbering.
     places = frame_coordinates(mesh)
     checkpoint()
     chance = uniform_hash(places)
@@ -153,7 +157,7 @@ def build_coarse_mesh(
 
 
 def _with_areas(mesh: Mesh) -> Mesh:
-    """A mesh without degenerate faces: on a grid, three seeds may be collinear."""
+    """The mesh with area given to degenerate faces: on a grid, three seeds may be collinear."""
     vertices, faces = mesh.vertices, mesh.faces
     short = tolerances.AT_ONE_PLACE * mesh.diagonal
     flat = degenerate_faces(vertices, faces, short)
@@ -164,9 +168,9 @@ def _with_areas(mesh: Mesh) -> Mesh:
 
 
 def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
-    """Lengths of the edges, each stored once, shape (V, V).
+    """Sparse matrix of edge lengths, shape (V, V); each edge is stored once.
 
-    They are changed by a little, so that no two paths on a grid are equally long.
+    Lengths are changed slightly, so that no two paths on a grid are equally long.
     """
     edges = mesh.edges
     checkpoint()
@@ -180,11 +184,12 @@ def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
 def _nearest_seeds(
     vertices: FloatArray, graph: sparse.csr_array, seed: IntArray, margin: float
 ) -> IntArray:
-    """The nearest seed of each vertex along edges, shape (V,).
+    """The index of the seed nearest to each vertex along edges, shape (V,).
 
-    -1 where no seed is connected, or none within the margin on a mesh of several slabs. Paths from
-    a vertex of a slab that are no longer than the margin stay in the widened slab, so the results
-    for its own vertices hold on the whole mesh.
+    The index is -1 if no seed is connected with the vertex or, on a mesh of several slabs, if none
+    is within the margin. Paths from a vertex of a slab that are no longer than the margin stay in
+    the slab widened by the margin, so the results for vertices of the slab itself hold on the whole
+    mesh.
     """
     n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
     along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]

@@ -1,4 +1,4 @@
-"""The start of a curve on a large mesh: found on a coarse mesh, then mapped to the fine mesh."""
+"""Finds the start of a curve on a large mesh: on a coarse mesh, then mapped to the fine mesh."""
 
 from __future__ import annotations
 
@@ -23,23 +23,26 @@ from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import curve_on_fine_mesh, nodes_on_fine_mesh
 
 CELLS = 4_000
-"""Cells of the first coarse mesh: about the number of vertices of the training meshes."""
+"""Number of cells of the first coarse mesh; training meshes have about as many vertices."""
 
 REDUCTION = 2
 """Least number of fine vertices per cell."""
 
 SMALL, LARGE = 3_000, 6_000
-"""Numbers of vertices up to which a mesh needs no coarse mesh, and from which it does."""
+"""Numbers of vertices up to which a mesh needs no coarse mesh, and above which it needs one."""
 
 CROSSED = 7.0
-"""`edges_crossed` from which a mesh between these sizes needs a coarse mesh: it has needles."""
+"""Value of `edges_crossed` above which a mesh between these sizes needs a coarse mesh.
+
+Such a mesh has needles.
+"""
 
 GROWTH = 4
-"""Factor of the number of cells after a coarse mesh on which no curve was found."""
+"""Factor of the number of cells after no curve was found on a coarse mesh."""
 
 
 COARSE_SHARE = 0.3
-"""Approximate share of the time to a first start that building the coarse mesh takes."""
+"""Approximate share of building the coarse mesh in the time until the first start is found."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,11 @@ class CoarseStart:
     Attributes
     ----------
     curve : NodedCurve or SurfaceCurve
-        Simple.
+        A simple curve on the fine mesh.
     visited : (k,) int array
-        Indices of the control points in the order of the curve.
+        Indices of the control points in the request, in the order visited.
     breaking_vertices : int
-        Of the level set on the coarse mesh, if there was one.
+        Number of breaking vertices of the level set on the coarse mesh, if there was one.
     """
 
     curve: NodedCurve | SurfaceCurve
@@ -63,18 +66,20 @@ class CoarseStart:
 
 @dataclass(frozen=True)
 class _CoarseSurface:
+    """A coarse mesh, prepared for curves and for the search for courses."""
+
     coarse: CoarseMesh
     surface: CurveSurface
     courses: CourseSurface
 
 
 class CoarseStarts:
-    """The coarse meshes of one mesh, each built on first use and cached.
+    """Finds starts on coarse meshes of one mesh, each built on first use and cached.
 
     Parameters
     ----------
     surface : CurveSurface
-        Of the fine mesh.
+        Surface of the fine mesh.
     """
 
     def __init__(self, surface: CurveSurface) -> None:
@@ -83,10 +88,10 @@ class CoarseStarts:
         self._large: dict[int, bool] = {}
 
     def courses(self, request: Request, draw: int = 0) -> Iterator[CoarseStart]:
-        """The courses on a coarse mesh that are simple on the fine mesh, the best first.
+        """Yield the courses on a coarse mesh that are simple on the fine mesh, the best first.
 
-        A small mesh has no coarse mesh, and where points are close together no course may be found.
-        Draws above 0 give other courses.
+        A small mesh has no coarse mesh and so no courses, and none may be found where points are
+        close together. `draw` is that of `CourseSurface.courses`.
         """
         level = next(self._levels(request), None)
         if level is None:
@@ -115,7 +120,7 @@ class CoarseStarts:
         return None
 
     def is_large(self, request: Request) -> bool:
-        """Whether the mesh has a coarse mesh for a request."""
+        """Whether the component of a request needs a coarse mesh."""
         component = int(self._mesh.face_component[request.points.faces[0]])
         if component not in self._large:
             count = self._n_vertices(component)
@@ -136,10 +141,12 @@ class CoarseStarts:
             count *= GROWTH
 
     def _n_vertices(self, component: int) -> int:
+        """Number of vertices of a component."""
         inside = self._mesh.faces[self._mesh.face_component == component]
         return np.count_nonzero(np.bincount(inside.ravel()))
 
     def _by_network_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
+        """The network's curve on one coarse mesh, mapped to the fine mesh; None if it fails."""
         coarse, copy = level.coarse, level.courses.copy
         on_coarse = _on_coarse(self._mesh, coarse, request)
         with subrange(COARSE_SHARE, 0.9), placed(copy.in_original):
@@ -154,6 +161,7 @@ class CoarseStarts:
         return None if result is None else CoarseStart(result, visited, zeros.breaking_vertices)
 
     def _surface(self, component: int, count: int) -> _CoarseSurface:
+        """The coarse mesh of a component with about `count` cells."""
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
@@ -164,12 +172,12 @@ class CoarseStarts:
 
 
 def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
-    """The request in terms of the coarse mesh.
+    """The request with its points and maps transferred to the coarse mesh.
 
     Raises
     ------
     ControlPointError, UnreachableError
-        If control points coincide there, or lie on different components.
+        If control points coincide on the coarse mesh or lie on different components of it.
     """
 
     def nearest(points: SurfacePoints) -> SurfacePoints:
@@ -190,6 +198,6 @@ def _in_cells(coarse: CoarseMesh, weights: FloatArray | None) -> FloatArray | No
 
 
 def _visited(curve: SurfaceCurve, positions: FloatArray) -> IntArray:
-    """Indices of the control points, (k, 3), in the order of a curve."""
+    """Indices of control points, given by positions (k, 3), in the order of a curve."""
     passed = curve.points[curve.control_index]
     return np.linalg.norm(passed[:, None] - positions, axis=2).argmin(axis=1)

@@ -1,8 +1,8 @@
-"""Map a curve from the coarse mesh to the fine mesh.
+"""Maps a curve from the coarse mesh to the fine mesh.
 
 Nodes of the coarse curve are projected to the fine faces of their cells and joined by straight
 traces, as in the relaxation. Where the fine surface is too rough for a trace, the shortest path
-along edges joins them. Cells and paths follow the surface, so a curve on one side of a thin limb
+along edges replaces it. Cells and paths follow the surface, so a curve on one side of a thin limb
 stays on that side.
 """
 
@@ -27,14 +27,14 @@ from ..relaxation.noded_curve import NodedCurve, is_simple, noded_curve, straigh
 from .coarse_mesh import CoarseMesh
 
 NODES = (256, 512, 128)
-"""Numbers of nodes, tried in this order.
+"""Numbers of nodes that are tried, in this order.
 
-Finer detail of the coarse curve comes from the coarse mesh and not from the surface. Where strands
-are close together, traces between other nodes may avoid a crossing.
+Finer detail of the coarse curve would come from the coarse mesh and not from the surface. Where
+strands are close together, traces between other nodes may avoid a crossing.
 """
 
 WIDENED = 3
-"""Rings of cells around two nodes in which a path between them is sought."""
+"""Number of rings of cells around two nodes in which a path between them is searched for."""
 
 
 def curve_on_fine_mesh(
@@ -44,22 +44,22 @@ def curve_on_fine_mesh(
     curve: SurfaceCurve,
     controls: SurfacePoints,
 ) -> SurfaceCurve | None:
-    """The curve on the fine mesh near one on the coarse mesh.
+    """Map a curve on the coarse mesh to a curve nearby on the fine mesh.
 
     Parameters
     ----------
     surface, coarse_surface : CurveSurface
-        Of the fine mesh and of ``coarse.mesh``.
+        Surfaces of the fine mesh and of ``coarse.mesh``.
     coarse : CoarseMesh
     curve : SurfaceCurve
-        Simple, on the coarse mesh.
+        A simple curve on the coarse mesh.
     controls : SurfacePoints
         k points of the fine mesh, in the order in which the curve visits them.
 
     Returns
     -------
     SurfaceCurve or None
-        Simple and exactly through its control points; None if no such curve is found.
+        A simple curve exactly through the control points; None if no such curve is found.
     """
     for count in NODES:
         checkpoint()
@@ -73,9 +73,10 @@ def curve_on_fine_mesh(
 def nodes_on_fine_mesh(
     surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
-    """The curve on the fine mesh through the nodes of a coarse one; None if it is not simple.
+    """The curve on the fine mesh through the nodes of a coarse curve; None if it is not simple.
 
-    Of the coarse curve only the nodes are used. Parameters are those of `curve_on_fine_mesh`.
+    Only the nodes of the coarse curve, `exact`, are used. The other parameters are those of
+    `curve_on_fine_mesh`.
     """
     result = _through_nodes(surface, coarse, exact, controls)
     return result if result is not None and is_simple(surface, result) else None
@@ -84,14 +85,14 @@ def nodes_on_fine_mesh(
 def _through_nodes(
     surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
-    """The curve through the nodes of a coarse one, simple or not."""
+    """The curve through the nodes of a coarse curve, simple or not; None if a gap remains."""
     fine = surface.mesh
     places, cell = _nearest_points(fine, coarse, exact.nodes.places)
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[exact.control_nodes] = controls.faces
     barycentric[exact.control_nodes] = controls.barycentric
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
-    # Normals of the coarse mesh ignore small dents that a trace has to cross.
+    # Normals of the coarse mesh, since they ignore small dents that a trace has to cross.
     smooth = replace(nodes, normals=exact.nodes.normals)
     polyline, node_place, lost = straight_traces(surface, exact, smooth)
     bridges: dict[int, SurfacePoints] = {}
@@ -114,7 +115,7 @@ def _through_nodes(
 def _nearest_points(
     fine: Mesh, coarse: CoarseMesh, points: SurfacePoints
 ) -> tuple[SurfacePoints, IntArray]:
-    """Coarse points projected to the fine mesh, strictly inside faces, and their cells, (p,)."""
+    """Coarse points projected strictly inside faces of the fine mesh, and their cells, (p,)."""
     positions = points.positions(coarse.mesh)
     cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
     faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
@@ -131,7 +132,10 @@ def _nearest_points(
 def _path_along_edges(
     mesh: Mesh, inside: IntArray, nodes: Nodes, start: int, end: int
 ) -> SurfacePoints | None:
-    """The shortest path along edges of some faces from one node to another, without its end."""
+    """The shortest path along edges of given faces from one node to another, without its end.
+
+    None if there is no such path.
+    """
     vertices, faces = np.unique(mesh.faces[inside], return_inverse=True)
     edges, _ = unique_edges(faces.reshape(-1, 3))
     ends = nodes.places[np.array([start, end])]
@@ -149,7 +153,7 @@ def _path_along_edges(
     arcs = np.concatenate([edges, np.array([link[:2] for link in links]).reshape(-1, 2)])
     length = np.linalg.norm(positions[arcs[:, 0]] - positions[arcs[:, 1]], axis=1)
     size = len(positions)
-    # A length of zero would not be stored as an arc.
+    # A sparse graph has no arc where the length is zero.
     length = np.maximum(length, np.finfo(float).tiny)
     graph = sparse.csr_array((length, (arcs[:, 0], arcs[:, 1])), shape=(size, size))
     _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
@@ -160,12 +164,15 @@ def _path_along_edges(
 
 
 def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> SurfacePoints | None:
-    """A path along vertices as points, with its start, each in the face of the next segment."""
+    """A path along vertices as points, each in the face of the segment after it.
+
+    The first of the two ends is included, the second is not. None if a segment lies in no face.
+    """
     weights = [
         {vertex: weight for vertex, weight in zip(*point, strict=True) if weight > 0.0}
         for point in zip(mesh.faces[ends.faces].tolist(), ends.barycentric.tolist(), strict=True)
     ]
-    # An end that is itself a vertex must not be repeated.
+    # An end that lies at a vertex of the path must not be repeated.
     inner = [{vertex: 1.0} for vertex in path]
     inner = inner[weights[0].keys() == {path[0]} :]
     if inner and weights[1].keys() == {path[-1]}:
@@ -188,7 +195,7 @@ def _with_bridges(
     node_place: IntArray,
     bridges: dict[int, SurfacePoints],
 ) -> NodedCurve:
-    """The polyline with paths along edges in place of lost traces."""
+    """The polyline with paths along edges in place of failed traces."""
     bounds = np.append(node_place, len(polyline))
     parts = [
         bridges.get(node, polyline[np.arange(bounds[node], bounds[node + 1])])

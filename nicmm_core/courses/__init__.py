@@ -1,4 +1,4 @@
-"""Which course a curve takes: candidates for every leg, combined, relaxed together and compared.
+"""Finds the course of a curve: candidates for every leg, combined, relaxed together and compared.
 
-`course_search` is the entry point.
+`course_surface` is the entry point; it prepares the surface on which `course_search` searches.
 """

@@ -1,7 +1,7 @@
-"""The search for the course of a curve: candidates from the hop graph, relaxed together, compared.
+"""Searches for the course of a curve: candidates from the hop graph, relaxed and compared.
 
-Courses are compared by the energy that relaxation minimises, with one length scale for all of them
-(`elastic_energy.comparable_energies`): the least length among them.
+Courses are compared by the energy that relaxation minimises, but with one length scale for all of
+them, the length of the shortest course (`elastic_energy.comparable_energies`).
 """
 
 from __future__ import annotations
@@ -25,23 +25,25 @@ from .leg_routes import routes_of_legs
 from .uncrossing import uncrossed
 
 TENSION = 4.0
-"""τ of the graph relative to (2π / L)², where L is the length of the shortest path. Hops overrate
-bending, since they turn at cells only."""
+"""τ of the graph relative to (2π / L)², where L is the length of the shortest path.
+
+It is greater than 1 because hops overestimate bending: they turn only at cells.
+"""
 
 CANDIDATES, FINALISTS = 24, 6
-"""Courses relaxed with few nodes, and those of them relaxed with twice as many."""
+"""Number of courses relaxed with few nodes, and number of the best relaxed with twice as many."""
 
 SPARSE = 8
-"""One node in so many is compared first."""
+"""Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
 
 APART = 0.02
-"""Greatest distance of two courses that count as the same, relative to the diagonal."""
+"""Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
 
 DRAWN = 0.4
-"""Standard deviation of the logarithms of random factors."""
+"""Standard deviation of the logarithms of the random factors of lengths."""
 
 MOST_LEGS = 60
-"""Number of legs above which no courses are sought: hardly any combination is simple then."""
+"""Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
 STAGES = (TogetherConfig(iterations=12), TogetherConfig(iterations=14))
 
@@ -57,28 +59,31 @@ def find_courses(
     any_order: bool,
     draw: int = 0,
 ) -> Iterator[tuple[Nodes, IntArray]]:
-    """Simple relaxed courses through points, by ascending energy.
+    """Yield simple relaxed courses through points, by ascending energy.
 
-    Each by its nodes, and the number of the control point at each of them, -1 at the others.
+    Each course is given by its nodes and, for every node, the index of its control point, or -1 if
+    it has none. It is yielded twice, the second time with twice as many nodes.
 
     Parameters
     ----------
     graph : HopGraph
-        Of the surface without maps.
+        Hop graph of the surface without maps.
     surface : CurveSurface
-        With the maps of the request.
+        Surface with the maps of the request.
     points : SurfacePoints
-        k points in the order visited.
+        Control points and via points, k in total, in the order visited.
     along : (k, V + k) float array
-        Distances from them along edges to the vertices and to them.
+        Distances along edges from these points to the V vertices and to the points themselves.
     fixed : (k,) bool array
-        The control points among them; curves pass the others only at the start.
+        Which points are control points. Courses pass via points only until they are relaxed.
     closed : bool
     smoothness : float
+        Divisor of the tension.
     any_order : bool
-        Whether a course may visit control points in another order, if it would cross itself.
+        Whether a course may visit the control points in another order to avoid crossing itself.
     draw : int
-        Numbers above 0 give other courses: lengths are multiplied by random factors.
+        Seed of random factors of the lengths in the graph, which give other courses; 0 for no
+        factors.
     """
     count = len(points) if closed else len(points) - 1
     if count > MOST_LEGS:
@@ -87,7 +92,7 @@ def find_courses(
     legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
     if draw:
-        # Numbers of vertices follow from their places (`geometry.numbering`).
+        # The numbering depends only on the surface (`geometry.numbering`), so the factors do too.
         chance = np.random.default_rng(draw).standard_normal(len(surface.mesh.vertices))
         factor = np.exp(DRAWN * chance) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
@@ -105,7 +110,7 @@ def find_courses(
     if not len(choice):
         return
     nodes, at_points = course_nodes(courses, routes, on_routes, traces, choice, closed)
-    # Control points are numbered without the others.
+    # Indices of control points do not count via points.
     number = np.where(fixed, np.cumsum(fixed) - 1, -1)
     visit = np.full(len(at_points), -1)
     visit[at_points] = np.tile(number, len(choice))
@@ -127,7 +132,7 @@ def find_courses(
 
 
 def _denser(surface: CurveSurface, nodes: Nodes, visit: IntArray) -> tuple[Nodes, IntArray]:
-    """Twice as many nodes, with their control points."""
+    """The curves with twice as many nodes, and the control point at each node."""
     finer, stays = with_midpoints(surface, nodes, visit >= 0)
     among = np.full(len(stays), -1)
     among[stays] = visit[visit >= 0]
@@ -135,7 +140,7 @@ def _denser(surface: CurveSurface, nodes: Nodes, visit: IntArray) -> tuple[Nodes
 
 
 def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:
-    """E of each course, (c,), with the least length among them as the scale."""
+    """E of each course, (c,), with the length of the shortest course as the length scale."""
     shortest = float(nodes.by_curve(nodes.step_lengths).sum(axis=1).min())
     return comparable_energies(surface, nodes, smoothness, shortest)
 
@@ -143,11 +148,11 @@ def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatAr
 def _best(
     surface: CurveSurface, nodes: Nodes, simple: BoolArray, smoothness: float
 ) -> tuple[IntArray, IntArray]:
-    """Courses that differ by ascending energy: those that are `simple`, (c,), and the others."""
+    """Distinct courses by ascending energy: the simple ones, and those that cross themselves."""
     energy = _energies(surface, nodes, smoothness)
     positions = nodes.positions.reshape(nodes.curves, -1, 3)
     limit = APART * surface.mesh.diagonal
-    # Curves near each other have about the same bounding boxes.
+    # Only courses with about the same bounding boxes can be near each other.
     boxes = np.concatenate([positions.min(axis=1), positions.max(axis=1)], axis=1)
     may_be_near = (np.abs(boxes[:, None] - boxes) <= limit).all(axis=2)
     trees: dict[int, cKDTree] = {}
@@ -169,11 +174,11 @@ def _best(
 
 
 def _near(points: FloatArray, tree: cKDTree, limit: float) -> bool:
-    """Whether no point is farther than a limit from those of a tree."""
+    """Whether every point is within a limit of the points in a tree."""
     few = tree.query(points[::SPARSE])[0].max() <= limit
     return bool(few and tree.query(points)[0].max() <= limit)
 
 
 def farthest_between(one: FloatArray, other: FloatArray) -> float:
-    """Greatest distance of a point of either set, (n, 3) and (m, 3), to the other set."""
+    """Hausdorff distance between two sets of points, (n, 3) and (m, 3)."""
     return float(max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()))

@@ -1,6 +1,7 @@
-"""The surface on which courses are sought: a copy of a mesh, refined where vertices are few.
+"""Searches a mesh for courses of a curve, on a canonical copy that is refined if it is coarse.
 
-The copy follows from the surface alone (`geometry.numbering`), so its courses do too.
+The copy depends only on the surface and not on the numbering of its vertices
+(`geometry.numbering`), so the courses do not depend on the numbering either.
 """
 
 from __future__ import annotations
@@ -27,24 +28,27 @@ from .course_search import find_courses
 from .hop_graph import CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
-"""`edges_crossed` above which no courses are sought: on needles moves pass thousands of faces."""
+"""Value of `edges_crossed` above which no courses are searched for.
+
+On meshes of needles, moving a node crosses thousands of faces.
+"""
 
 FEWEST_VERTICES = 1_000
-"""Number of vertices below which the mesh is refined."""
+"""Number of vertices below which the copy is refined."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """A relaxed course on the mesh, by its nodes.
+    """A relaxed course, given by its nodes on the mesh.
 
     Attributes
     ----------
     places : SurfacePoints
-        n nodes.
+        The n nodes as points of the mesh.
     control_nodes : (k,) int array
-        Indices of the control points among them.
+        Indices of the control points among the nodes.
     visited : (k,) int array
-        Indices of the control points in the request.
+        Indices of the control points in the request, in the order visited.
     """
 
     places: SurfacePoints
@@ -53,10 +57,10 @@ class Course:
 
 
 def edges_crossed(mesh: Mesh, component: int) -> float:
-    """Mean number of edges that a line crosses on its way over a cell of the hop graph.
+    """Mean number of edges that a straight line crosses over the width of a hop-graph cell.
 
-    By Crofton's formula this is 2 / π times the length of all edges per area, times that of the
-    line. It is 5 on a mesh of 4,000 vertices whose faces are about equilateral.
+    By Crofton's formula it is 2 / π times the length of the line times the total edge length per
+    area: about 5 on a mesh of 4,000 vertices whose faces are nearly equilateral.
     """
     inside = mesh.face_component == component
     corners = mesh.vertices[mesh.faces[inside]]
@@ -67,7 +71,7 @@ def edges_crossed(mesh: Mesh, component: int) -> float:
 
 
 class CourseSurface:
-    """Seeks courses on one mesh; what depends on the mesh alone is computed once.
+    """Searches one mesh for courses; computes once what depends only on the mesh.
 
     Parameters
     ----------
@@ -80,7 +84,7 @@ class CourseSurface:
 
     @cached_property
     def copy(self) -> Renumbered:
-        """The copy that its surface decides."""
+        """The canonical copy of the mesh, which depends only on the surface."""
         return renumbered(self._mesh)
 
     @cached_property
@@ -98,21 +102,27 @@ class CourseSurface:
         normals = self._refined.interpolation @ unsigned_normals(self.copy.mesh)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         own = curve_surface(mesh)
-        # Normals with opposite signs may cancel.
+        # Vertex normals have arbitrary signs, so interpolated ones may cancel.
         sound = length > tolerances.ROUNDED
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return replace(own, vertex_normals=normals)
 
     def courses(self, request: Request, draw: int = 0) -> Iterator[Course]:
-        """Courses for a request, the best first, each a second time with twice as many nodes.
+        """Yield courses for a request, the best first, each once more with twice as many nodes.
 
-        Where strands are close together, traces between more nodes may avoid a crossing. Draws
-        above 0 give other courses.
+        Where strands are close together, traces between more nodes may avoid a crossing.
+
+        Parameters
+        ----------
+        request : Request
+        draw : int
+            Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
+            no factors.
 
         Raises
         ------
         ControlPointError, UnreachableError
-            If via points coincide with control points, or lie on another component.
+            If via points coincide with control points or lie on another component.
         """
         there = renumbered_request(self.copy, request)
         mesh = self.copy.mesh
@@ -159,7 +169,10 @@ class CourseSurface:
         return self._graphs[component]
 
     def _with_maps(self, request: Request, face: int) -> CurveSurface:
-        """The surface with the maps of a request on the copy, for the component of a face."""
+        """The surface with the maps of a request, scaled to the component of a face.
+
+        The request is one on the copy, the face one of the refined mesh.
+        """
 
         def at_vertices(values: FloatArray | None) -> FloatArray | None:
             return None if values is None else self._refined.interpolation @ values

@@ -1,18 +1,19 @@
-"""A graph of hops between cells of a surface, in which turning costs.
+"""Builds a graph of hops between cells of a surface, in which turning has a cost, and searches it.
 
-Cells are vertices of the surface, about evenly spread. A hop joins two cells that are close to each
-other along the surface. A state is a directed hop; from hop (p, q) to hop (q, r) the cost is
+Cells are vertices of the surface, spread about evenly. A hop joins two cells that are close to each
+other along the surface. A state is a directed hop. Going on from hop (p, q) to hop (q, r) costs
 
     θ² / h + τ |qr|,
 
-with the turn θ between them in the tangent plane at q and h their mean length: the energy of
-`relaxation.elastic_energy` for a polyline. So a shortest path in the graph is a discrete elastica
-(after Ulén, Strandmark and Kahl, "Shortest paths with higher-order regularization", PAMI 2015).
-A course may turn by 120° at a cell, so paths round the tips of limbs are found too.
+where θ is the turn between the hops in the tangent plane at q, and h is their mean length. This is
+the energy of `relaxation.elastic_energy` for a polyline, so a shortest path in the graph is a
+discrete elastica (after Ulén, Strandmark and Kahl, "Shortest paths with higher-order
+regularization", PAMI 2015). A path may turn by up to 120° at a cell, so that paths around the tips
+of limbs are found too.
 
-Control points are more cells, from which paths start with any direction. A path and its reverse
-have the same cost; so paths from both ends of a leg meet in every hop, and give the best course of
-the leg by that hop.
+Control points are additional cells, from which paths start in any direction. A path and its reverse
+have the same cost. So paths from both ends of a leg meet in every hop, and together they give the
+best path of the leg through that hop.
 """
 
 from __future__ import annotations
@@ -33,28 +34,31 @@ from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 
 CELLS = 700
-"""Cells per component; more make a course finer, which relaxation does better."""
+"""Number of cells per component. More cells would refine a course, which relaxation does better."""
 
 NORMAL_WEIGHT = 1.2
-"""As `geometry.sampling.NORMAL_WEIGHT`, but larger: courses round thin limbs need cells there."""
+"""As `geometry.sampling.NORMAL_WEIGHT`, but larger: courses around thin limbs need cells there."""
 
 HOPS = 16
-"""Hops from a cell to its nearest cells, before those in the other direction are added."""
+"""Number of hops from a cell to its nearest cells, before the reverse hops are added."""
 
 REACH = 4.2
-"""Longest hop, in square roots of the area per cell."""
+"""Greatest length of a hop, in square roots of the area per cell."""
 
 SAME_SHEET = 1.6
-"""Longest distance along edges of a hop, relative to its length in space.
+"""Greatest length of a hop along edges, relative to its length in space.
 
-Beyond that the two cells lie on different sheets of the surface.
+Beyond this ratio the two cells lie on different sheets of the surface.
 """
 
 SHARPEST = 2.0 * np.pi / 3.0
-"""Greatest turn at a cell. A third of all continuations turn more; two turns cost less there."""
+"""Greatest turn at a cell, in radians.
+
+A third of all continuations turn by more; two smaller turns cost less there.
+"""
 
 EDGE_DETOUR = 1.07
-"""Mean length of the shortest path along edges, relative to the distance along the surface."""
+"""Mean length of the shortest path along edges, relative to the geodesic distance."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +68,10 @@ class Hops:
     Attributes
     ----------
     start, end : (m,) int array
-        Cells; start ascends.
+        Cells at the start and at the end of each hop.
     length : (m,) float array
     leaving, arriving : (m, 3) float array
-        Unit tangents at start and end.
+        Unit tangents at the start and at the end.
     """
 
     start: IntArray
@@ -85,12 +89,13 @@ class HopGraph:
     ----------
     surface : CurveSurface
     vertex : (n,) int array
-        The vertices at which the n cells are.
+        Vertices of the surface that are the n cells.
     spacing : float
         Square root of the area per cell.
     hops : Hops
+        The m hops, sorted by their starts.
     reverse : (m,) int array
-        The same hop in the other direction.
+        Index of the reverse of each hop.
     """
 
     surface: CurveSurface
@@ -101,7 +106,7 @@ class HopGraph:
 
     @cached_property
     def arcs(self) -> tuple[IntArray, IntArray, FloatArray]:
-        """From each hop to each continuation: `indptr`, `indices` and the bending θ² / h."""
+        """Arcs from each hop to its continuations: `indptr`, `indices` and the bending θ² / h."""
         hops = self.hops
         first = np.searchsorted(hops.start, np.arange(len(self.vertex) + 1))
         before, after = continuations(hops.end, first)
@@ -112,7 +117,7 @@ class HopGraph:
 
 
 def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
-    """The graph of a component of a surface."""
+    """Build the hop graph of one component of a surface."""
     mesh = surface.mesh
     inside = mesh.face_component == component
     areas = np.zeros(len(mesh.vertices))
@@ -120,7 +125,7 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
     vertex = np.flatnonzero(areas > 0.0)
     spacing = float(np.sqrt(areas.sum() / min(CELLS, len(vertex))))
     if len(vertex) > CELLS:
-        # Numbers of vertices follow from their places (`geometry.numbering`).
+        # The numbering depends only on the surface (`geometry.numbering`), so the sample does too.
         chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
         normals = surface.vertex_normals
         distance = PACKING * spacing
@@ -147,10 +152,10 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
 
 @dataclass(frozen=True)
 class CourseGraph:
-    """A hop graph with control points, and least costs from each of them.
+    """A hop graph with control points, and the least costs of paths from each control point.
 
-    States are the m hops of the graph, then d departures from control points, then the d arrivals
-    in the other direction. Cells are the n of the graph, then the k control points.
+    States are the m hops of the graph, then d departures from control points, then d arrivals,
+    which are the departures reversed. Cells are the n cells of the graph, then k control points.
 
     Attributes
     ----------
@@ -158,19 +163,20 @@ class CourseGraph:
     points : SurfacePoints
         k control points.
     positions, normals : (n + k, 3) float array
-        Of the cells.
+        Positions and unit normals of the cells.
     hops : Hops
-        Of all m + 2 d states.
+        The hops of all m + 2 d states.
     reverse : (m + 2 d,) int array
+        Index of the reverse of each state.
     length : (m + 2 d,) float array
-        Weighted by maps.
+        Length of the hop of each state, weighted by maps.
     tension : float
         τ.
     cost : (k, m + 2 d) float array
-        Least cost of a path from each control point that ends with each state; inf without
-        one.
+        Least cost of a path from each control point that ends with each state; infinite if there is
+        no such path.
     previous : (k, m + 2 d) int array
-        The state before on this path, -1 at its first one.
+        The state before each state on this path, -1 if it is the first.
     """
 
     graph: HopGraph
@@ -191,7 +197,7 @@ class CourseGraph:
 
     @cached_property
     def first(self) -> IntArray:
-        """The first state on the path to each state, (k, m + 2 d); itself at the beginning."""
+        """The first state on the best path to each state, (k, m + 2 d)."""
         states = np.arange(self.cost.shape[1])
         found = np.where(self.previous < 0, states, self.previous)
         while True:
@@ -219,15 +225,15 @@ def with_control_points(
     ----------
     graph : HopGraph
     points : SurfacePoints
-        k points of its component.
+        k control points on the component of the graph.
     along : (k, V + k) float array
-        `distances_along_edges` from them.
+        Distances from the control points, by `distances_along_edges`.
     legs : (l, 2) int array
-        Consecutive points.
+        Indices of the two points of each leg.
     factor : (V,) float array or None
-        Factor of lengths at the vertices.
+        Factor of lengths at the vertices; None for no factor.
     tension : float
-        τ L² for the length L of the shortest path through the points.
+        τ L², where L is the length of the shortest path through the points.
     """
     surface, n, k = graph.surface, len(graph.vertex), len(points)
     length = along[:, len(surface.mesh.vertices) :][legs[:, 0], legs[:, 1]].sum()
@@ -270,11 +276,14 @@ def _least_costs(
     tension: float,
     k: int,
 ) -> tuple[FloatArray, IntArray]:
-    """Least costs from k control points to all states, and the states before."""
+    """Least costs from k control points to all states, and the state before each on its path.
+
+    Both have the shape (k, m + 2 d).
+    """
     m, d, n = len(graph.reverse), len(departures.start), len(graph.vertex)
     indptr, after, bent = graph.arcs
     first = np.searchsorted(graph.hops.start, np.arange(n + 1))
-    first = np.concatenate([first, np.full(k, first[-1])])  # no path passes a control point
+    first = np.concatenate([first, np.full(k, first[-1])])  # no hop goes on from a control point
     before, onward = continuations(departures.end, first)
     leaving = bending(departures, before, graph.hops, onward) + tension * length[onward]
     rows = np.concatenate(
@@ -294,7 +303,7 @@ def _least_costs(
     )
     cost, previous = cost[:, : m + d], previous[:, : m + d]
     previous[(previous >= m + d) | (previous < 0)] = -1
-    # Arrivals continue hops that end at the cell before.
+    # An arrival continues the states that end at the cell where it starts.
     order = np.argsort(hops.end[: m + d], kind="stable")
     ends = np.searchsorted(hops.end[: m + d][order], np.arange(n + k + 1))
     arrival, place = continuations(departures.end, ends)
@@ -311,7 +320,7 @@ def _least_costs(
         best = best[np.isfinite(total[best])]
         arriving[number, arrival[best]] = total[best]
         came[number, arrival[best]] = state[best]
-    # A hop between two control points is the whole path from the other one too.
+    # The reverse of a direct hop between two control points is a whole path in itself.
     direct = np.flatnonzero(departures.end >= n)
     arriving[:, direct], came[:, direct] = np.inf, -1
     arriving[departures.end[direct] - n, direct] = tension * length[m + direct]
@@ -319,7 +328,16 @@ def _least_costs(
 
 
 def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Pairs of a hop, by the cell at which it ends, and each hop from there."""
+    """All pairs of a hop and an item of the cell where the hop ends, by the indices of both.
+
+    Parameters
+    ----------
+    ends : (p,) int array
+        Cell at which each hop ends.
+    first : (cells + 1,) int array
+        Index of the first item of each cell, and the number of items at the end. Items are sorted
+        by cell; they may be the hops that start there.
+    """
     count = first[ends + 1] - first[ends]
     hop = np.repeat(np.arange(len(ends)), count)
     place = np.arange(len(hop)) - np.repeat(np.cumsum(count) - count, count)
@@ -327,7 +345,7 @@ def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def turning(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
-    """θ from hops to their continuations."""
+    """Turning angle θ from hops to their continuations, in radians, 0 … π."""
     arriving, leaving = one.arriving.take(before, axis=0), other.leaving.take(after, axis=0)
     return np.arccos(dot(arriving.T, leaving.T).clip(-1.0, 1.0))
 
@@ -339,7 +357,7 @@ def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatA
 
 
 def taken(hops: Hops, which: IntArray | BoolArray) -> Hops:
-    """Some of the hops."""
+    """Some of the hops, by indices or a mask."""
     return Hops(
         hops.start[which], hops.end[which], hops.length[which], hops.leaving[which],
         hops.arriving[which],
@@ -347,7 +365,7 @@ def taken(hops: Hops, which: IntArray | BoolArray) -> Hops:
 
 
 def joined_hops(parts: list[Hops]) -> Hops:
-    """Hops one after another."""
+    """Concatenate hops."""
     return Hops(
         *(
             np.concatenate([getattr(part, name) for part in parts])
@@ -357,7 +375,7 @@ def joined_hops(parts: list[Hops]) -> Hops:
 
 
 def _nearest(distance: FloatArray, count: int) -> tuple[IntArray, IntArray]:
-    """Row and column of the least finite distances of each row, rows ascending."""
+    """Row and column of the `count` least finite distances of each row, rows ascending."""
     if distance.shape[1] > count:
         farthest = np.partition(distance, count - 1, axis=1)[:, count - 1, None]
         distance = np.where(distance <= farthest, distance, np.inf)
@@ -375,7 +393,7 @@ def _hops(
     here: tuple[FloatArray, FloatArray],
     there: tuple[FloatArray, FloatArray],
 ) -> Hops:
-    """Hops between cells with positions and normals."""
+    """Hops between cells, given the positions and normals of their starts and of their ends."""
     offset = there[0][end] - here[0][start]
     length = np.maximum(np.linalg.norm(offset, axis=1), along_edges / EDGE_DETOUR)
     return Hops(
@@ -384,7 +402,7 @@ def _hops(
 
 
 def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
-    """Unit vectors along vectors, (m, 3), in the planes with the given normals."""
+    """Unit vectors along the projections of vectors, (m, 3), onto planes with given normals."""
     flat = vectors - np.einsum("md,md->m", vectors, normals)[:, None] * normals
     return flat / np.maximum(np.linalg.norm(flat, axis=1), tolerances.TINY)[:, None]
 
@@ -395,7 +413,7 @@ def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> Float
     corners = mesh.faces[points.faces]
     size = len(mesh.vertices)
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
-    # A length of zero would not be stored as an arc.
+    # A sparse graph has no arc where the length is zero.
     away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
     edges = surface.edge_graph
     values = np.concatenate([edges.data, away.ravel()])
@@ -406,5 +424,6 @@ def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> Float
 
 
 def _at_points(surface: CurveSurface, points: SurfacePoints, values: FloatArray) -> FloatArray:
+    """Values at the vertices, (V,), interpolated at k points, (k,)."""
     corners = values[surface.mesh.faces[points.faces]]
     return np.einsum("kc,kc->k", points.barycentric, corners)

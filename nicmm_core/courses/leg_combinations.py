@@ -1,7 +1,7 @@
-"""Combinations of routes, one a leg: whole courses, the cheapest first, where crossings cost extra.
+"""Combines one route per leg into whole courses, the cheapest first; crossings add to the cost.
 
-Routes are laid over the surface as straight traces between a few nodes, and relaxed a little, so
-that routes through the same cells separate. Then all of them are tested against each other at once.
+Routes are placed on the surface as straight traces between a few nodes. They are relaxed a little,
+so that routes through the same cells separate. Then all routes are tested for crossings together.
 """
 
 from __future__ import annotations
@@ -23,36 +23,41 @@ from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, rounded
 
 NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
-"""Nodes of each route, the least number, and the sum over all legs above which they get fewer."""
+"""Number of nodes of a route, and its least value.
+
+The number is reduced where its sum over all legs would exceed the third value.
+"""
 
 NODES = 96
-"""Nodes of a course, distributed over its legs by length."""
+"""Number of nodes of a course, distributed over its legs by length."""
 
 SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
-"""Relaxation of routes before they are tested; their directions at both ends are kept."""
+"""Settings with which routes are relaxed before the test; their end directions are kept."""
 
 CROSSING = 0.1
-"""Cost of two routes that cross, relative to the sum of the best of all legs: `uncrossing` may
-separate them."""
+"""Cost of a crossing of two routes, relative to the sum of the least costs of all legs.
+
+Crossings are not forbidden, since `uncrossing` may remove them.
+"""
 
 BEAM = 3_000
-"""Incomplete combinations kept after each leg."""
+"""Number of incomplete combinations kept after each leg."""
 
 
 WORST = 1.5
-"""Cost of a combination, relative to the least, above which it is not relaxed."""
+"""Cost of a combination, relative to the cheapest, above which it is not relaxed."""
 
 
 @dataclass(frozen=True)
 class Combinations:
-    """Courses by their routes.
+    """Courses, each given by one route per leg.
 
     Attributes
     ----------
     choice : (c, l) int array
-        The route of each leg.
+        Index of the route that each course takes on each leg.
     cost : (c,) float array
-        Ascending.
+        Cost of each course, ascending.
     """
 
     choice: IntArray
@@ -60,9 +65,10 @@ class Combinations:
 
 
 def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
-    """Nodes on all routes, as one open curve each, with equally many nodes.
+    """Place nodes on all routes; each route is an open curve with the same number of nodes.
 
-    They are relaxed with few nodes, then get twice as many, between which hardly a trace fails.
+    Routes are relaxed with few nodes. Then the number of nodes is doubled, so that hardly any trace
+    between neighbours fails.
     """
     surface = graph.graph.surface
     count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // len(routes)))
@@ -70,14 +76,14 @@ def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> 
     cells = np.concatenate(paths)
     begins = np.cumsum([0, *(len(path) for path in paths)])
     steps = np.linalg.norm(np.diff(graph.positions[cells], axis=0), axis=1)
-    steps[begins[1:-1] - 1] = 0.0  # from one path to the next
+    steps[begins[1:-1] - 1] = 0.0  # the distance between two paths does not count
     arc = np.append(0.0, np.cumsum(steps))
     at = np.linspace(arc[begins[:-1]], arc[begins[1:] - 1], count, axis=1)
     hop = np.searchsorted(arc, at, side="right") - 1
     hop = hop.clip(begins[:-1, None], begins[1:, None] - 2)
     along = ((at - arc[hop]) / np.maximum(steps[hop], tolerances.TINY)).clip(0.0, 1.0).ravel()
     one, other = cells[hop.ravel()], cells[hop.ravel() + 1]
-    nearer = along <= 0.5 + tolerances.ROUNDED  # halfway is nearer to the first
+    nearer = along <= 0.5 + tolerances.ROUNDED  # halfway counts as nearer to the first
     start, end = np.where(nearer, one, other), np.where(nearer, other, one)
     places = _places_of_cells(graph)[start]
     offset = graph.positions[end] - graph.positions[start]
@@ -98,13 +104,14 @@ def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> 
 
 
 def _is_end(count: int, paths: list[IntArray]) -> BoolArray:
+    """Whether each node is the first or the last of its path."""
     ends = np.zeros((len(paths), count), dtype=bool)
     ends[:, [0, -1]] = True
     return ends.ravel()
 
 
 def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
-    """Cells as points of faces."""
+    """The cells as points on the mesh."""
     mesh, vertex = graph.graph.surface.mesh, graph.graph.vertex
     faces = mesh.vertex_faces.indices[mesh.vertex_faces.indptr[vertex]]
     barycentric = (mesh.faces[faces] == vertex[:, None]).astype(np.float64)
@@ -116,16 +123,16 @@ def crossing_routes(
 ) -> BoolArray:
     """Which pairs of routes of different legs cross, and which routes cross themselves, (r, r).
 
-    Routes that leave the same control point may touch there.
+    Routes that share a control point may touch there.
 
     Parameters
     ----------
     graph : CourseGraph
     routes : list of Routes
     nodes : Nodes
-        On all routes.
+        Nodes on all routes.
     traces : NodeTraces
-        Between these.
+        Traces between these nodes.
     """
     segments = traced_segments(graph.graph.surface.mesh, traces)
     count = len(nodes.positions) // nodes.curves
@@ -154,7 +161,7 @@ def crossing_routes(
 def combined(
     graph: CourseGraph, routes: list[Routes], crosses: BoolArray, closed: bool
 ) -> Combinations:
-    """The cheapest combinations of routes, by beam search leg by leg."""
+    """Find the cheapest combinations of routes by beam search, leg by leg."""
     count = len(routes)
     offset = np.cumsum([0] + [len(leg.cells) for leg in routes])
     price = CROSSING * sum(leg.cost.min() for leg in routes)
@@ -185,7 +192,7 @@ def combined(
 
 
 def _least(values: FloatArray, most: int) -> IntArray:
-    """Indices of the least values, ascending."""
+    """Indices of the `most` smallest values, by ascending value."""
     among = np.arange(len(values))
     if len(values) > most:
         among = np.flatnonzero(values <= np.partition(values, most - 1)[most - 1])
@@ -193,7 +200,7 @@ def _least(values: FloatArray, most: int) -> IntArray:
 
 
 def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
-    """The cheapest combinations of which no two run beside each other on all legs, (d, l)."""
+    """The cheapest combinations, no two of which run beside each other on all legs, (d, l)."""
     choice = combinations.choice
     left = combinations.cost <= WORST * combinations.cost.min(initial=np.inf)
     chosen: list[int] = []
@@ -215,18 +222,26 @@ def course_nodes(
     choice: IntArray,
     closed: bool,
 ) -> tuple[Nodes, BoolArray]:
-    """Nodes on courses, and which of them are control points.
+    """Place nodes on whole courses.
 
     Parameters
     ----------
     graph : CourseGraph
     routes : list of Routes
     nodes : Nodes
-        On all routes.
+        Nodes on all routes.
     traces : NodeTraces
-        Between these.
+        Traces between these nodes.
     choice : (c, l) int array
+        Index of the route that each course takes on each leg.
     closed : bool
+
+    Returns
+    -------
+    Nodes
+        c curves.
+    (n,) bool array
+        Which of their nodes are ends of legs.
     """
     surface = graph.graph.surface
     size = len(nodes.positions) // nodes.curves

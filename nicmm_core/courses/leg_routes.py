@@ -1,7 +1,8 @@
-"""Routes of one leg: good paths between two control points that differ from each other.
+"""Finds routes of each leg: good paths between its two control points that differ from each other.
 
-Paths from both ends meet in every state of the graph. So every state gives the best path by it, and
-these paths differ in their route and in their directions at both ends.
+Shortest paths from both ends of a leg meet in every state of the hop graph. So every state gives
+the best path through it, and these paths differ in their course and in their directions at both
+ends.
 """
 
 from __future__ import annotations
@@ -18,29 +19,29 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from .hop_graph import CourseGraph
 
 DIRECTIONS = 64
-"""Pairs of directions at both ends of a leg that are compared with those of other legs."""
+"""Number of pairs of end directions of a leg that are compared with those of the other legs."""
 
 ALIGNED = 16
-"""Routes of a leg that fit those of its neighbours best."""
+"""Number of routes of a leg that fit the directions of the other legs best."""
 
 DIFFERENT = 8
-"""Further routes of a leg, each along another way."""
+"""Number of further routes of a leg, which run elsewhere."""
 
 ALL_DIRECTIONS, ALL_ROUTES = 320, 120
-"""Caps on the sums of these over all legs, except that every leg has a few."""
+"""Caps on the totals of direction pairs and routes over all legs; every leg gets a few anyway."""
 
 WORST = 8.0
-"""Greatest cost of a route relative to the best of its leg."""
+"""Greatest cost of a further route, relative to the cheapest route of its leg."""
 
 VIA_CELLS = 120
-"""Most cells by which other ways are tried."""
+"""Greatest number of cells through which further routes are tried."""
 
 BESIDE = 1.5
-"""Distance, in median lengths of hops, within which two routes count as the same."""
+"""Distance, in median hop lengths, within which two routes count as the same."""
 
 NORMAL_WEIGHT = 0.8
-"""Weight of the difference of two unit normals in that distance: routes on both sides of a thin
-part differ."""
+"""Weight of the difference of two unit normals in that distance, so that routes on opposite sides
+of a thin part differ."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,13 @@ class Routes:
     Attributes
     ----------
     start, end : int
-        Control points.
+        Indices of the control points at both ends.
     cells : list of (c,) int arrays
-        Cells of each of r routes, with both control points.
+        Cells of each of the r routes, including both control points.
     first, last : (r,) int array
-        The states at both ends of each.
+        First and last state of each route.
     cost : (r,) float array
+        Cost of each route.
     alike : (r, r) bool array
         Pairs of routes that run beside each other.
     """
@@ -71,27 +73,27 @@ class Routes:
 
 @dataclass(frozen=True)
 class _ByState:
-    """The best legs through states."""
+    """The best leg through each of some states."""
 
     state: IntArray
     cost: FloatArray
-    first: IntArray  # states at both ends
+    first: IntArray  # first and last state of each leg
     last: IntArray
 
 
 @dataclass(frozen=True)
 class _Paths:
-    """Paths one after another, each as the states on it."""
+    """The states of several paths, concatenated."""
 
     states: IntArray
-    begins: IntArray  # (p + 1,)
+    begins: IntArray  # (p + 1,) where each path begins, and the end
 
 
 def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Routes]:
-    """Routes for legs, (l, 2), which follow each other.
+    """Find routes of consecutive legs, (l, 2).
 
-    Some are chosen because their directions fit those of the other legs, some because they run
-    elsewhere. There are no routes at all if one leg has none.
+    Some routes are chosen because their directions fit those of the other legs, some because they
+    run elsewhere. The result is empty if any leg has no route.
     """
     beside = _cells_beside(graph)
     share = max(1, len(legs))
@@ -128,9 +130,9 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
         passed = _passed_cells(graph, paths)
         alike = _alike(beside, passed)
         first, last = paths.states[paths.begins[:-1]], paths.states[paths.begins[1:] - 1]
-        # A path that passes each cell once has as many of them as states, and its start.
+        # A path that passes no cell twice passes one cell more than it has states.
         simple = passed.sum(axis=1) == 1 + np.diff(paths.begins)
-        # A hop between two control points is a departure and an arrival too.
+        # A direct hop between the control points is both the first and the last state.
         ends = np.stack([graph.hops.end[first], graph.hops.start[last]], axis=1)
         chosen = _different(simple, ends, alike, len(best), n_aligned, n_different)
         passes = [
@@ -150,7 +152,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
 
 
 def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> FloatArray:
-    """Bending at a control point, (a, b), between a states that end and b that start there."""
+    """Bending at a control point, (a, b), where `a` states end and `b` states start."""
     hops = graph.hops
     cosine = hops.arriving[arriving] @ hops.leaving[leaving].T
     step = 0.5 * (hops.length[arriving][:, None] + hops.length[leaving])
@@ -158,21 +160,25 @@ def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> 
 
 
 def rounded(cost: FloatArray) -> FloatArray:
-    """Costs without rounding errors: the best leg by each of its own states costs the same."""
+    """Costs without rounding errors, so that equal costs compare as equal.
+
+    The best legs through two states may be the same leg; both costs then differ only by rounding.
+    """
     unit = tolerances.SAME_COST * float(cost[np.isfinite(cost)].min(initial=np.inf))
     return np.round(cost / unit) * unit if 0.0 < unit < np.inf else cost
 
 
 def _least_of_each(key: IntArray, ascending: IntArray, cost: FloatArray) -> IntArray:
-    """The first state of each key by ascending cost; states and their keys ascend by cost."""
+    """The cheapest state of each key; `ascending`, `key` and the result are in order of cost."""
     least = ascending[np.unique(key, return_index=True)[1]]
     return least[np.argsort(cost[least], kind="stable")]
 
 
 def _least_totals(graph: CourseGraph, legs: list[_ByState], closed: bool) -> list[FloatArray]:
-    """For each leg, the least cost of a whole curve with each of its choices.
+    """For each leg, the least cost of a whole curve through each of its choices.
 
-    Viterbi's algorithm forward and backward; on a closed curve, for every choice of the first leg.
+    Viterbi's algorithm runs forward and backward; on a closed curve, it does so for every choice of
+    the first leg.
     """
     count = len(legs)
     joints = [
@@ -194,17 +200,17 @@ def _least_totals(graph: CourseGraph, legs: list[_ByState], closed: bool) -> lis
 
 
 def _paths(graph: CourseGraph, start: int, end: int, states: IntArray) -> _Paths:
-    """The best leg through each state."""
+    """The best leg through each state, as a path of states."""
     before = _states_before(graph, start, states)
     after = _states_before(graph, end, graph.reverse[states])[-2::-1]
-    # Paths from the end pass states in the other direction.
+    # Paths from the end of the leg pass the states in reverse.
     whole = np.concatenate([before, np.where(after < 0, -1, graph.reverse[after])]).T
     passed = whole >= 0
     return _Paths(whole[passed], np.append(0, np.cumsum(passed.sum(axis=1))))
 
 
 def _passed_cells(graph: CourseGraph, paths: _Paths) -> NDArray[np.float32]:
-    """1 at the cells that each path passes, (p, n + k)."""
+    """Incidence matrix, (p, n + k): 1 where a path passes a cell, 0 elsewhere."""
     count = np.diff(paths.begins)
     passed = np.zeros((len(count), len(graph.positions)), dtype=np.float32)
     path = np.arange(len(count)).repeat(count)
@@ -214,7 +220,7 @@ def _passed_cells(graph: CourseGraph, paths: _Paths) -> NDArray[np.float32]:
 
 
 def _states_before(graph: CourseGraph, control: int, states: IntArray) -> IntArray:
-    """States on the paths from a control point to some states, (most, s), after -1 at first."""
+    """States on the best paths from a control point to s states, (most, s), after padding by -1."""
     previous = graph.previous[control]
     rows = [states]
     while True:
@@ -225,7 +231,7 @@ def _states_before(graph: CourseGraph, control: int, states: IntArray) -> IntArr
 
 
 def _cells_beside(graph: CourseGraph) -> sparse.csr_array:
-    """Which cells are beside each other, (n + k, n + k)."""
+    """Which cells lie beside each other, (n + k, n + k)."""
     scale = max(float(np.median(graph.hops.length)), tolerances.TINY)
     places = np.concatenate([graph.positions / scale, NORMAL_WEIGHT * graph.normals], axis=1)
     pairs = cKDTree(places).query_pairs(BESIDE, output_type="ndarray")
@@ -236,7 +242,7 @@ def _cells_beside(graph: CourseGraph) -> sparse.csr_array:
 
 
 def _alike(beside: sparse.csr_array, passed: NDArray[np.float32]) -> BoolArray:
-    """Pairs of paths, by the cells they pass, of which each runs beside the other."""
+    """Pairs of paths that run beside each other, (p, p), from the cells that they pass."""
     away = (beside @ passed.T == 0.0).astype(np.float32)
     inside = passed @ away == 0.0
     return inside & inside.T
@@ -250,9 +256,10 @@ def _different(
     n_aligned: int,
     n_different: int,
 ) -> list[int]:
-    """Indices of paths that differ: of the first ones in their cells next to the ends too.
+    """Indices of paths that differ from each other: aligned paths, then further paths.
 
-    These are `ends`, (p, 2).
+    Among the first `n_first` paths, two also differ if one of the cells next to their control
+    points, `ends` (p, 2), differs.
     """
     same = alike & (ends[:, None] == ends).all(axis=2)
     aligned = _apart(same, np.flatnonzero(simple[:n_first]), [], n_aligned)
@@ -261,7 +268,7 @@ def _different(
 
 
 def _apart(alike: BoolArray, order: IntArray, chosen: list[int], most: int) -> list[int]:
-    """The chosen ones and the next in an order that are like none of them, up to a number."""
+    """The chosen paths, extended in order by paths unlike all chosen so far, up to `most` paths."""
     chosen = chosen.copy()
     left = ~alike[chosen].any(axis=0)
     for number in order.tolist():

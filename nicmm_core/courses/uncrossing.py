@@ -1,9 +1,10 @@
-"""Remove crossings of a curve with itself by joining its nodes in another order.
+"""Removes self-crossings of a curve by joining its nodes in another order.
 
-Between two crossings of the same strands, without a control point there, the strands exchange their
-parts. A loop with at most one control point is passed in the other direction. Both keep all nodes
-and the order of the control points. Where any order is allowed, every other loop is passed in the
-other direction too ("2-opt": Croes, "A method for solving traveling-salesman problems", 1958).
+Where two strands cross twice, without a control point between the crossings, they exchange the
+parts between them. A loop with at most one control point is traversed in the other direction. Both
+moves keep all nodes and the order of the control points. If the control points may be visited in
+any order, every other loop is reversed as well ("2-opt": Croes, "A method for solving
+traveling-salesman problems", 1958).
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.node_traces import crossing_steps
 
 ROUNDS = 4
-"""Times that crossings are sought: steps between nodes in a new order may cross others."""
+"""Rounds in which crossings are removed; steps between nodes in a new order may cross again."""
 
 MOST_CROSSINGS = 200
-"""Crossings of one curve above which it is left as it is."""
+"""Number of crossings of a curve above which the curve is left unchanged."""
 
 
 def uncrossed(
     surface: CurveSurface, nodes: Nodes, visit: IntArray, any_order: bool
 ) -> tuple[Nodes, IntArray, BoolArray]:
-    """Curves without the crossings that another order of their nodes removes.
+    """Remove crossings of curves by joining their nodes in another order.
 
     Parameters
     ----------
@@ -34,17 +35,18 @@ def uncrossed(
     nodes : Nodes
         Curves that begin at a control point.
     visit : (n,) int array
-        The number of the control point at each node, -1 at the others.
+        Index of the control point at each node, -1 where there is none.
     any_order : bool
         Whether control points may be visited in another order.
 
     Returns
     -------
     Nodes
+        The nodes in their new order.
     (n,) int array
-        The control points at these.
+        Index of the control point at each of these nodes, -1 where there is none.
     (c,) bool array
-        Which curves do not cross themselves, where traces succeed.
+        Which curves do not cross themselves. Steps whose trace fails are not tested.
     """
     size = len(nodes.positions) // nodes.curves
     order = np.arange(len(nodes.positions)).reshape(nodes.curves, size)
@@ -76,14 +78,14 @@ def uncrossed(
 
 
 def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: bool) -> IntArray:
-    """The sequence of the nodes of one curve after crossings are removed, (n,).
+    """The order of the nodes of one curve after its crossings have been removed, (n,).
 
     Parameters
     ----------
     crossings : (p, 2) int array
-        Nodes whose steps to the next ones cross.
+        Pairs of nodes whose steps to the next nodes cross.
     control : (n,) bool array
-        Which nodes are control points; the first one is.
+        Which nodes are control points; the first node always is.
     closed : bool
     any_order : bool
     """
@@ -110,31 +112,34 @@ def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: 
 
 @dataclass(frozen=True)
 class _Move:
-    """Parts of a sequence, (first, end), backward if they descend, and the crossings removed."""
+    """A new order of a sequence, and the crossings that it removes.
+
+    The order is given by parts of the sequence, (first, end), reversed where first > end.
+    """
 
     parts: list[tuple[int, int]]
     removed: list[int]
 
 
 def _step(place: IntArray, node: int) -> int:
-    """The place of the step from a node to the next one of the original sequence."""
+    """The position of the step between a node and its successor in the original sequence."""
     low, high = sorted((int(place[node]), int(place[(node + 1) % len(place)])))
     return high if high - low > 1 else low  # from the last node to the first
 
 
 def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
-    """Exchange two strands between two of their crossings, the shortest first.
+    """Exchange the shortest pair of strands between two of their crossings.
 
     Parameters
     ----------
     steps : list of [int, int]
-        Places of the steps that cross, ascending.
+        Positions of the two steps of each crossing, ascending.
     before : (n + 1,) int array
-        Number of control points before each place.
+        Number of control points before each position.
     """
     places = np.array(steps)  # (p, 2)
-    begin, first_end = places[:, :1], places[:, 1:]  # (p, 1), of one crossing
-    end, second_end = places[:, 0], places[:, 1]  # (p,), of another
+    begin, first_end = places[:, :1], places[:, 1:]  # (p, 1), of the first crossing
+    end, second_end = places[:, 0], places[:, 1]  # (p,), of the second crossing
     low, high = np.minimum(first_end, second_end), np.maximum(first_end, second_end)  # (p, p)
     free = (before[end + 1] == before[begin + 1]) & (before[high + 1] == before[low + 1])
     possible = free & (begin < end) & (end < low) & (low < high)
@@ -155,7 +160,7 @@ def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
 def _reversal(
     steps: list[list[int]], before: IntArray, closed: bool, any_order: bool
 ) -> _Move | None:
-    """Pass a loop in the other direction: one with few control points, the shortest first."""
+    """Reverse the shortest loop, preferably one with at most one control point."""
     n = len(before) - 1
     best, least = None, (True, n)
     for number, (begin, end) in enumerate(steps):
@@ -172,5 +177,5 @@ def _reversal(
 
 
 def _in_order(surface: CurveSurface, nodes: Nodes, order: IntArray) -> Nodes:
-    """Curves through the nodes in the order given, (c, n)."""
+    """The curves through their nodes in a given order, (c, n)."""
     return nodes_at(surface, nodes.places[order.ravel()], nodes.closed, len(order))

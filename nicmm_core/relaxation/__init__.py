@@ -1,4 +1,4 @@
-"""Relaxation of the curve itself on the input mesh.
+"""Relaxes the curve itself on the input mesh until its energy converges.
 
-`relaxing` is the entry point; `warm_start` starts from a curve that was relaxed before.
+`relaxing` is the entry point; `warm_start` starts from a curve that has been relaxed before.
 """

@@ -1,4 +1,4 @@
-"""The level set of a curve: the distance to it, signed if the curve bounds a region.
+"""Computes the level set of a final curve: the distance to it, signed if it bounds a region.
 
 The two ends of an edge lie on different sides if the curve crosses the edge an odd number of times,
 and on the same side otherwise. If these conditions contradict each other, the curve bounds no

@@ -1,4 +1,4 @@
-"""Nodes of a curve on a surface, with the normals and conormals there."""
+"""Represents curves on a surface by nodes, with the normals, conormals and φ_fea there."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from ..maps.guidance import feature_map
 FEATURE_TENSION = 600.0
 """τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
 
-It sets the smallest radius with which the curve bends to follow a map: about 1/√600, 4 % of that
-length. With the level set's ratio, 30, the curve would be too stiff for typical painted maps.
+It determines the smallest radius to which the curve bends to follow a map: about 1/√600, 4 % of
+that unit. With 30, the ratio of the level set, the curve would be too stiff for typical painted
+maps.
 """
 
 
@@ -34,14 +35,14 @@ class CurveSurface:
     ----------
     mesh : Mesh
     vertex_normals : (V, 3) float array
-        Unit vectors. Their signs do not matter: each face turns them to its own side.
+        Unit vectors. Their signs are arbitrary: at each face they are turned to its side.
     feature_map : (V,) float array or None
         φ_fea.
     feature_weight : float
         λ_fea / λ_smooth, in 1/length², where there is a feature map.
     folded : (F,) bool array or None
-        Faces that are folded back over others: they point against the normals of their corners.
-        None if no face is folded.
+        Which faces are folded back over others, so that they point against the normals of their
+        corners. None if no face is folded.
     """
 
     mesh: Mesh
@@ -52,7 +53,7 @@ class CurveSurface:
 
     @cached_property
     def edge_graph(self) -> sparse.csr_array:
-        """Lengths of the edges of the mesh, each stored once."""
+        """Sparse matrix of edge lengths, (V, V); each edge is stored once."""
         mesh = self.mesh
         length = edge_lengths(mesh.vertices, mesh.edges)
         size = len(mesh.vertices)
@@ -60,7 +61,7 @@ class CurveSurface:
 
 
 def curve_surface(mesh: Mesh) -> CurveSurface:
-    """The surface of a mesh, without a feature map."""
+    """Prepare a mesh as the surface of curves, without a feature map."""
     normals, folded = normals_and_folds(mesh)
     return CurveSurface(mesh, normals, folded=folded)
 
@@ -68,9 +69,9 @@ def curve_surface(mesh: Mesh) -> CurveSurface:
 def with_maps(
     surface: CurveSurface, obstacles: FloatArray | None, alignment: FloatArray | None, unit: float
 ) -> CurveSurface:
-    """The surface with φ_fea of obstacles and alignment, (V,) each.
+    """The surface with φ_fea computed from weights of obstacles and alignment, (V,) each.
 
-    The unit is the square root of the area of the surface.
+    The unit of lengths, `unit`, is the square root of the area of the component.
     """
     if obstacles is None and alignment is None:
         return surface
@@ -80,21 +81,21 @@ def with_maps(
 
 @dataclass(frozen=True)
 class Nodes:
-    """Nodes of a curve on a surface, or of several curves, which cost hardly more than one.
+    """Nodes of one or more curves on a surface; several curves cost hardly more than one.
 
     Attributes
     ----------
     places : SurfacePoints
-        n points.
+        The n nodes as points of the mesh.
     closed : bool
-        Whether the last node of a curve joins the first.
+        Whether the last node of each curve is joined to its first.
     positions : (n, 3) float array
     normals : (n, 3) float array
-        Unit vectors.
+        Unit normals of the surface at the nodes.
     phi_fea : (n,) float array
-        φ_fea.
+        φ_fea at the nodes.
     curves : int
-        Number c of curves, each with n / c nodes in a row.
+        Number c of curves, each with n / c consecutive nodes.
     """
 
     places: SurfacePoints
@@ -106,7 +107,7 @@ class Nodes:
 
     @cached_property
     def steps(self) -> FloatArray:
-        """Vectors from each node to the next, zero at the last of an open curve, (n, 3)."""
+        """Vectors from each node to the next, (n, 3); zero at the last node of an open curve."""
         steps = self.after_each(self.positions.T) - self.positions.T
         if not self.closed:
             steps[:, self.last] = 0.0
@@ -114,58 +115,58 @@ class Nodes:
 
     @cached_property
     def step_lengths(self) -> FloatArray:
-        """Distance from each node to the next, zero at the last of an open curve, (n,)."""
+        """Distances from each node to the next, (n,); zero at the last node of an open curve."""
         return lengths(self.steps.T)
 
     @cached_property
     def lengths(self) -> FloatArray:
-        """Lengths of the steps of one curve; (n,), or (n - 1,) of an open curve."""
+        """Lengths of the steps of a single curve: (n,) if it is closed, (n - 1,) if it is open."""
         return self.step_lengths if self.closed else self.step_lengths[:-1]
 
     @cached_property
     def ds(self) -> FloatArray:
-        """Half the length of both steps at each node, (n,)."""
+        """Arc length that belongs to each node, half the sum of its two steps, (n,)."""
         lengths = self.step_lengths
         return np.maximum(0.5 * (lengths + self.before_each(lengths)), tolerances.TINY)
 
     def by_curve(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values at nodes, (n,), by curve, (c, n / c)."""
+        """Values at nodes, (n,), as one row per curve, (c, n / c)."""
         return values.reshape(self.curves, -1)
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of the curves, (c,), at their nodes, (n,)."""
+        """Values of the curves, (c,), repeated for their nodes, (n,)."""
         return values.repeat(len(self.positions) // self.curves)
 
     @cached_property
     def first(self) -> IntArray:
-        """The first node of each curve, (c,)."""
+        """Index of the first node of each curve, (c,)."""
         return np.arange(0, len(self.positions), len(self.positions) // self.curves)
 
     @cached_property
     def last(self) -> IntArray:
-        """The last node of each curve, (c,)."""
+        """Index of the last node of each curve, (c,)."""
         return self.first + len(self.positions) // self.curves - 1
 
     @property
     def following(self) -> IntArray:
-        """The index of the next node of each, (n,); the first of the curve after its last."""
+        """Index of the node after each node, (n,); the last node is followed by the first."""
         return self.after_each(np.arange(len(self.positions)))
 
     @property
     def with_step(self) -> IntArray:
-        """Nodes with a step to the next one: all but the last of open curves."""
+        """Indices of the nodes with a step to the next node: all but the last of open curves."""
         every = np.arange(len(self.positions))
         return every if self.closed else np.delete(every, self.last)
 
     def after_each(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values at the next node of the curve, (…, n)."""
+        """Values at nodes, (…, n), shifted so that each node has the value of the next node."""
         result = np.empty(values.shape, values.dtype)
         result[..., :-1] = values[..., 1:]
         result[..., self.last] = values[..., self.first]
         return result
 
     def before_each(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values at the previous node of the curve, (…, n)."""
+        """Values at nodes, (…, n), shifted so that each node has the value of the previous node."""
         result = np.empty(values.shape, values.dtype)
         result[..., 1:] = values[..., :-1]
         result[..., self.first] = values[..., self.last]
@@ -173,13 +174,13 @@ class Nodes:
 
     @cached_property
     def conormals(self) -> FloatArray:
-        """Unit vectors normal to the curve in the tangent planes, shape (n, 3)."""
+        """Unit vectors in the tangent planes, normal to the curve, shape (n, 3)."""
         along = self.steps.T / np.maximum(self.step_lengths, tolerances.TINY)
         return unit(cross(self.normals.T, along + self.before_each(along))).T
 
     @cached_property
     def turns(self) -> Turns:
-        """How the curves turn at the nodes."""
+        """Turning of the curves at the nodes."""
         after, normal = self.steps.T, self.normals.T
         before = self.before_each(after)
         out_before, out_after = dot(before, normal), dot(after, normal)
@@ -191,14 +192,14 @@ class Nodes:
         return Turns(before, out_before, out_after, product, sine, cosine, angle)
 
     def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of normals, (n, 3), and φ_fea, (n,), by moves along conormals."""
+        """Derivatives of the normals, (n, 3), and of φ_fea, (n,), by moves along conormals."""
         mesh, faces, conormals = surface.mesh, self.places.faces, self.conormals.T
         a, b, c = corners_of(mesh, faces)
         one, other = b - a, c - a
         # Barycentric coordinates of the move: least squares in the plane of the face.
         p, q, r = dot(one, one), dot(one, other), dot(other, other)
         f, g = dot(one, conormals), dot(other, conormals)
-        # At least its rounding error, where two long sides are almost parallel.
+        # Not below its rounding error, where two long sides are almost parallel.
         determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
         determinant = np.maximum(determinant, tolerances.TINY)
         u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
@@ -214,20 +215,20 @@ class Nodes:
 
 
 class Turns(NamedTuple):
-    """How curves turn at their n nodes.
+    """Turning of curves at their n nodes.
 
     Attributes
     ----------
     before : (3, n) float array
-        The steps to the nodes.
+        The step to each node.
     out_before, out_after : (n,) float array
-        Components of the steps before and after along the normals.
+        Components along the normal of the steps before and after each node.
     product : (3, n) float array
         Cross product of both steps.
     sine, cosine : (n,) float array
-        Of the angle, times the lengths of both steps in the tangent plane.
+        Sine and cosine of the angle, times the lengths of both steps in the tangent plane.
     angle : (n,) float array
-        In the tangent plane; zero at the ends of open curves.
+        Turning angle in the tangent plane, in radians; zero at the ends of open curves.
     """
 
     before: FloatArray
@@ -240,7 +241,7 @@ class Turns(NamedTuple):
 
 
 def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
-    """Nodes with the normals and φ_fea that the energy needs."""
+    """Create nodes at given places, with the normals and φ_fea that the energy needs."""
     weight = places.barycentric.T
     normals = unit(interpolated(_corner_normals(surface, places.faces), weight)).T
     phi_fea = np.ones(len(places))

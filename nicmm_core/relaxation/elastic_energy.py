@@ -1,19 +1,23 @@
-"""The energy of a curve: Eq. 6 and 7 where φ is exactly the distance to its zero set.
+"""Computes the energy of a curve, its Gauss–Newton system, and damped steps of its nodes.
 
-There |∇φ| = 1, the level-set term vanishes and the integrals reduce to the curve:
+The energy is that of Eq. 6 and 7 for a φ that is exactly the distance to its zero set. Then
+|∇φ| = 1, the level-set term vanishes, and the integrals reduce to integrals along the curve:
 
     E = ∮ κ_g² ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds.
 
-Without the length term, ever larger arcs would join distant points. τ = (2π / L)², with which a
-circle in the plane neither grows nor shrinks, so the balance does not depend on scale. Outside all
-maps φ_fea = 1, and maps have no effect. τ_fea scales with the surface, but is at least a few times
-τ, which matters for short curves. In an obstacle φ_fea > 1, which adds to the tension. In a lane
-φ_fea < 1. The energy must not reward length there, or the curve would buckle in the lane to gain
-length; so ds is held constant, and only the position counts. Where strands must not cross, a
-contact term keeps them apart (`strand_contact`).
+Without the length term, distant points would be joined by ever larger arcs. With τ = (2π / L)² a
+circle in the plane neither grows nor shrinks, so the balance does not depend on scale.
 
-The unknowns are moves of nodes along their conormals. Residuals of a node depend on it and its two
-neighbours only, so the Gauss–Newton matrix has two bands on each side and a step is cheap.
+Outside all maps φ_fea = 1, so maps have no effect there. τ_fea scales with the surface but is at
+least a few times τ, which matters for short curves. In an obstacle φ_fea > 1, which adds to the
+tension. In a lane, a region painted for alignment, φ_fea < 1. The energy must not reward length
+there, or the curve would buckle in the lane to gain length. So ds is held constant in this term,
+and only the position of the curve counts. Where strands must not cross, a contact term keeps them
+apart (`strand_contact`).
+
+The unknowns are the moves of the nodes along their conormals. The residuals of a node depend only
+on the node and its two neighbours, so the Gauss–Newton matrix has two bands on each side and a step
+is cheap.
 """
 
 from __future__ import annotations
@@ -35,31 +39,31 @@ from .strand_contact import Contacts, contacts_between
 OVER_TENSION = 4.0
 """Multiple of τ added to τ_fea, so that short curves follow a map too.
 
-τ grows as the curve gets shorter, whatever the surface: below about √area / 4, tension alone would
-exceed the pull of a map. With this term a map may bend any curve to half the radius of a circle of
-its length; long curves hardly change.
+τ grows as the curve gets shorter, independently of the surface. For curves shorter than about
+√area / 4, tension alone would exceed the pull of a map. With this term a map may bend any curve to
+half the radius of a circle of the same length; long curves hardly change.
 """
 
 CONTACT = 10.0
-"""Energy of a curve whose strands all touch, relative to that of the same curve without contact."""
+"""Contact energy of a curve whose strands touch everywhere, relative to its other energy."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Weights of the terms, which change from step to step but not within one.
+    """Weights of the energy terms, which change from step to step but not within a step.
 
-    One number, or one at each node, (n,), of several curves.
+    For a single curve each weight is a number; for several curves it has a value at each node.
 
     Attributes
     ----------
     tension : float or (n,) float array
         τ, in 1/length².
     contact : float or (n,) float array
-        Weight of a node's contact, in 1/length; 0 where strands may cross.
+        Weight of the contacts of a node, in 1/length; 0 where strands may cross.
     feature : float or (n,) float array
         τ_fea, in 1/length²; 0 without a map.
     held : (n,) float array or None
-        ds at each node, constant in the terms of lanes; None without a map.
+        ds at each node, held constant in the term of lanes; None without a map.
     """
 
     tension: float | FloatArray
@@ -71,18 +75,18 @@ class Balance:
 def balance(
     surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, tension_factor: float = 1.0
 ) -> Balance:
-    """The weights for a curve.
+    """Compute the weights of the energy terms for one or more curves.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
     smoothness : float
-        Divides the tension and the weight of a map.
+        Divisor of the tension and of the weight of a map.
     apart : bool
         Whether strands are kept apart.
     tension_factor : float
-        Factor of the tension alone.
+        Additional factor of the tension only.
     """
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     tension = _weight(nodes, (2.0 * np.pi / lengths) ** 2 / smoothness)
@@ -98,7 +102,7 @@ def balance(
 
 
 def _weight(nodes: Nodes, values: FloatArray) -> float | FloatArray:
-    """Values of the curves, (c,), as a weight."""
+    """Values of the curves, (c,), as a weight: a number for one curve, else values at nodes."""
     return float(values[0]) if nodes.curves == 1 else nodes.spread(values)
 
 
@@ -118,21 +122,30 @@ def feature_energy(nodes: Nodes) -> float:
 
 
 def elastic_energy(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> float:
-    """E of one curve, with the contact term if it has a weight."""
+    """E of one curve, with the contact term if its weight is not zero."""
     return float(curve_energies(nodes, weights, contacts)[0])
 
 
 def comparable_energies(
     surface: CurveSurface, nodes: Nodes, smoothness: float, scale: float
 ) -> FloatArray:
-    """E with one length scale L₀ for all curves, (c,), so that different courses can be compared.
+    """E of all curves, (c,), with one length scale L₀, so that different courses can be compared.
 
         E = L₀ ∮ κ_g² ds + 4π² L / (s L₀) + L₀ τ_fea (∮ max(φ_fea² - 1, 0) ds + L₀ a),
 
-    with the smoothness s and the mean a of min(φ_fea² - 1, 0) along the curve. For a circle in the
-    plane of length L₀ both first terms are 4π². With a length scale of its own for each curve, a
-    long way round would cost nothing; with the length of the curve before a, turning back and forth
-    in a lane would pay.
+    where s is the smoothness and a the mean of min(φ_fea² - 1, 0) along the curve. For a plane
+    circle of length L₀ and s = 1, the first two terms are 4π² each. With a separate length scale
+    for each curve, a long detour would cost nothing. With the length of the curve as the factor of
+    a, turning back and forth in a lane would lower the energy.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+        Nodes of c curves.
+    smoothness : float
+    scale : float
+        L₀, in mesh units.
     """
     length = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     tension = (2.0 * np.pi / scale) ** 2 / smoothness
@@ -147,9 +160,9 @@ def comparable_energies(
 
 
 def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> FloatArray:
-    """E of each curve, (c,), with the contact term if it has a weight.
+    """E of each curve, (c,), with the contact term if its weight is not zero.
 
-    Contacts may be given where they are known.
+    Contacts are computed unless they are given.
     """
     at_nodes = _bending(nodes) + _tension(nodes, weights) * nodes.ds
     if weights.held is not None:
@@ -162,13 +175,13 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
 
 
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
-    """Tension at each node, (n,): τ, and more in an obstacle."""
+    """Tension at each node, (n,): τ, plus τ_fea times the excess φ_fea² - 1 in an obstacle."""
     excess = np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
     return weights.tension + weights.feature * excess
 
 
 def _bending(nodes: Nodes) -> FloatArray:
-    """κ_g² ds at each node, (n,); an open curve does not bend at its ends."""
+    """κ_g² ds at each node, (n,); zero at the ends of open curves."""
     return nodes.turns.angle**2 / nodes.ds
 
 
@@ -182,23 +195,23 @@ def _no_entries() -> FloatArray:
 
 @dataclass(frozen=True)
 class ElasticSystem:
-    """The Gauss–Newton matrix and the slope: half the derivatives of the energy.
+    """Half the derivatives of the energy by moves of the nodes along their conormals.
 
-    By moves of the nodes along their conormals.
+    The first derivatives are the slope; the Gauss–Newton matrix approximates the second ones.
 
     Attributes
     ----------
     bands : (3, n) float array
-        The matrix without contact, symmetric with two cyclic bands to each side: entries (i, i),
-        (i, i + 1) and (i, i + 2) in column i, indices modulo n.
+        The matrix without contact: symmetric, with two cyclic bands on each side. Column i has the
+        entries (i, i), (i, i + 1) and (i, i + 2), with indices modulo n.
     slope : (n,) float array
-        By the move of each node.
+        Half the derivative of the energy by the move of each node.
     pairs : (p, 2) int array
-        Nodes in contact.
+        Pairs (i, j) of nodes in contact.
     pair_entries : (3, p) float array
-        What contact adds to entries (i, i), (i, j) and (j, j) of the matrix.
+        Contributions of contact to the entries (i, i), (i, j) and (j, j) of the matrix.
     curves : int
-        Number c of curves; the cyclic indices are modulo n / c within each.
+        Number c of curves; within each of them, indices are modulo n / c.
     """
 
     bands: FloatArray
@@ -209,7 +222,7 @@ class ElasticSystem:
 
     @property
     def diagonal(self) -> FloatArray:
-        """Of the whole matrix, shape (n,)."""
+        """Diagonal of the matrix with contact, shape (n,)."""
         if not len(self.pairs):
             return self.bands[0]
         added = self.pair_entries[[0, 2]].ravel()
@@ -219,9 +232,9 @@ class ElasticSystem:
 def elastic_system(
     surface: CurveSurface, nodes: Nodes, weights: Balance, contacts: Contacts | None = None
 ) -> ElasticSystem:
-    """The Gauss–Newton system of the square roots of the integrands and of contact.
+    """Assemble the Gauss–Newton system; the residuals are the square roots of the energy's terms.
 
-    Contacts may be given where they are known.
+    Contacts are computed unless they are given.
     """
     n = len(nodes.positions)
     tension = _tension(nodes, weights)
@@ -231,13 +244,13 @@ def elastic_system(
         pull = np.where(nodes.phi_fea < 1.0, weights.feature * weights.held * drift, 0.0)
         bands[0] += pull * drift
         slope += pull * nodes.phi_fea
-    # The residuals lack part of the second derivative of the length: the stiffness of a string.
+    # JᵀJ lacks a part of the second derivative of the length: the stiffness of a taut string.
     lengths = np.maximum(nodes.step_lengths, tolerances.TINY)
     if not nodes.closed:
         lengths[nodes.last] = np.inf
     stiffness = tension / lengths
     bands[0] += stiffness + nodes.before_each(stiffness)
-    # On an unoriented surface, moves of neighbours to one side may have opposite signs.
+    # Without an orientation, moves of two neighbours to the same side may have opposite signs.
     opposite = dot(nodes.normals.T, nodes.after_each(nodes.normals.T)) < 0.0
     bands[1] -= np.where(opposite, -stiffness, stiffness)
     if not np.any(weights.contact):
@@ -249,7 +262,8 @@ def elastic_system(
     slope += np.bincount(contact.pairs.ravel(), pull.ravel(), n)
     one, other = contact.derivatives.T
     if nodes.curves > 1:
-        # Bands are far faster, and 2 (a² + b²) is never less than (a + b)².
+        # Only diagonal entries, so that the matrix stays banded, which is far faster to solve. They
+        # overestimate the stiffness, since 2 (a² + b²) is never less than (a + b)².
         own = 2.0 * weight[:, None] * contact.derivatives**2
         bands[0] += np.bincount(contact.pairs.ravel(), own.ravel(), n)
         return ElasticSystem(bands, slope, curves=nodes.curves)
@@ -260,15 +274,16 @@ def elastic_system(
 def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatArray) -> FloatArray:
     """Moves of the free nodes along conormals that lower the linearised energy, shape (n,).
 
+    A curve does not move if its linearisation is zero or not finite, as where nodes coincide.
+
     Parameters
     ----------
     system : ElasticSystem
     free : (n,) bool array
-        At least one node.
+        Which nodes may move; at least one.
     damping : float or (c,) float array
-        Of each curve. Added to its diagonal, relative to the greatest entry of a free node.
-
-    A curve whose linearisation is not finite or zero, as where nodes coincide, does not move.
+        Damping of each curve. It is added to the diagonal of the matrix, relative to the greatest
+        diagonal entry of a free node.
     """
     may = free.reshape(system.curves, -1)
     after, after_next = (np.concatenate([may[:, i:], may[:, :i]], axis=1) for i in (1, 2))
@@ -295,7 +310,7 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
 
 
 def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
-    """The decrease of the linearised energy by moves along the conormals."""
+    """Decrease of the linearised energy by given moves along the conormals, (n,)."""
     return -float(move @ (2.0 * system.slope + _product(system, move)))
 
 
@@ -307,10 +322,11 @@ def _linearised(
     Returns
     -------
     (2, n) float array
+        Residuals.
     (3, 2, n) float array
-        Derivatives by the moves of nodes i - 1, i and i + 1.
+        Derivatives of the residuals of node i by the moves of nodes i - 1, i and i + 1.
     (n,) float array
-        Derivative of φ_fea by the node's own move.
+        Derivative of φ_fea at each node by the move of that node.
     """
     here = nodes.conormals.T
     here_before, here_after = nodes.before_each(here), nodes.after_each(here)
@@ -325,7 +341,7 @@ def _linearised(
     by_before = cross(flat_before, normal) / squared_before
     by_after = cross(normal, flat_after) / squared_after
     by_normal = sine * (out_after * dot(before, turn) + out_before * dot(after, turn))
-    # Divided one after the other: the product of two tiny squares may underflow.
+    # Divided by one square after the other: the product of two tiny squares may underflow.
     by_normal = (by_normal + cosine * dot(product, turn)) / squared_before / squared_after
     angle_by = np.array(
         [
@@ -360,16 +376,16 @@ def _linearised(
 
 @lru_cache(maxsize=64)
 def _folding(n: int, curves: int) -> tuple[IntArray, IntArray]:
-    """Where cyclic bands, (3, c, n), go in a banded matrix of all curves, (5, c n).
+    """Storage of cyclic bands, (3, c, n), in one banded matrix of all curves, (5, c n).
 
-    In the order 0, n-1, 1, n-2, …, entries coupled by the bands are at most four places apart.
+    In the order 0, n-1, 1, n-2, …, nodes coupled by the bands are at most four positions apart.
 
     Returns
     -------
     (n,) int array
-        The place of each node in this order.
+        The position of each node in this order.
     (3 c n,) int array
-        The index of each entry in the matrix.
+        The index of each entry of the bands in the flattened matrix.
     """
     place = np.empty(n, dtype=np.int64)
     place[: (n + 1) // 2] = 2 * np.arange((n + 1) // 2)
@@ -380,7 +396,7 @@ def _folding(n: int, curves: int) -> tuple[IntArray, IntArray]:
 
 
 def _solved(bands: FloatArray, right: FloatArray, curves: int) -> FloatArray:
-    """Solve a positive definite cyclic banded system of each of some curves."""
+    """Solve a positive definite cyclic banded system for each curve."""
     n = len(right) // curves
     place, entry = _folding(n, curves)
     matrix = np.bincount(entry, bands.ravel(), 5 * len(right)).reshape(5, -1)
@@ -395,7 +411,7 @@ def _solved(bands: FloatArray, right: FloatArray, curves: int) -> FloatArray:
 def _solved_with_pairs(
     bands: FloatArray, pairs: IntArray, entries: FloatArray, right: FloatArray
 ) -> FloatArray:
-    """The same with entries of pairs of nodes added."""
+    """Solve such a system of one curve, with additional entries for pairs of nodes."""
     n = len(right)
     node = np.arange(n)
     rows = np.concatenate([node, node, pairs[:, 0]])
@@ -412,7 +428,7 @@ def _solved_with_pairs(
 def _normal_equations(
     nodes: Nodes, jacobian: FloatArray, residuals: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Bands of JᵀJ, (3, n), and Jᵀ r, (n,), for r residuals of each node, (r, n)."""
+    """Bands of JᵀJ, (3, n), and Jᵀr, (n,), where r are two residuals of each node, (2, n)."""
     left, middle, right = jacobian
 
     def product(one: FloatArray, other: FloatArray) -> FloatArray:
@@ -435,7 +451,7 @@ def _normal_equations(
 
 
 def _product(system: ElasticSystem, move: FloatArray) -> FloatArray:
-    """The matrix times moves, shape (n,)."""
+    """The matrix of a system times moves, shape (n,)."""
     result = system.bands[0] * move
     for offset in (1, 2):
         band = system.bands[offset]

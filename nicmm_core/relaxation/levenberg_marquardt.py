@@ -1,8 +1,8 @@
-"""Levenberg–Marquardt steps of the nodes of a curve: moves along conormals that lower its energy.
+"""Moves the nodes of a curve along conormals, by Levenberg–Marquardt steps that lower its energy.
 
 The energy is linearised about the nodes (`elastic_energy`), and the least damped step that lowers
-the energy itself is taken. Only nodes move here; `relaxing` traces the curve between them after a
-few steps.
+the energy itself is taken. Only nodes move here; `relaxing` traces the curve between them after
+several steps.
 """
 
 from __future__ import annotations
@@ -25,38 +25,42 @@ from .noded_curve import moved_along_conormals
 from .strand_contact import Contacts, NearStrands
 
 DAMPING_NODES = 128
-"""Number of nodes for which the damping is given."""
+"""Number of nodes to which `StepConfig.damping` refers."""
 
 DAMPING_FACTOR = 10.0
 """Factor by which damping rises after a failed step and falls after a successful one."""
 
 WORTHWHILE = 0.05
-"""Predicted decrease, relative to that so far, from which an iteration takes another step."""
+"""Predicted decrease, relative to the decrease so far, above which another step is taken."""
 
 FACES_OF_A_MOVE = 16.0
-"""Number of faces passed that costs as much time as the rest of a move."""
+"""Number of faces that take as much time to cross as the rest of a move."""
 
 TWICE = 4.0 / 3.0
-"""Decrease, relative to half the slope along a step, from which a double step is tried."""
+"""Decrease of the energy above which a double step is tried.
+
+It is relative to half the derivative of the energy along the step.
+"""
 
 
 @dataclass(frozen=True)
 class StepConfig:
-    """Settings of the steps; lengths are in mean distances between neighbouring nodes.
+    """Settings of the steps. Lengths are in mean distances between neighbouring nodes.
 
     Attributes
     ----------
     steps : int
-        Most steps in an iteration.
+        Greatest number of steps in an iteration.
     longest_move : float
-        Trust radius of the linearised energy; a double move is taken if it lowers the energy
-        further. Longer moves between two traces fold the curve where it bends.
+        Trust radius of the linearised energy. A move of twice this length is taken if it lowers the
+        energy further. Longer moves between two traces would fold the curve where it bends.
     damping : float
-        At the start of a level of `DAMPING_NODES` nodes, relative to the greatest diagonal entry.
-        That entry is the stiffness of a zigzag from node to node. Moves of the whole curve are far
-        softer, the more so with more nodes; so damping is far below 1 and falls with their cube.
+        Damping at the start of a level of `DAMPING_NODES` nodes, relative to the greatest diagonal
+        entry of the matrix. That entry is the stiffness against a zigzag from node to node. The
+        stiffness against moves of the whole curve is far smaller, and the more nodes there are, the
+        smaller it is. So damping is far below 1 and falls with the cube of the number of nodes.
     most_damping : float
-        The search for a step ends there.
+        Damping above which the search for a step ends.
     """
 
     steps: int = 8
@@ -65,16 +69,16 @@ class StepConfig:
     most_damping: float = 1e2
 
     def least_damping(self, n_nodes: int) -> float:
-        """The damping of a first step."""
+        """Damping of the first step for a number of nodes, and its lower bound afterwards."""
         return self.damping * (DAMPING_NODES / n_nodes) ** 3
 
 
 @dataclass
 class Work:
-    """Moves of all nodes, taken or only tried, with a cap on their number.
+    """Number of moves of all nodes, whether taken or only tried, and a cap on it.
 
     On defective surfaces few trial steps lower the energy, so an iteration may try many moves. A
-    move over many faces counts as several.
+    move across many faces counts as several.
     """
 
     most: float
@@ -87,7 +91,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Stepping:
-    """What the steps of one iteration share.
+    """Data shared by the steps of one iteration.
 
     Attributes
     ----------
@@ -96,7 +100,7 @@ class Stepping:
     config : StepConfig
     work : Work
     strands : NearStrands or None
-        None if strands may cross.
+        Pairs of nodes that may be in contact; None if strands may cross.
     """
 
     surface: CurveSurface
@@ -106,11 +110,11 @@ class Stepping:
     strands: NearStrands | None = None
 
     def contacts(self, nodes: Nodes) -> Contacts | None:
-        """Contacts of the nodes."""
+        """Contacts between the nodes; None if strands may cross."""
         return None if self.strands is None else self.strands.contacts(nodes)
 
     def energy(self, nodes: Nodes) -> float:
-        """Energy of the nodes."""
+        """Energy of the nodes, including contact."""
         return elastic_energy(nodes, self.weights, self.contacts(nodes))
 
 
@@ -123,7 +127,7 @@ class Linearised:
     system: ElasticSystem
 
     def may_fall(self, free: BoolArray, config: StepConfig) -> float:
-        """Predicted decrease of the least damped step of the free nodes, (n,)."""
+        """Predicted decrease of the energy by the least damped step of the free nodes, (n,)."""
         if not free.any():
             return 0.0
         damping = config.least_damping(len(free))
@@ -136,13 +140,13 @@ class Moved:
 
     nodes: Nodes
     energy: float
-    stayed: BoolArray  # (n,) nodes that reached a boundary
+    stayed: BoolArray  # (n,) which nodes reached a boundary
     damping: float  # of the first step
-    farthest: float  # move, in mean distances between nodes
+    farthest: float  # greatest length of a move, in mean distances between nodes
 
 
 def linearised(stepping: Stepping, nodes: Nodes) -> Linearised:
-    """The energy of nodes, and its linearisation about them."""
+    """Compute the energy of nodes and its linearisation about them."""
     surface, weights, contacts = stepping.surface, stepping.weights, stepping.contacts(nodes)
     energy = elastic_energy(nodes, weights, contacts)
     return Linearised(nodes, energy, elastic_system(surface, nodes, weights, contacts))
@@ -151,16 +155,16 @@ def linearised(stepping: Stepping, nodes: Nodes) -> Linearised:
 def take_steps(
     stepping: Stepping, start: Linearised, free: BoolArray, damping: float
 ) -> Moved | None:
-    """As many steps as are worthwhile.
+    """Take steps as long as they are worthwhile.
 
     Parameters
     ----------
     stepping : Stepping
     start : Linearised
     free : (n,) bool array
-        Nodes that may move.
+        Which nodes may move.
     damping : float
-        Of the first trial step.
+        Damping of the first trial step.
 
     Returns
     -------
@@ -188,7 +192,7 @@ def less_damping(moved: Moved, config: StepConfig) -> float:
 def _first_step(
     stepping: Stepping, start: Linearised, free: BoolArray, damping: float
 ) -> Moved | None:
-    """The least damped step that lowers the energy, or None."""
+    """The least damped step that lowers the energy; None if there is no such step."""
     nodes = start.nodes
     while damping <= stepping.config.most_damping and free.any() and not stepping.work.exhausted():
         move = damped_step(start.system, free, damping)
@@ -197,8 +201,9 @@ def _first_step(
         move, farthest = _trusted(nodes, move, stepping.config)
         moved, stayed = _moved(stepping, nodes, move)
         reached = stepping.energy(moved)
-        # The Gauss–Newton matrix is too stiff where the curve bends strongly. After such a
-        # decrease, the parabola through both energies with this slope is lower at twice the step.
+        # The Gauss–Newton matrix is too stiff where the curve bends strongly. If the energy falls
+        # by more than this, the parabola through both energies, with the slope of the energy at the
+        # start, is lower at twice the step.
         fallen = start.energy - reached
         if fallen > 0.0 and fallen > -TWICE * float(start.system.slope @ move):
             farther, also_stayed = _moved(stepping, nodes, 2.0 * move)
@@ -214,7 +219,10 @@ def _first_step(
 def _further_step(
     stepping: Stepping, moved: Moved, free: BoolArray, damping: float, least: float
 ) -> Moved | None:
-    """A step or half step that lowers the energy; None below the least predicted decrease."""
+    """A step or half step that lowers the energy.
+
+    None if neither does, or if the predicted decrease is not more than `least`.
+    """
     nodes, free = moved.nodes, free & ~moved.stayed
     if not free.any() or stepping.work.exhausted():
         return None
@@ -235,7 +243,7 @@ def _further_step(
 
 
 def _moved(stepping: Stepping, nodes: Nodes, step: FloatArray) -> tuple[Nodes, BoolArray]:
-    """Nodes moved along conormals, and which reached a boundary."""
+    """Nodes moved along conormals, and which of them reached a boundary."""
     moved, stayed, passed = moved_along_conormals(stepping.surface, nodes, step)
     stepping.work.spent += 1.0 + passed / FACES_OF_A_MOVE
     return moved, stayed

@@ -1,8 +1,8 @@
-"""Positions of nodes on a polyline: about equally spaced on each leg, and not inside folds.
+"""Places nodes on a polyline: about equally spaced on each leg, and not inside folds.
 
-Over folded faces a straight trace runs forward, backward and forward again. Nodes in between would
-reverse the curve twice. So segments that run backward over folded faces count with negative length,
-and a node is placed at the last point of the leg with its share of the length.
+Over folded faces a straight trace runs forward, backward and forward again. Nodes inside the fold
+would reverse the curve twice. So segments that run backward over folded faces count with negative
+length, and a node is placed at the last point of the leg where the net length equals its share.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from ..progress import checkpoint
 from .curve_nodes import CurveSurface
 
 FEWEST_OF_A_LEG = 6
-"""Least number of nodes of a leg, including the control point at its start."""
+"""Least number of nodes on a leg, including the control point at its start."""
 
 REACH = 3.0
-"""Half length of curve over which its direction is measured, in mean edge lengths."""
+"""Length of curve on either side over which its direction is measured, in mean edge lengths."""
 
 SHORTEST_TURN = 1.0 / 16.0
-"""Limit of that half length, as a share of the curve."""
+"""Upper limit of that length, relative to the length of the curve."""
 
 
 def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
-    """Arc length at each point of a polyline, and at its end, shape (s + 1,)."""
+    """Arc lengths at the starts of the s segments of a polyline and at its end, shape (s + 1,)."""
     steps = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     return np.concatenate([[0.0], np.cumsum(steps if closed else steps[:-1])])
 
@@ -39,17 +39,17 @@ def node_arcs(
     count: int,
     closed: bool,
 ) -> tuple[FloatArray, IntArray]:
-    """Arc lengths of the nodes of a polyline.
+    """Compute the arc lengths at which nodes are placed on a polyline.
 
     Parameters
     ----------
     surface : CurveSurface
     polyline : SurfacePoints
-        Each point in the face of the segment after it.
+        Points of the polyline, each in the face of the segment after it.
     arc : (s + 1,) float array
-        Its `arc_lengths`.
+        Arc lengths of the polyline, by `arc_lengths`.
     control_place : (k,) int array
-        Indices of the control points in it, ascending.
+        Indices of the control points in the polyline, ascending.
     count : int
         Approximate number of nodes.
     closed : bool
@@ -83,9 +83,9 @@ def node_arcs(
 def _runs_back(
     surface: CurveSurface, polyline: SurfacePoints, arc: FloatArray, closed: bool
 ) -> BoolArray:
-    """Segments over folded faces against the direction of the curve, shape (s + 1,).
+    """Which segments run over folded faces against the direction of the curve, shape (s + 1,).
 
-    The last entry is a dummy, so that it can be sliced as the arc lengths are.
+    The last entry is padding, so that the result can be sliced like the arc lengths.
     """
     mesh = surface.mesh
     back = np.zeros(len(arc), dtype=bool)
@@ -109,16 +109,16 @@ def _runs_back(
 
 
 def _last_arcs(arc: FloatArray, back: BoolArray, share: FloatArray) -> FloatArray:
-    """The last arc length on a leg at each share, within (0, 1), of its net length.
+    """The last arc lengths on a leg at which given shares of its net length are reached, (n,).
 
     Parameters
     ----------
     arc : (s + 1,) float array
-        At the ends of its segments.
+        Arc lengths at the ends of the s segments of the leg.
     back : (s,) bool array
-        Segments that run backward.
+        Which segments run backward.
     share : (n,) float array
-        Ascending.
+        Shares within (0, 1), ascending.
     """
     steps = np.diff(arc)
     covered = np.concatenate([[0.0], np.cumsum(np.where(back, -steps, steps))])

@@ -1,6 +1,6 @@
-"""Straight traces between the nodes of one or more curves, without keeping a polyline.
+"""Computes straight traces between the nodes of curves, without keeping a polyline.
 
-Where a trace fails there is a gap, which stops nothing here: whether a curve is simple is decided
+A failed trace leaves a gap, which is not an error here: whether a curve is simple is decided later,
 on the mesh on which it is returned (`noded_curve`).
 """
 
@@ -22,22 +22,25 @@ from ..geometry.vectors import lengths, unit
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 
 DETOUR = 3.0
-"""Longest trace between two nodes, relative to their distance in space; longer ones fail."""
+"""Greatest length of a trace between two nodes, relative to their distance; longer ones fail."""
 
 AROUND = 6.0
-"""Longest path along edges where a trace fails, relative to the longest distance in space."""
+"""Greatest length of a path along edges in place of a failed trace.
+
+It is relative to the greatest distance between two nodes without a trace.
+"""
 
 
 @dataclass(frozen=True)
 class NodeTraces:
-    """Straight traces between the nodes of some curves, where they succeed.
+    """Straight traces between the nodes of curves, where they succeed.
 
     Attributes
     ----------
     node : (p,) int array
-        The node before each point, ascending.
+        Index of the node at which the trace of each point begins, ascending.
     points : SurfacePoints
-        Points of the traces with both ends, each in the face of the segment after it.
+        Points of the traces, including both ends, each in the face of the segment after it.
     """
 
     node: IntArray
@@ -45,21 +48,22 @@ class NodeTraces:
 
     @cached_property
     def is_last(self) -> BoolArray:
-        """Whether each point is the last one of its trace, (p,)."""
+        """Whether each point is the end of its trace, (p,)."""
         return np.append(np.diff(self.node) > 0, True)
 
 
 @dataclass(frozen=True)
 class TracedSegments:
-    """Traces as s segments in faces.
+    """Traces as s segments, each in one face.
 
     Attributes
     ----------
     node : (s,) int array
-        The node before each segment, ascending.
+        Index of the node at which the trace of each segment begins, ascending.
     face : (s,) int array
+        The face of each segment.
     start, end : (s, 2) float array
-        Barycentric coordinates in it.
+        First two barycentric coordinates of both ends in this face.
     """
 
     node: IntArray
@@ -69,7 +73,7 @@ class TracedSegments:
 
 
 def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
-    """The segments of traces."""
+    """Divide traces into their segments."""
     corners, points = mesh.faces, traces.points
     begins = np.flatnonzero(~traces.is_last)
     face, following = points.faces[begins], points[begins + 1]
@@ -78,7 +82,7 @@ def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
 
 
 def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
-    """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next ones cross."""
+    """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next nodes cross."""
     segments = traced_segments(surface.mesh, traces_between_nodes(surface, nodes))
     size = len(nodes.positions) // nodes.curves
     curve = segments.node // size
@@ -97,23 +101,23 @@ def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
 def with_midpoints(
     surface: CurveSurface, nodes: Nodes, fixed: BoolArray
 ) -> tuple[Nodes, BoolArray]:
-    """Twice as many nodes: one more halfway along each trace.
+    """Double the number of nodes by a new node halfway along each trace.
 
-    Where a trace fails, it lies halfway along edges.
+    Where a trace fails, the new node lies halfway along a path of edges.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
     fixed : (n,) bool array
-        Nodes that stay fixed.
+        Which nodes are fixed.
 
     Returns
     -------
     Nodes
-        An open curve gets one node less.
-    (2 n,) bool array
-        The fixed ones of these.
+        m = 2 n nodes, or one fewer for each open curve.
+    (m,) bool array
+        Which of these nodes are fixed; new nodes are not.
     """
     begins = nodes.with_step
     traces = traces_between_nodes(surface, nodes)
@@ -133,7 +137,7 @@ def with_midpoints(
 def places_along(
     surface: CurveSurface, nodes: Nodes, traces: NodeTraces, node: IntArray, share: FloatArray
 ) -> SurfacePoints:
-    """Points at a share of the traces from some nodes, (q,), to the next ones, inside faces.
+    """Points at given shares of the traces from q nodes to the next nodes, strictly inside faces.
 
     Where a trace fails, as around a thin part, the point lies on the shortest path along edges.
     """
@@ -161,7 +165,7 @@ def places_along(
 
 
 def traces_between_nodes(surface: CurveSurface, nodes: Nodes) -> NodeTraces:
-    """The traces from all nodes to the next ones."""
+    """Trace from every node to the next one."""
     node, following = nodes.with_step, nodes.following
     places = SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric))
     start, end = places[node], places[following[node]]
@@ -181,18 +185,20 @@ def traces_of_steps(
     start: IntArray,
     end: IntArray,
 ) -> Traces:
-    """Straight traces from nodes, (m,), to the next or the previous ones.
+    """Trace from m nodes to the next or the previous nodes.
 
-    Round the edge of a thin part the normals of both nodes may be opposite, and no plane along them
-    contains the trace; there the directions of the curve before and after span the plane.
+    The plane of a trace contains the mean normal of both nodes. Around the edge of a thin part
+    these normals may be opposite, and no such plane contains a trace. Where the trace fails, the
+    plane contains the mean direction of the curve before and after it instead.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
     places : SurfacePoints
-        Of all n nodes; those of the starts strictly inside faces.
+        Places of all n nodes. Those of the nodes in `start` are strictly inside faces.
     start, end : (m,) int array
+        Indices of the nodes at which the traces start and end.
     """
     mesh, one, other = surface.mesh, nodes.normals[start], nodes.normals[end]
     if not mesh.is_oriented:  # turn both normals to the same side
@@ -224,9 +230,10 @@ def traces_of_steps(
 def _along_edges(
     surface: CurveSurface, nodes: Nodes, node: IntArray, share: FloatArray
 ) -> SurfacePoints:
-    """Points at a share of the shortest paths along edges from some nodes to the next ones.
+    """Points at given shares of the shortest paths along edges from nodes to the next nodes.
 
-    Paths run from vertex to vertex; without a path the point stays at its vertex.
+    A path joins the corners with the greatest barycentric coordinates of both nodes. If there is no
+    path, the point stays at the first corner.
     """
     mesh = surface.mesh
     corner = mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]

@@ -1,9 +1,9 @@
-"""A polyline exactly on the mesh, with the nodes that move it.
+"""Represents a curve as a polyline exactly on the mesh, with nodes that move it.
 
-Each segment of the polyline lies in one face. Nodes are about equally spaced points of it. When
-they move, the polyline between them is retraced by straight traces over the faces. Where a trace
-fails or crosses another, its two nodes and the polyline between them stay as they were. So the
-result is always a simple curve through the same control points in the same order.
+Each segment of the polyline lies in one face. The nodes are about equally spaced points of the
+polyline. When they move, the polyline between them is replaced by straight traces over the faces.
+Where a trace fails or crosses another one, its two nodes and the polyline between them stay as they
+were. So the result is always a simple curve through the same control points in the same order.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, within which a new node replaces an old point."""
 
 SHORT = 0.05
-"""Length, relative to the mean distance between nodes, below which a result omits a segment.
+"""Length of a segment, relative to the mean distance between nodes, below which results omit it.
 
-A tube along the curve would show a shorter segment as a notch.
+A tube along the curve would show such a segment as a notch.
 """
 
 
@@ -42,11 +42,11 @@ class NodedCurve:
     Attributes
     ----------
     nodes : Nodes
-        n nodes; all but the control points lie strictly inside faces.
+        The n nodes; all but the control points lie strictly inside faces.
     control_nodes : (k,) int array
-        Indices of the control points among them, in order.
+        Indices of the control points among the nodes, in order.
     polyline : SurfacePoints
-        Each point in the face of the segment after it.
+        Points of the polyline, each in the face of the segment after it.
     node_place : (n,) int array
         Index of each node in the polyline, ascending.
     """
@@ -67,22 +67,22 @@ class NodedCurve:
         return float(self.nodes.lengths.sum())
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
-        """The polyline as a result."""
+        """The polyline in the form of a result."""
         at_controls = self.node_place[self.control_nodes]
         polyline = self.polyline
         return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
 def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
-    """The polyline without nodes close to edges, if it stays simple; otherwise all of it.
+    """The polyline without nodes close to edges if it stays simple; otherwise the whole polyline.
 
-    The neighbours of a node inside a face can be joined in the same face.
+    The neighbours of a node strictly inside a face can be joined within this face.
     """
     polyline = curve.polyline
     inside = np.zeros(len(polyline), dtype=bool)
     inside[np.delete(curve.node_place, curve.control_nodes)] = True
     inside &= (polyline.barycentric > 0.0).all(axis=1)
-    inside[1:] &= ~inside[:-1]  # One of two nodes in a row stays.
+    inside[1:] &= ~inside[:-1]  # Of two consecutive nodes, one stays.
     positions = polyline.positions(mesh)
     length = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
     short = length < SHORT * float(curve.nodes.lengths.mean())
@@ -114,43 +114,44 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
 def noded(
     surface: CurveSurface, places: SurfacePoints, control_nodes: IntArray, closed: bool
 ) -> NodedCurve:
-    """A curve of nodes alone, before any trace between them."""
+    """A curve that consists of nodes alone, before anything is traced between them."""
     nodes = nodes_at(surface, places, closed)
     return NodedCurve(nodes, control_nodes, places, np.arange(len(places)))
 
 
 def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
-    """A new number of equally spaced nodes on the same polyline."""
+    """The same polyline with about `count` equally spaced nodes."""
     at_controls = curve.node_place[curve.control_nodes]
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
 
 def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
-    """Fine nodes on a smooth curve through the coarse ones of the same polyline.
+    """Move fine nodes onto a smooth curve through the coarse nodes of the same polyline.
 
-    Between coarse nodes the polyline is straight, so with four times as many nodes it bends only
-    at a quarter of them, at four times the cost. A cubic spline through the coarse nodes gives the
-    moves of the fine nodes along their conormals.
+    Between coarse nodes the polyline is straight. So with four times as many nodes it bends only at
+    a quarter of them, which costs four times the bending energy. A cubic spline through the coarse
+    nodes gives the moves of the fine nodes along their conormals.
 
     Parameters
     ----------
     surface : CurveSurface
     coarse : NodedCurve
-        Simple.
+        A simple curve.
     fine : NodedCurve
-        More nodes on its polyline.
+        The same polyline with more nodes.
 
     Returns
     -------
     NodedCurve
-        Simple; nodes that could not move stay, all of them if a leg has no length.
+        A simple curve. Nodes that cannot be moved stay where they are, and all nodes do if two
+        coarse nodes coincide.
     """
     at, total = _arc_lengths(surface.mesh, coarse)
     through = coarse.nodes.positions
     if coarse.closed:
         at, through = np.append(at, total), np.concatenate([through, through[:1]])
     if (np.diff(at) <= 0.0).any():
-        return fine  # No slope on a leg without length.
+        return fine  # There is no slope between nodes that coincide.
     chord = np.diff(through, axis=0) / np.diff(at)[:, None]
     slope = 0.5 * (np.concatenate([chord[:1], chord]) + np.concatenate([chord, chord[-1:]]))
     if coarse.closed:
@@ -164,7 +165,7 @@ def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> Node
 
 
 def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
-    """Arc length at the nodes, (n,), and of the whole curve."""
+    """Arc lengths at the nodes, (n,), and the length of the whole polyline."""
     arc = arc_lengths(curve.polyline.positions(mesh), curve.closed)
     return arc[curve.node_place], float(arc[-1])
 
@@ -172,14 +173,14 @@ def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
 def moved_along_conormals(
     surface: CurveSurface, nodes: Nodes, step: FloatArray
 ) -> tuple[Nodes, BoolArray, int]:
-    """Nodes moved by signed lengths, (n,), along `Nodes.conormals`; otherwise as `shifted`."""
+    """Move nodes along `Nodes.conormals` by signed lengths, (n,); returns the same as `shifted`."""
     return shifted(surface, nodes, nodes.conormals * np.sign(step)[:, None], np.abs(step))
 
 
 def shifted(
     surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
 ) -> tuple[Nodes, BoolArray, int]:
-    """Nodes moved over the surface; the polyline between them is not traced.
+    """Move nodes over the surface, without tracing the polyline between them.
 
     Parameters
     ----------
@@ -188,13 +189,14 @@ def shifted(
     direction : (n, 3) float array
         Unit vectors approximately tangent to the surface; ignored where the length is zero.
     length : (n,) float array
-        Zero at control points.
+        Distances to move; zero at control points.
 
     Returns
     -------
     Nodes
+        The moved nodes, with new normals and φ_fea.
     (n,) bool array
-        Nodes that reached a boundary and stopped beside it.
+        Which nodes reached a boundary and stopped next to it.
     int
         Greatest number of faces that a node has passed.
     """
@@ -224,7 +226,7 @@ def traced_through(
 ) -> NodedCurve | None:
     """The curve traced through nodes at new places, simple or not; None if a trace fails.
 
-    Between two nodes that are `still`, (n,), the polyline is kept.
+    Between two consecutive nodes that have not moved, `still` (n,), the polyline is kept.
     """
     kept = np.zeros(len(nodes.positions), dtype=bool)
     if still is not None:
@@ -247,21 +249,22 @@ def straight_traces(
 def retraced(
     surface: CurveSurface, curve: NodedCurve, nodes: Nodes
 ) -> tuple[NodedCurve, BoolArray]:
-    """The curve retraced through nodes at new places wherever it stays simple.
+    """Retrace a curve through nodes at new places, wherever it stays simple.
 
     Parameters
     ----------
     surface : CurveSurface
     curve : NodedCurve
-        Simple.
+        A simple curve.
     nodes : Nodes
-        n nodes; control points have not moved.
+        Its n nodes at new places; control points have not moved.
 
     Returns
     -------
     NodedCurve
+        A simple curve.
     (n,) bool array
-        Nodes that kept their old places.
+        Which nodes were put back to their old places.
     """
     old, new = curve.nodes.places, nodes.places
     stays = np.zeros(len(old), dtype=bool)
@@ -293,7 +296,7 @@ def _with_nodes(
     count: int,
     closed: bool,
 ) -> NodedCurve:
-    """Insert equally spaced nodes on each leg and drop old points that were only nodes."""
+    """Insert equally spaced nodes on each leg and drop old points inside faces at their places."""
     mesh, n = surface.mesh, len(polyline)
     arc = arc_lengths(polyline.positions(mesh), closed)
     at, control_nodes = node_arcs(surface, polyline, arc, control_place, count, closed)
@@ -308,7 +311,7 @@ def _with_nodes(
     barycentric[control_nodes] = polyline.barycentric[control_place]
     places = SurfacePoints(faces, barycentric)
 
-    # Old points between the nodes remain, except points inside faces at the place of a node.
+    # All other old points remain, so the polyline keeps its shape.
     inside = (polyline.barycentric > 0.0).all(axis=1)
     nodes_along = np.append(at, arc[-1])
     ahead = np.searchsorted(nodes_along, arc[:n]).clip(max=len(at))
@@ -317,7 +320,7 @@ def _with_nodes(
     dropped = inside & (nearest < SAME_PLACE * arc[-1])
     dropped[control_place] = True
     old = np.flatnonzero(~dropped)
-    # A node follows the start of its segment, even if both are at the same place.
+    # A node is sorted after the start of its segment, even if both are at the same place.
     segment[control_nodes] = control_place
     before = np.concatenate([segment, old])
     order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
@@ -337,17 +340,18 @@ def _traced_polyline(
     surface : CurveSurface
     curve : NodedCurve
     nodes : Nodes
-        n nodes at new places.
+        The n nodes at new places.
     kept : (n,) bool array
-        Nodes after which the polyline is kept; they and the next ones have not moved.
+        Nodes after which the polyline is kept; neither they nor the next nodes have moved.
 
     Returns
     -------
     SurfacePoints
+        The polyline.
     (n,) int array
-        Index of each node in it.
+        Index of each node in the polyline.
     (n,) bool array
-        Nodes from which the trace to the next one failed; the polyline has no points between them.
+        Nodes whose trace to the next node failed; there the polyline has no points in between.
     """
     places = nodes.places
     n = len(places)
@@ -358,7 +362,8 @@ def _traced_polyline(
     parts = [_kept_pieces(curve, np.flatnonzero(~changed))]
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
-    # A trace starts inside a face; control points may lie elsewhere, so it then runs backward.
+    # A trace must start strictly inside a face. Control points may lie elsewhere, so traces from
+    # them run backward.
     for backwards in (False, True):
         here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
@@ -374,10 +379,14 @@ def _traced_polyline(
 
 
 Pieces = tuple[IntArray, SurfacePoints]
-"""Points of the polyline, each with the node before it; that node is the first point."""
+"""Pieces of a polyline: for each point the node at which its piece starts, and the points.
+
+A piece ends before the next node, and its first point is its node.
+"""
 
 
 def _kept_pieces(curve: NodedCurve, nodes: IntArray) -> Pieces:
+    """The present pieces of the polyline after some nodes."""
     bounds = np.append(curve.node_place, len(curve.polyline))
     count = bounds[nodes + 1] - bounds[nodes]
     owner = np.repeat(nodes, count)
@@ -392,7 +401,10 @@ def _traced_pieces(
     ends: tuple[IntArray, IntArray],
     backwards: bool,
 ) -> tuple[Pieces, BoolArray]:
-    """Straight traces from nodes to the next ones, traced in reverse if backwards."""
+    """Pieces traced from nodes to the next nodes, and which traces reached their ends.
+
+    If `backwards`, each trace runs from the next node to the node, and the piece is its reverse.
+    """
     mesh, places = surface.mesh, of.places
     start, end = reversed(ends) if backwards else ends
     traces = traces_of_steps(surface, of, places, start, end)
@@ -402,8 +414,8 @@ def _traced_pieces(
         order = np.argsort(owner, kind="stable")
         points = joined([first, crossings])
         return (owner[order], points[order]), traces.reached
-    # In reverse, a crossing belongs to the face before it on the trace, and the first node to the
-    # face where the trace ended.
+    # In the reverse, a crossing belongs to the face that the trace left there, and the first node
+    # to the face in which the trace ended.
     begins = np.searchsorted(traces.pair, np.arange(len(nodes)))
     ends_at = np.searchsorted(traces.pair, np.arange(len(nodes)), side="right")
     came_from = np.roll(crossings.faces, 1)

@@ -1,17 +1,18 @@
-"""Relax a curve on the surface until its own energy converges: the schedule of the relaxation.
+"""Relaxes a curve on the surface until its energy converges, on levels of more and more nodes.
 
-A level set determines the course of the curve, but only at the resolution of the mesh, and strands
-a few edges apart block each other. From there nodes move over the surface until the energy of Eq. 6
-and 7 along the curve converges (`elastic_energy`).
+The start determines the course of the curve but not its shape: a level set has only the resolution
+of its mesh, and in it strands a few edges apart block each other. From the start, nodes move over
+the surface until the energy of Eq. 6 and 7 along the curve converges (`elastic_energy`).
 
-Few nodes move far in a step, many resolve detail; so the number of nodes rises by levels. An
-iteration takes a few steps of the nodes (`levenberg_marquardt`) and then retraces the curve. Nodes
-whose trace fails or would cross another stay for that iteration, so the curve is simple after every
-iteration. A contact term repels strands.
+A curve with few nodes moves far in a step, and a curve with many nodes resolves detail. So the
+number of nodes increases from level to level. An iteration takes several steps of the nodes
+(`levenberg_marquardt`) and then retraces the curve. A node whose trace fails or would cross another
+trace stays where it was for that iteration, so the curve is simple after every iteration. A contact
+term repels strands.
 
-A curve that has nearly converged, such as one with a dragged control point, can defer this: its
-nodes move without contact, and it is traced after convergence. If it then crosses itself, it is
-relaxed again from the start with a trace in every iteration.
+For a curve that has nearly converged, such as one with a dragged control point, tracing can be
+deferred: the nodes move without contact, and the curve is traced after convergence. If it then
+crosses itself, it is relaxed again from the start, with a trace in every iteration.
 """
 
 from __future__ import annotations
@@ -58,26 +59,27 @@ class RelaxationConfig:
     Attributes
     ----------
     levels : tuple of int
-        Numbers of nodes, rising.
+        Number of nodes of each level, ascending.
     stepping : StepConfig
         Settings of the steps of an iteration.
     least_decrease : float
-        Decrease of the energy in an iteration, relative to the bending, below which the last level
-        has converged.
+        Decrease of the energy in an iteration, relative to the bending energy, below which the last
+        level has converged.
     least_decrease_before : float
-        The same for the levels before.
+        The same for all earlier levels.
     spacing_ratio : float
         Ratio of the longest to the shortest step of a leg above which nodes are respaced.
     iterations : int
-        Cap over all levels of one attempt.
+        Cap on the iterations of one attempt, over all levels.
     most_iterations : int
-        Cap over all attempts.
+        Cap on the iterations of all attempts together.
     work : float
         Cap on the `Work` of one attempt.
     defer_tracing : bool
         Whether a first attempt traces the curve only after convergence.
     tension_factor : float
-        Above 1, an additional first pass with the fewest nodes multiplies the tension by this.
+        Factor of the tension in an additional first pass with the fewest nodes; there is no such
+        pass if it is 1.
     """
 
     levels: tuple[int, ...] = (128, 512)
@@ -93,36 +95,36 @@ class RelaxationConfig:
 
 
 GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, tension_factor=30.0)
-"""Settings for maps with lanes: the curve must find a lane with few nodes, since many hardly move.
+"""Settings for maps with lanes, in which the curve must find a lane while it has few nodes.
 
-Few nodes take long steps. These may inflate a fold of the start into an arc from lane to lane, a
-local minimum far above the lowest energy. 30 times the tension removes folds first, and lanes still
-hold the curve.
+Many nodes hardly move. Few nodes take long steps, which may inflate a fold of the start into an arc
+from lane to lane, a local minimum far above the lowest energy. So a first pass with 30 times the
+tension removes folds; lanes still hold the curve during that pass.
 """
 
 RELEASES = 2
-"""Times per level that held nodes are released after convergence."""
+"""Number of times per level that held nodes are released after convergence."""
 
 HELD_TRIES = 1
-"""Times that an iteration is repeated with nodes held that could not be retraced."""
+"""Number of times that an iteration is repeated, holding the nodes that could not be retraced."""
 
 SURELY = 0.1
 """Predicted decrease, relative to the least decrease, below which no step is tried.
 
-Damping makes predictions too small.
+It is far below 1, because damping makes predictions too small.
 """
 
 MOST_STALLED = 4
-"""Consecutive iterations without a new least energy that end a level.
+"""Number of consecutive iterations without a new least energy after which a level ends.
 
-On folds and needles, respacing the nodes may raise the energy by more than steps lower it.
+On folds and needles, respacing the nodes may raise the energy by more than the steps lower it.
 """
 
 STRAIGHT = 2e-3
-"""Least bending, as a share of the energy, in the scale of the convergence test."""
+"""Lower bound, as a share of the energy, on the bending energy used in the convergence test."""
 
 SMALL_MOVE = 0.1
-"""Largest moves that do not disturb the spacing, in mean distances between nodes."""
+"""Greatest move that does not disturb the spacing, in mean distances between nodes."""
 
 
 @dataclass(frozen=True)
@@ -132,18 +134,18 @@ class Relaxed:
     Attributes
     ----------
     curve : SurfaceCurve
-        Simple.
+        The relaxed curve, which is simple.
     noded_curve : NodedCurve
-        The same with its nodes.
+        The same curve with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
     feature : float
         ∮ φ_fea² ds, in units of length.
     iterations : int
-        Of all attempts.
+        Number of iterations of all attempts.
     status : Status
         `CONVERGED`, `ITERATION_LIMIT` or `CANCELLED`; `UNRELAXED` if strands of the start are too
-        close together to place nodes on it without contact.
+        close together to place nodes on it without contact. The curve is then the start itself.
     collided : bool
         Whether the curve crossed itself after an attempt with deferred tracing.
     """
@@ -173,14 +175,19 @@ def relax(
     ----------
     surface : CurveSurface
     start : SurfaceCurve or NodedCurve
-        Simple, and through its control points in order.
+        A simple curve that passes its control points in order.
     smoothness : float
-        Divides the tension.
+        Divisor of the tension and of the weight of a map.
     config : RelaxationConfig
     watch : callable, optional
-        Called after every iteration with the iterations done, as a fraction of the cap, and the
-        positions of the nodes, (n, 3); relaxation stops when it returns False. It also stops, with
-        the last traced curve, when `progress.checkpoint` raises `CancelledError`.
+        Called after every iteration with the number of iterations, as a fraction of the cap, and
+        the positions of the nodes, (n, 3). Relaxation stops when it returns False. It also stops,
+        with the last traced curve, when `progress.checkpoint` raises `CancelledError`.
+
+    Returns
+    -------
+    Relaxed
+        The start itself, with the status, if no simple relaxed curve was found.
     """
     if isinstance(start, NodedCurve):
         first, start = start, start.surface_curve(surface.mesh)
@@ -215,36 +222,36 @@ def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
 
 @dataclass(frozen=True)
 class _State:
-    """A curve between two iterations, with its energy linearised."""
+    """A curve between two iterations, with its linearised energy."""
 
     curve: NodedCurve  # as last traced
     here: Linearised
-    held: BoolArray  # (n,) nodes that must not move
+    held: BoolArray  # (n,) which nodes must not move
     stepping: Stepping
 
     @property
     def free(self) -> BoolArray:
-        """Nodes that may move, (n,)."""
+        """Which nodes may move, (n,)."""
         free = ~self.held
         free[self.curve.control_nodes] = False
         return free
 
     @property
     def may_fall(self) -> float:
-        """Predicted decrease of the least damped step."""
+        """Predicted decrease of the energy by the least damped step."""
         return self.here.may_fall(self.free, self.stepping.config)
 
 
 @dataclass(frozen=True)
 class _Iteration:
-    """Steps that lowered the energy, traced."""
+    """The result of an iteration that lowered the energy."""
 
     curve: NodedCurve  # as last traced
     nodes: Nodes
     energy: float
-    held: BoolArray  # (n,) nodes that could not move
+    held: BoolArray  # (n,) which nodes could not move
     damping: float  # for the next iteration
-    farthest: float  # move, in mean distances between nodes
+    farthest: float  # greatest length of a move, in mean distances between nodes
 
 
 class _LostError(Exception):
@@ -266,7 +273,7 @@ class _Attempt:
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
         self.simple = simple  # whether the curve is traced after every iteration
-        self.iterations = iterations  # with those of earlier attempts
+        self.iterations = iterations  # including those of earlier attempts
         self.last_iteration = min(iterations + config.iterations, config.most_iterations)
         self.work = Work(config.work)
         self.status = Status.CONVERGED
@@ -295,7 +302,7 @@ class _Attempt:
     def _level(
         self, curve: NodedCurve, level: int, least: float, tension_factor: float
     ) -> NodedCurve:
-        """Iterate with one number of nodes until the decrease of the energy is below the least."""
+        """Iterate with a fixed number of nodes until the energy decreases by less than `least`."""
         config, least_damping = self.config, self.config.stepping.least_damping(level)
         damping = least_damping
         curve = self.traced = self._respaced(curve, level)
@@ -353,7 +360,7 @@ class _Attempt:
         return _State(curve, linearised(stepping, nodes), held, stepping)
 
     def _iteration(self, state: _State, damping: float) -> _Iteration | None:
-        """Steps from a curve, retraced unless deferred; None if no step lowers the energy."""
+        """Take steps and retrace the curve, unless deferred; None if no step lowers the energy."""
         free, stepping = state.free, state.stepping
         tries = 0
         while True:
@@ -383,7 +390,7 @@ class _Attempt:
         return changed
 
     def _respaced(self, curve: NodedCurve, level: int) -> NodedCurve:
-        """Respace the nodes, unless that would make strands touch."""
+        """Respace the nodes if necessary, unless that would make strands touch."""
         alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
         if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.spacing_ratio:
             return curve
@@ -393,7 +400,7 @@ class _Attempt:
         return changed if alike else self._rounded(curve, changed)
 
     def _rounded(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
-        """Move fine nodes to a smooth curve through the coarse ones, if that bends less."""
+        """Move fine nodes onto a smooth curve through the coarse ones, if that bends less."""
         if len(fine.nodes.positions) < len(coarse.nodes.positions):
             return fine
         changed = rounded(self.surface, coarse, fine)

@@ -1,9 +1,10 @@
-"""Relax several curves together, to compare them: nodes only, without tracing between them.
+"""Relaxes several curves together, so that their energies can be compared.
 
-The steps are those of `levenberg_marquardt`, with all nodes of all curves in one set of arrays,
-since the number of calls and not of nodes decides the time. Each curve has its own damping and
-takes or rejects its own steps. A curve may cross itself, although the contact term resists it;
-`node_traces.crossing_steps` tells where it does.
+Only nodes move; the curves are not traced between them. The steps are those of
+`levenberg_marquardt`, with the nodes of all curves in one set of arrays, because the time depends
+on the number of array calls rather than on the number of nodes. Damping is separate for each curve,
+and so is the decision to accept or reject a step. A curve may cross itself, although the contact
+term resists it; `node_traces.crossing_steps` finds where.
 """
 
 from __future__ import annotations
@@ -25,20 +26,21 @@ from .strand_contact import close_pairs, contacts_of_pairs
 
 @dataclass(frozen=True)
 class TogetherConfig:
-    """Settings; lengths are in mean distances between neighbouring nodes.
+    """Settings. Lengths are in mean distances between neighbouring nodes.
 
     Attributes
     ----------
     iterations : int
-        Most iterations, of one step each.
+        Greatest number of iterations, of one step each.
     longest_move : float
         Trust radius of the linearised energy.
     respacing : int
-        Iterations from one respacing of the nodes to the next.
+        Number of iterations from one respacing of the nodes to the next.
     least_decrease : float
-        Relative decrease of the energy below which an iteration counts as quiet.
+        Relative decrease of the energy up to which an iteration counts as quiet, if no node has
+        moved by more than half of `longest_move` either.
     quiet : int
-        Quiet iterations after which a curve has converged.
+        Number of consecutive quiet iterations after which a curve has converged.
     contact : bool
         Whether strands are kept apart.
     """
@@ -52,10 +54,10 @@ class TogetherConfig:
 
 
 NODES_PER_RADIAN = 1.0
-"""Additional nodes where the normals turn by one radian, as round the edge of a thin part."""
+"""Additional nodes per radian by which the normals turn, as around the edge of a thin part."""
 
 SHORT_MOVE = 1e-3
-"""Distance, in mean distances between nodes, that is too short for respacing."""
+"""Move, in mean distances between nodes, below which respacing leaves a node in place."""
 
 
 def relax_together(
@@ -65,17 +67,18 @@ def relax_together(
     smoothness: float,
     config: TogetherConfig,
 ) -> Nodes:
-    """Relax some curves.
+    """Relax several curves without tracing them.
 
     Parameters
     ----------
     surface : CurveSurface
     nodes : Nodes
-        c curves of n / c nodes.
+        c curves with n / c nodes each.
     fixed : (n,) bool array
-        Nodes that stay, as control points do; the first node of each curve is one of them.
+        Which nodes must not move, such as control points. The first node of each curve must be
+        fixed.
     smoothness : float
-        Divides the tension.
+        Divisor of the tension and of the weight of a map.
     config : TogetherConfig
     """
     size = len(nodes.positions) // nodes.curves
@@ -91,7 +94,7 @@ def relax_together(
         if iteration % config.respacing == 0:
             nodes = _respaced(surface, nodes, fixed)
             pairs = close_pairs(nodes) if config.contact else None
-        # Nodes may coincide where a route could not be laid; that curve then stays as it is.
+        # Nodes may coincide where a route could not be placed; such a curve does not move.
         with np.errstate(over="ignore", invalid="ignore"):
             weights = balance(surface, nodes, smoothness, apart=config.contact)
             contacts = None if pairs is None else contacts_of_pairs(nodes, pairs)
@@ -130,7 +133,7 @@ def relax_together(
 
 
 def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
-    """Some of the curves."""
+    """Some of the curves, by their indices."""
     size = len(nodes.positions) // nodes.curves
     place = (which[:, None] * size + np.arange(size)).ravel()
     return Nodes(
@@ -140,7 +143,7 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
 
 
 def _chosen(one: Nodes, other: Nodes, take: BoolArray) -> Nodes:
-    """The curves of the other nodes where they are taken, (c,)."""
+    """The curves of `other` where `take`, (c,), is true, and those of `one` elsewhere."""
     if take.all():
         return other
     taken = one.spread(take)
@@ -160,7 +163,7 @@ def _chosen(one: Nodes, other: Nodes, take: BoolArray) -> Nodes:
 
 
 def _renumbered(pairs: IntArray, left: IntArray, size: int) -> IntArray:
-    """Pairs of nodes of the curves that are left, by their new numbers."""
+    """The pairs that belong to the remaining curves, with the new indices of their nodes."""
     curve = pairs[:, 0] // size
     place = np.searchsorted(left, curve).clip(max=len(left) - 1)
     kept = left[place] == curve
@@ -168,7 +171,7 @@ def _renumbered(pairs: IntArray, left: IntArray, size: int) -> IntArray:
 
 
 def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
-    """Nodes moved along their curves, so that they are evenly spaced between fixed ones.
+    """Nodes moved along their curves, so that they are evenly spaced between fixed nodes.
 
     They are closer together where the normals turn (`NODES_PER_RADIAN`).
     """
@@ -178,7 +181,8 @@ def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
     turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve
     lengths = nodes.step_lengths + NODES_PER_RADIAN * nodes.spread(mean) * turning
     lengths = nodes.by_curve(lengths)
-    # Weighted arc length over all curves, each with its first node once more at its end.
+    # Weighted arc length over all curves in a row. Each curve is extended by a node at its end: the
+    # first node again if it is closed, the last one if it is open.
     last = np.where(nodes.closed, nodes.first, nodes.last)
     around = np.append(
         np.arange(len(nodes.positions)).reshape(nodes.curves, size), last[:, None], 1

@@ -1,4 +1,4 @@
-"""Contact between strands of a curve: where they are close, and the term that repels them."""
+"""Finds contacts between strands of a curve, for the energy term that repels the strands."""
 
 from __future__ import annotations
 
@@ -16,28 +16,31 @@ CLEARANCE = 2.0
 """Distance between strands, in mean distances between nodes, below which they repel."""
 
 ALONG = 4.0
-"""Least distance along the curve between two nodes of different strands, in clearances."""
+"""Distance along the curve, in clearances, above which two nodes belong to different strands."""
 
 SAME_SIDE = 0.3
-"""Least cosine between two normals; excludes strands on opposite sides of a thin part."""
+"""Cosine between the normals of two nodes above which they may be in contact.
+
+It excludes strands on opposite sides of a thin part.
+"""
 
 
 NEARBY = 2.0
-"""Distance, in clearances, of nodes that are tested for contact again after short moves."""
+"""Distance, in clearances, within which pairs of nodes are kept for tests after short moves."""
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Pairs of close nodes of different strands.
+    """Pairs of close nodes on different strands.
 
     Attributes
     ----------
     pairs : (p, 2) int array
-        Each pair once.
+        Indices of the two nodes; each pair occurs once.
     overlap : (p,) float array
         1 - distance / clearance.
     derivatives : (p, 2) float array
-        Of the overlap by the two nodes' moves along their conormals.
+        Derivatives of the overlap by the moves of the two nodes along their conormals.
     """
 
     pairs: IntArray
@@ -51,16 +54,16 @@ def contacts_between(nodes: Nodes) -> Contacts:
 
 
 def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
-    """Pairs of nodes of a curve, (p, 2), that are close in space and far along the curve.
+    """Pairs of nodes of a curve, (p, 2), that are close in space but far apart along the curve.
 
-    Close are those within a reach, in clearances.
+    Nodes are close if their distance is at most `reach`, in clearances.
     """
     lengths = nodes.by_curve(nodes.step_lengths)
     total = lengths.sum(axis=1)
     clearance = nodes.spread(_clearances(nodes))
     places = nodes.positions / clearance[:, None]
     if nodes.curves > 1:
-        # Another dimension keeps curves apart.
+        # An additional coordinate keeps different curves apart.
         curve = nodes.spread(2.0 * reach * np.arange(nodes.curves))
         places = np.concatenate([places, curve[:, None]], axis=1)
     tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
@@ -73,9 +76,9 @@ def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
 
 
 class NearStrands:
-    """Pairs of nodes of one curve that may be in contact, sought again only after long moves.
+    """Pairs of nodes of one curve that may be in contact, updated only after long moves.
 
-    Where they are sought it is also decided which nodes are far enough apart along the curve.
+    Whether two nodes are far enough apart along the curve is decided only when pairs are updated.
 
     Parameters
     ----------
@@ -86,19 +89,20 @@ class NearStrands:
         self._seek(nodes)
 
     def contacts(self, nodes: Nodes) -> Contacts:
-        """Contacts of the same nodes at other places."""
+        """Contacts between the same nodes at new positions."""
         moved = float(lengths(nodes.positions.T - self._positions.T).max())
         if 2.0 * moved + _clearances(nodes)[0] > self._reach:
             self._seek(nodes)
         return contacts_of_pairs(nodes, self._pairs)
 
     def _seek(self, nodes: Nodes) -> None:
+        """Find the pairs that may come into contact by short moves of these nodes."""
         self._positions, self._reach = nodes.positions, NEARBY * _clearances(nodes)[0]
         self._pairs = close_pairs(nodes, NEARBY)
 
 
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
-    """Those of some pairs that are closer than the clearance, on the same side of the surface."""
+    """Contacts among given pairs: closer than the clearance, on the same side of the surface."""
     ends, size = pairs.T, len(nodes.positions) // nodes.curves
     clearance = _clearances(nodes).take(ends[0] // size)
     one, other = (nodes.positions.take(end, axis=0).T for end in ends)
@@ -119,6 +123,6 @@ def _clearances(nodes: Nodes) -> FloatArray:
     """The clearance of each curve, (c,)."""
     lengths = nodes.by_curve(nodes.step_lengths)
     steps = len(nodes.lengths) if nodes.curves == 1 else lengths.shape[1]
-    # A curve without length has a clearance too.
+    # The clearance is positive even if the curve has no length.
     least = max(tolerances.TINY, tolerances.ROUNDED * float(np.abs(nodes.positions).max()))
     return CLEARANCE * np.maximum(lengths.sum(axis=1) / steps, least)

@@ -1,8 +1,7 @@
-"""Start from the previous curve: its control points move, and nearby nodes move with them.
+"""Moves the control points of a relaxed curve, and nearby nodes with them, as a start.
 
-The shift of a node decreases smoothly with its distance from the control point, so that relaxation
-starts from a curve without a kink. This works for small moves only; for others a new curve is
-designed.
+The move of a node decreases smoothly with its distance from the control point, so that relaxation
+starts from a curve without a kink. This works for small moves only; `start` rejects others.
 """
 
 from __future__ import annotations
@@ -23,35 +22,35 @@ WARM = RelaxationConfig(
     least_decrease=1e-3,
     defer_tracing=True,
 )
-"""Settings of the relaxation: the curve has enough nodes and has nearly converged.
+"""Settings of the relaxation of a curve that has enough nodes and has nearly converged.
 
-Tracing is deferred, so an iteration is one step.
+Since tracing is deferred, an iteration consists of only one step.
 """
 
 LONGEST_MOVE = 0.1
-"""Farthest that a control point may have moved, relative to the curve's length."""
+"""Greatest distance that a control point may have moved, relative to the curve's length."""
 
 TAKEN_ALONG = 4.0
-"""Arc length within which nodes follow a control point, relative to its move."""
+"""Arc length within which nodes move along with a control point, relative to its move."""
 
 
 def moved_along(
     surface: CurveSurface, curve: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
-    """A curve with its control points at new places nearby.
+    """Move the control points of a curve to new places nearby, and nearby nodes with them.
 
     Parameters
     ----------
     surface : CurveSurface
     curve : NodedCurve
-        Simple, and through its control points in order.
+        A simple curve that passes its control points in order.
     controls : SurfacePoints
-        The new places, in the order visited.
+        New places of the control points, in the order visited.
 
     Returns
     -------
     NodedCurve or None
-        Simple; None where the moves are too large for that.
+        A simple curve; None if the moves are too large to give one.
     """
     mesh = surface.mesh
     nodes, at_controls = curve.nodes, curve.control_nodes
@@ -69,7 +68,7 @@ def moved_along(
     still = length == 0.0
     still[going] = False
     places = SurfacePoints(faces, barycentric)
-    # Between nodes that do not move the polyline is kept: a straight trace may fail there.
+    # Between nodes that do not move the polyline is kept, since a straight trace may fail there.
     changed = traced_through(surface, curve, nodes_at(surface, places, curve.closed), still)
     if changed is None or not is_simple(surface, changed):
         return None
@@ -77,7 +76,7 @@ def moved_along(
 
 
 def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray:
-    """Shift of each node by the moves of nearby control points, (n, 3)."""
+    """Shift of each node due to the moves of nearby control points, (n, 3)."""
     total = float(nodes.lengths.sum())
     arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])[: len(nodes.positions)]
     shift = np.zeros((len(arc), 3))

@@ -1,9 +1,9 @@
-"""Cubic Bézier splines along a polyline, with as few knots as keep it within a tolerance.
+"""Fits cubic Bézier splines to a polyline, with as few knots as keep them within a tolerance.
 
-Each leg, from one control point to the next, starts as one cubic; cubics too far from the polyline
-are split, and in the end neighbours are merged where one cubic is enough. Cubics are fitted by the
-method of Schneider (1990): tangents at the knots are given, the lengths of the handles solve a
-least-squares problem, and each point of the polyline then moves to a nearer parameter.
+Each leg, from one control point to the next, starts as one cubic. Cubics too far from the polyline
+are split, and in the end neighbouring cubics are merged where one is enough. Cubics are fitted by
+the method of Schneider (1990): tangents at the knots are given, the lengths of the handles solve a
+least-squares problem, and then each point of the polyline moves to a nearer parameter.
 """
 
 from __future__ import annotations
@@ -18,30 +18,37 @@ from ..geometry.tolerances import TINY
 from .polyline import CORNER, CutPolyline, angles, cut_polyline
 
 SAMPLES = 16
-"""Points of the polyline that each cubic is fitted to, besides its vertices."""
+"""Number of points of the polyline to which each cubic is fitted, besides its vertices."""
 
 ROUNDS = 6
-"""How often handles and parameters are solved for in turn."""
+"""Number of times that handles and parameters are solved for in turn."""
 
 LEAST_HANDLE, GREATEST_HANDLE = 0.01, 0.6
-"""Limits of a handle, in arc lengths of its cubic. Those of an arc of a circle are a third; two
-handles of 0.6 on a straight line still give a cubic that runs forward only."""
+"""Limits on the length of a handle, relative to the arc length of its cubic.
+
+On an arc of a circle the handles are about a third. On a straight line, a cubic with two handles of
+0.6 still runs forward only.
+"""
 
 TANGENT_REACH, TANGENT_REACH_AT_END = 0.4, 0.25
-"""Arc length over which the tangent at a knot is measured, on either side or on one side only, in
-lengths of the shorter cubic there. Less shows the zigzag at mesh edges; one side follows less."""
+"""Arc length over which the tangent at a knot is measured, on either side or on one side only.
+
+The first is relative to the shorter of the two adjacent cubics, the second to the cubic on that
+side. A shorter length would show the zigzag at mesh edges; a fit on one side alone follows the
+curve over less of it.
+"""
 
 TANGENT_SAMPLES = 12
-"""Points on either side of a knot to which its tangent is fitted."""
+"""Number of points on either side of a knot to which its tangent is fitted."""
 
 CORNER_REACH = 4.0
-"""A corner turns within this distance on either side, in tolerances."""
+"""Distance on either side within which the turn of a corner is measured, in tolerances."""
 
 ORDER = 6.0
 """The distance of a fitted cubic from a smooth curve falls with this power of its length."""
 
 MOST_PARTS = 4
-"""Greatest number of parts into which a cubic is split at once."""
+"""Greatest number of parts into which a cubic is split in one round."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ class BezierSpline:
     closed : bool
         Whether the last knot is joined to the first, which is not repeated.
     knots : (m, 3) float array
-        Positions, vertices of the polyline.
+        Positions of the knots, which are vertices of the polyline.
     left, right : (m, 3) float array
         Positions of the handles towards the previous and the next knot. The handle beyond an end
         of an open spline mirrors the other one.
@@ -71,14 +78,15 @@ class BezierSpline:
 def fit_bezier(
     points: FloatArray, closed: bool, control_index: IntArray, tolerance: float
 ) -> BezierSpline:
-    """A Bézier spline along a polyline, with as few knots as keep it within a tolerance.
+    """Fit a Bézier spline to a polyline, with as few knots as keep it within a tolerance.
 
-    Control points, corners and the ends of an open polyline are knots. Both handles and the knot
-    lie on one line, except at corners, where the polyline turns by 30° or more within a few
-    tolerances. Polyline and spline are compared both ways at many places.
+    Control points, corners and the ends of an open polyline are knots. A knot and its two handles
+    lie on one line, except at corners, where the polyline turns by more than 30° within a few
+    tolerances. The distance is measured at many places, from the polyline to the spline and from
+    the spline to the polyline.
 
-    Splitting stops at the vertices of the polyline. A cubic over one segment keeps any tolerance,
-    but with short handles, so the spline bends as sharply there as the polyline.
+    Splitting stops at the vertices of the polyline. A cubic over a single segment keeps any
+    tolerance, but only with short handles, so the spline bends as sharply there as the polyline.
 
     Parameters
     ----------
@@ -86,7 +94,7 @@ def fit_bezier(
     closed : bool
         Whether the last point is joined to the first, which is not repeated.
     control_index : (k,) int array
-        Indices of the control points among the points, in any order; -1 for none.
+        Indices of the control points among the points, in any order; -1 is ignored.
     tolerance : float
         Greatest distance between the spline and the polyline, in units of the points.
     """
@@ -119,31 +127,32 @@ def fit_bezier(
 
 Fits = tuple[FloatArray, FloatArray]
 """Lengths of the handles of s cubics at the start and at the end, (s, 2), and the greatest distance
-of each from its span of the polyline, (s,), infinite where the cubic runs backward."""
+of each cubic from its span of the polyline, (s,), which is infinite where the cubic runs backward.
+"""
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """Least squares for the handles of s cubics to n points, each of one span."""
+    """A least-squares problem: the handles of s cubics, fitted to n points, each on one span."""
 
     ends: tuple[FloatArray, FloatArray]
-    """(s, 3) each."""
+    """(s, 3) each, start and end of each cubic."""
     first: FloatArray
     last: FloatArray
     """(s, 3) unit tangents at the ends, forward."""
     length: FloatArray
     """(s,) arc lengths of the spans."""
     span: IntArray
-    """(n,) ascending."""
+    """(n,) the span of each point, ascending."""
     first_row: IntArray
     """(s,) the first point of each span."""
     weight: FloatArray
-    """(n,)"""
+    """(n,) weights of the points."""
     target: FloatArray
-    """(n, 3)"""
+    """(n, 3) positions of the points."""
 
     def least_squares(self, parameter: FloatArray) -> FloatArray:
-        """Lengths of both handles of each cubic, within limits, (s, 2)."""
+        """Lengths of both handles of each cubic, (s, 2), within their limits."""
         span, first, last = self.span, self.first, self.last
         basis = _bernstein(parameter)
         base = self.target - basis[:, :2].sum(axis=1)[:, None] * self.ends[0][span]
@@ -157,7 +166,7 @@ class _Problem:
         low, high = LEAST_HANDLE * self.length, GREATEST_HANDLE * self.length
         determinant = np.maximum(out_out * back_back - out_back**2, TINY)
         out = np.clip((back_back * out_target - out_back * back_target) / determinant, low, high)
-        for _ in range(2):  # where one is at its limit, the other one is the best for it
+        for _ in range(2):  # where one handle is at its limit, find the best other handle
             back = (back_target - out_back * out) / np.maximum(back_back, TINY)
             back = np.clip(back, low, high)
             out = (out_target - out_back * back) / np.maximum(out_out, TINY)
@@ -165,11 +174,12 @@ class _Problem:
         return np.stack([out, back], axis=1)
 
     def _sums(self, terms: FloatArray) -> FloatArray:
+        """Weighted sums of terms, (n,), over each span, (s,)."""
         return np.add.reduceat(self.weight * terms, self.first_row)
 
 
 class _Fitter:
-    """A polyline and what the fits need of it."""
+    """A polyline with the data that fits require, and the fits of cubics to its spans."""
 
     def __init__(self, line: CutPolyline, tolerance: float) -> None:
         self.line = line
@@ -181,17 +191,17 @@ class _Fitter:
         if not line.closed:
             self.sharp[ends] = True
         self.fixed = np.union1d(line.bounds, np.flatnonzero(self.corner))
-        if line.closed and len(self.fixed) == 2:  # one cubic would start where it ends
+        if line.closed and len(self.fixed) == 2:  # one cubic would end where it starts
             halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
             self.fixed = np.union1d(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
 
     def _corners(self) -> BoolArray:
-        """Where the polyline turns sharply: (n,), one vertex at each place."""
+        """Which vertices are corners, (n,): one vertex at each place of a sharp turn."""
         reach, arc = CORNER_REACH * self.tolerance, self.line.arc
         corner = self.turn > CORNER
         found = np.zeros(len(arc), dtype=bool)
         at = np.flatnonzero(corner)
-        # Vertices close to one another see the same turn; the one with most of it counts.
+        # The same turn is measured at vertices close together; it counts where it is greatest.
         for group in np.split(at, np.flatnonzero(np.diff(arc[at]) > reach) + 1):
             if len(group):
                 found[group[self.turn[group].argmax()]] = True
@@ -200,7 +210,7 @@ class _Fitter:
         return found
 
     def tangents(self, knots: IntArray) -> FloatArray:
-        """Unit tangents, forward, before and after k knots, (2, k, 3); they differ at corners only.
+        """Forward unit tangents before and after k knots, (2, k, 3); they differ only at corners.
 
         They are measured over a part of the spans next to each knot.
         """
@@ -217,7 +227,7 @@ class _Fitter:
         return np.stack([_unit(before, after), _unit(after, before)])
 
     def _two_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
-        """Directions of cubics through points at arc lengths, fitted to both sides."""
+        """Tangent directions at arc lengths, from cubics fitted to the polyline on both sides."""
         share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
         weights = np.linalg.pinv(np.stack([share, share**3], axis=1))[0]
         at, steps = arc[:, None], share * reach[:, None]
@@ -225,7 +235,7 @@ class _Fitter:
         return np.einsum("s,ksd->kd", weights, chords)
 
     def _one_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
-        """Directions of cubics from points at arc lengths, fitted to one side."""
+        """Tangent directions at arc lengths, from cubics fitted on the side of `reach`."""
         share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
         weights = np.linalg.pinv(np.stack([share, share**2, share**3], axis=1))[0]
         chords = self.line.positions(arc[:, None] + share * reach[:, None])
@@ -237,9 +247,9 @@ class _Fitter:
         Parameters
         ----------
         start, end : (s,) int array
-            Vertices of the polyline.
+            Vertices of the polyline at which the spans start and end.
         first, last : (s, 3) float array
-            Unit tangents there, forward.
+            Forward unit tangents at these vertices.
         """
         handles, deviation = self._fit(start, end, first, last, None)
         far = np.flatnonzero(deviation > self.tolerance)
@@ -254,15 +264,15 @@ class _Fitter:
     def _short_handles(
         self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray
     ) -> FloatArray:
-        """Handles (s, 2) with which cubics stay within the tolerance of their chords.
+        """Handle lengths, (s, 2), with which cubics stay within the tolerance of their chords.
 
-        At a weak corner the tangent is between the directions of both sides. Least squares come
-        only slowly to the short handles that a straight side then needs.
+        At a weak corner the tangent lies between the directions of both sides. A straight side then
+        needs short handles, to which least squares converge only slowly.
         """
         chord = self.line.points[end] - self.line.points[start]
         length = np.linalg.norm(chord, axis=1)[:, None]
         turn = np.stack([angles(first, chord), angles(chord, last)], axis=1)
-        # The two handles move a cubic by three quarters of their distance from the chord at most.
+        # The two handles move a cubic by at most three quarters of their distance from the chord.
         sine = np.sin(np.minimum(turn, np.pi / 2.0))
         return np.minimum(length / 3.0, self.tolerance / np.maximum(sine, TINY))
 
@@ -274,13 +284,13 @@ class _Fitter:
         last: FloatArray,
         handles: FloatArray | None,
     ) -> Fits:
-        """Fit cubics with handles of given lengths (s, 2), or by least squares."""
+        """Fit cubics with handles of given lengths, (s, 2), or by least squares if None."""
         span, arc, first_row = self._data(start, end)
         target = self.line.positions(arc)
         length = self.line.arc[end] - self.line.arc[start]
         ends = self.line.points[start], self.line.points[end]
         parameter = (arc - self.line.arc[start][span]) / length[span]
-        # Of points along the polyline, not of its vertices, which may be close together.
+        # Points are weighted by arc length, since vertices may be close together.
         problem = _Problem(ends, first, last, length, span, first_row, np.gradient(arc), target)
         for number in range(ROUNDS):
             lengths = problem.least_squares(parameter) if handles is None else handles
@@ -292,12 +302,12 @@ class _Fitter:
         parameter[first_row] = 0.0
         parameter[np.append(first_row[1:], len(arc)) - 1] = 1.0
         deviation = _deviations(cubic, span, parameter, target, first_row)
-        # A cubic over one segment cannot be split, and its handles are short if need be.
+        # A cubic over one segment cannot be split; if necessary, its handles are short.
         deviation[_turns_back(cubic, first, last) & (end - start > 1)] = np.inf
         return lengths, deviation
 
     def _data(self, start: IntArray, end: IntArray) -> tuple[IntArray, FloatArray, IntArray]:
-        """Points on spans: the span and arc length of each, and the first one of each span."""
+        """Points on spans: span and arc length of each point, and the first point of each span."""
         counts = end - start + 1
         span = np.repeat(np.arange(len(start)), counts)
         vertex = start[span] + np.arange(len(span)) - (np.cumsum(counts) - counts)[span]
@@ -311,13 +321,13 @@ class _Fitter:
         return span[order], arc[order], np.cumsum(counts) - counts
 
     def splits(self, start: IntArray, end: IntArray, deviation: FloatArray) -> IntArray:
-        """Vertices at which to split spans (s,) that are too far from the polyline."""
+        """Vertices at which to split spans, (s,), whose cubics are too far from the polyline."""
         arc, tolerance = self.line.arc, self.tolerance
         length = arc[end] - arc[start]
         spans = zip(start.tolist(), end.tolist(), strict=True)
         sharpest = np.array([a + 1 + self.turn[a + 1 : b].argmax() for a, b in spans])
         turn, reach = self.turn[sharpest], length / 8.0
-        # Most of the turn there is at one vertex, and no smooth cubic passes it.
+        # Most of the turn is at one vertex, so no smooth cubic fits there.
         kink = turn > 0.5 * self.line.turns(arc[sharpest], reach)
         kink &= turn * reach > 0.5 * tolerance
         parts = np.ceil(np.minimum(deviation / tolerance, MOST_PARTS**ORDER) ** (1.0 / ORDER))
@@ -334,7 +344,8 @@ class _Fitter:
 def _split(fitter: _Fitter) -> IntArray:
     """Knots between which every cubic keeps the tolerance or has no vertex to split at."""
     knots, count = fitter.fixed, len(fitter.line.arc)
-    # By the start of a cubic that is good: its end, and its tangents, which later knots may change.
+    # For the start of each cubic that keeps the tolerance: its end, and its tangents, which later
+    # knots may change.
     known_end, known = np.full(count, -1), np.zeros((count, 2, 3))
     while True:
         before, after = fitter.tangents(knots)
@@ -351,7 +362,7 @@ def _split(fitter: _Fitter) -> IntArray:
 
 
 def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Remove knots where one cubic is enough; the tangents at the others stay."""
+    """Remove knots where one cubic is enough, keeping the tangents at the remaining knots."""
     tangents = fitter.tangents(knots)
     untested = ~np.isin(knots, fitter.fixed)
     while untested.any():
@@ -360,7 +371,8 @@ def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, Floa
         _, found = fitter.fit(knots[at - 1], knots[at + 1], after[at - 1], before[at + 1])
         deviation = np.full(len(knots), np.inf)
         deviation[at] = np.where(found <= fitter.tolerance, found, np.inf)
-        # Of neighbours, only the better one: the other's spans are no longer the same.
+        # Of two neighbouring knots only the better one is removed, as this changes the spans at the
+        # other one.
         removed = np.isfinite(deviation)
         removed[1:] &= deviation[1:] < deviation[:-1]
         removed[:-1] &= deviation[:-1] <= deviation[1:]
@@ -375,7 +387,7 @@ def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, Floa
 
 
 def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
-    """A polyline without steps of length zero, and the index there of each of its points."""
+    """The polyline without steps of length zero, and the new index of each of its points."""
     moves = np.concatenate([[True], np.diff(line.arc) > 0.0])
     kept = np.cumsum(moves) - 1
     points = line.points[moves].copy()
@@ -386,30 +398,30 @@ def _without_repeats(line: CutPolyline) -> tuple[CutPolyline, IntArray]:
 
 
 def _unit(vectors: FloatArray, others: FloatArray) -> FloatArray:
-    """Unit vectors; where a vector is zero, that of the other one or any."""
+    """Unit vectors; where a vector is zero, that of the other, or the x axis if both are zero."""
     vectors = np.where((vectors == 0.0).all(axis=1, keepdims=True), others, vectors)
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 0.0, vectors / np.maximum(length, TINY), [1.0, 0.0, 0.0])
 
 
 def _bernstein(parameter: FloatArray) -> FloatArray:
-    """Cubic Bernstein polynomials at parameters (n,), shape (n, 4)."""
+    """Cubic Bernstein polynomials at parameters, (n,), shape (n, 4)."""
     t, u = parameter, 1.0 - parameter
     return np.stack([u**3, 3.0 * u * u * t, 3.0 * u * t * t, t**3], axis=1)
 
 
 def _at(cubic: FloatArray, span: IntArray, parameter: FloatArray) -> FloatArray:
-    """Points of cubics (s, 4, 3), each on one span, shape (n, 3)."""
+    """Points of cubics, (s, 4, 3), at parameters, each on a given span, shape (n, 3)."""
     return np.einsum("nb,nbd->nd", _bernstein(parameter), cubic[span])
 
 
 def _parameters_at(cubic: FloatArray, span: IntArray, share: FloatArray) -> FloatArray:
-    """Parameters at which shares of the lengths of cubics are reached, (n,)."""
+    """Parameters at which cubics reach given shares of their lengths, (n,)."""
     parameter = np.linspace(0.0, 1.0, SAMPLES + 1)
     places = np.einsum("tb,sbd->std", _bernstein(parameter), cubic)
     reached = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
     reached /= np.maximum(reached[:, -1:], TINY)
-    # All in one table: the whole part of a key is the number of the cubic.
+    # One table for all cubics: the integer part of a key is the index of the cubic.
     number = np.arange(len(cubic))[:, None]
     keys = np.concatenate([number, number + reached], axis=1).ravel()
     values = (number + parameter).ravel()
@@ -419,7 +431,10 @@ def _parameters_at(cubic: FloatArray, span: IntArray, share: FloatArray) -> Floa
 def _nearer(
     cubic: FloatArray, span: IntArray, parameter: FloatArray, target: FloatArray
 ) -> FloatArray:
-    """Parameters after a step of Newton's method towards the nearest points of the cubics."""
+    """Parameters after a Gauss–Newton step towards the nearest points of the cubics.
+
+    A parameter whose point does not come nearer stays the same.
+    """
     t, u = parameter[:, None], 1.0 - parameter[:, None]
     step = 3.0 * np.diff(cubic, axis=1)[span]
     slope = u * u * step[:, 0] + 2.0 * u * t * step[:, 1] + t * t * step[:, 2]
@@ -439,8 +454,9 @@ def _deviations(
 ) -> FloatArray:
     """Greatest distance between each cubic and its part of the polyline, (s,).
 
-    All vertices are among the targets, so the polyline is straight from one to the next. Their
-    parameters begin with 0 and end with 1, so the parts of the cubic between them cover it.
+    All vertices are among the targets, so the polyline is straight from one target to the next. The
+    parameters of the targets begin with 0 and end with 1, so the parts between them cover the whole
+    cubic.
     """
     distance = np.linalg.norm(target - _at(cubic, span, parameter), axis=1)
     middle = _at(cubic, span[:-1], 0.5 * (parameter[:-1] + parameter[1:]))
@@ -453,7 +469,7 @@ def _deviations(
 def _turns_back(cubic: FloatArray, first: FloatArray, last: FloatArray) -> BoolArray:
     """Whether no direction leads forward along the whole control polygon, (s,).
 
-    If one does, it leads forward along the whole cubic, which has no loop or cusp then.
+    If a direction does, it leads forward along the whole cubic, which then has no loop or cusp.
     """
     middle = _unit(cubic[:, 2] - cubic[:, 1], first)
     forward = first + middle + last

@@ -1,8 +1,8 @@
-"""Evenly spaced points on a curve, as few as keep it within a tolerance.
+"""Computes evenly spaced points on a curve, as few as keep it within a tolerance.
 
-Each leg, from one control point to the next, is divided evenly by arc length. At corners even
-spacing alone would need very many points, so a corner becomes a point too (an anchor), and the
-pieces between anchors are divided evenly.
+Each leg, from one control point to the next, is divided evenly by arc length. At corners, even
+spacing alone would need very many points. So corners become points too (anchors), and the pieces
+between anchors are divided evenly.
 """
 
 from __future__ import annotations
@@ -20,28 +20,31 @@ from ..geometry.surface_points import weights_at
 from .polyline import CutPolyline, cut_polyline
 
 SHORTEST = 0.5
-"""Least segment of a leg, in mean segments of that leg."""
+"""Least length of a segment, relative to the mean segment of its leg."""
 
 NEIGHBOURS = 2.0
 """Greatest ratio of the spacings of neighbouring legs."""
 
 MOST = 8
-"""Greatest number of segments of a leg, in segments that it had."""
+"""Greatest number of segments of a leg, relative to the number that it had."""
 
 MOST_OF_A_SHORT_LEG = 64
-"""That number, where a leg had so few segments that `MOST` would give less."""
+"""Greatest number of segments of a leg that had so few that `MOST` would allow fewer than this."""
 
 ANCHOR_GAP = 0.7
-"""Least arc length between anchors, in spacings. Spacings of the pieces vary from this to 1.5."""
+"""Least arc length between anchors, in spacings.
+
+The spacings of the pieces between them vary from this to 1.5.
+"""
 
 NEAR, FAR = 1.0 / 8.0, 1.0 / 2.0
-"""A turn within `NEAR` spacings that is more than half of that within `FAR` is a corner."""
+"""A corner turns within `NEAR` spacings by more than half of its turn within `FAR` spacings."""
 
 ANCHOR_ROUNDS = 4
-"""How often anchors are added for one spacing."""
+"""Number of times that anchors are added for one spacing."""
 
 CLOSE_COUNT = 1.05
-"""Two numbers of segments with a ratio up to this are not told apart in the search."""
+"""Ratio of two numbers of segments up to which the search does not distinguish them."""
 
 NO_ANCHORS: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -82,7 +85,7 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     mesh : Mesh
     curve : SurfaceCurve
     tolerance : float
-        Greatest distance between both curves, in mesh units.
+        Greatest distance between the two curves, in mesh units.
 
     Raises
     ------
@@ -109,19 +112,22 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
 def even_places(
     points: FloatArray, closed: bool, control_index: IntArray, tolerance: float
 ) -> tuple[IntArray, FloatArray, IntArray]:
-    """Evenly spaced places on a polyline, as few as keep it within a tolerance.
+    """Find evenly spaced places on a polyline, as few as keep it within a tolerance.
 
     Control points, the ends of an open polyline, and most corners are among the places. No segment
     of a leg is shorter than half the mean segment of that leg. The spacings of neighbouring legs
-    differ at most by a factor of 2, unless a leg has only one segment or too many (see below).
+    differ by at most a factor of 2, unless one of them has only one segment or the coarser one
+    cannot be divided more finely (see below).
 
-    Every vertex of the old polyline is within the tolerance of the chord over it, so every point
-    is. The old line runs from one end of a chord to the other, so every point of the chord is the
-    nearest one for some point of the old line: the new polyline is within the tolerance too.
+    Every vertex of the old polyline is within the tolerance of the chord that spans it, so every
+    point of the old polyline is. The old polyline runs from one end of a chord to the other, so
+    every point of the chord is the nearest point of the chord for some point of the old polyline.
+    So the new polyline is within the tolerance of the old one too.
 
-    A leg has at most eight times as many segments as before, or 64. Where this is not enough,
-    because the polyline turns sharply at places too close to each other or to a control point, the
-    tried division with the least distance is taken, and the distance exceeds the tolerance.
+    A leg has at most eight times as many segments as before, or 64 if this is more. Where that is
+    not enough, because the polyline turns sharply at places too close to each other or to a control
+    point, the closest of the divisions that were tried is taken, and its distance exceeds the
+    tolerance.
 
     Parameters
     ----------
@@ -129,24 +135,24 @@ def even_places(
     closed : bool
         Whether the last point is joined to the first, which is not repeated.
     control_index : (k,) int array
-        Indices of the control points among the points, in any order; -1 for none.
+        Indices of the control points among the points, in any order; -1 is ignored.
     tolerance : float
-        Greatest distance between both polylines, in units of the points.
+        Greatest distance between the two polylines, in units of the points.
 
     Returns
     -------
     segment : (m,) int array
-        Segment i goes from point i to the next one. The end of an open polyline has the index of
-        the last point.
+        Segment on which each place lies; segment i goes from point i to the next point. The end of
+        an open polyline has the index of the last point.
     share : (m,) float array
-        In [0, 1), along that segment. Zero at control points.
+        Position along that segment, in [0, 1); zero at control points.
     control_index : (k,) int array
         The index of each control point among the places; -1 where it was -1.
     """
     control_index = np.asarray(control_index, dtype=np.int64)
     line = cut_polyline(points, closed, control_index)
     legs = [_Leg(line, *ends) for ends in zip(line.bounds[:-1], line.bounds[1:], strict=True)]
-    # A closed polyline has three points at least.
+    # A closed polyline has at least three points.
     fewest = max(1, 4 - len(legs)) if closed and len(legs) < 3 else 1
     divisions = [
         _divide(leg, fewest, tolerance) or _spread(leg, NO_ANCHORS, leg.length / fewest)
@@ -184,7 +190,7 @@ class _Division:
     at: FloatArray
     """(count + 1,) arc lengths, ascending."""
     vertex: IntArray
-    """(count + 1,) the vertex of the leg at an end or anchor, or -1."""
+    """(count + 1,) the vertex of the leg at each end or anchor, -1 elsewhere."""
 
     @property
     def count(self) -> int:
@@ -195,12 +201,12 @@ class _Division:
         return self.leg.length / self.count
 
     def on_line(self, line: CutPolyline) -> FloatArray:
-        """Segments of the line and shares, (2, count), without the end of the leg."""
+        """Segments of the line and shares along them, (2, count), without the end of the leg."""
         arc, at, vertex = self.leg.arc, self.at[:-1], self.vertex[:-1]
         segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(arc) - 2)
         width = arc[segment + 1] - arc[segment]
         share = np.divide(at - arc[segment], width, out=np.zeros(len(at)), where=width > 0.0)
-        # Rounding might give a share of 1, which is the next vertex.
+        # Rounding may give a share of 1; that place is the next vertex.
         over = share >= 1.0
         segment, share = np.where(over, segment + 1, segment), np.where(over, 0.0, share)
         anchored = vertex >= 0
@@ -209,7 +215,7 @@ class _Division:
 
     @cached_property
     def deviations(self) -> tuple[FloatArray, IntArray]:
-        """The greatest distance of the leg from each chord, and its vertex there, (count,) each."""
+        """Greatest distance of the leg from each chord, and the vertex there, (count,) each."""
         arc, places = self.leg.arc, self.leg.alone.positions(self.at)
         span = np.clip(np.searchsorted(self.at, arc, side="right") - 1, 0, self.count - 1)
         distance = distance_to_segments(self.leg.points, places[span], places[span + 1])
@@ -229,9 +235,9 @@ class _Division:
 
 
 def _divide(leg: _Leg, fewest: int, tolerance: float) -> _Division | None:
-    """The division of a leg with the fewest segments that keeps the tolerance, or the nearest.
+    """The division of a leg with the fewest segments that keeps the tolerance.
 
-    None if each division has a segment that is too short.
+    If no division keeps it, the closest one; None if each of them has a segment that is too short.
     """
     count, failed = fewest, fewest - 1
     nearest: _Division | None = None
@@ -255,7 +261,10 @@ def _divide(leg: _Leg, fewest: int, tolerance: float) -> _Division | None:
 
 
 def _anchored(leg: _Leg, count: int, tolerance: float) -> _Division | None:
-    """A leg in about `count` segments, with anchors at corners; None if one would be too short."""
+    """Divide a leg into about `count` segments, with anchors at corners.
+
+    None if a segment would be too short.
+    """
     anchors = NO_ANCHORS
     spacing = leg.length / count
     division = _spread(leg, anchors, spacing)
@@ -274,7 +283,7 @@ def _anchored(leg: _Leg, count: int, tolerance: float) -> _Division | None:
 
 
 def _spread(leg: _Leg, anchors: IntArray, spacing: float) -> _Division:
-    """Divide the pieces of a leg between anchors evenly."""
+    """Evenly divide the pieces of a leg between its anchors."""
     ends = np.concatenate([[0], anchors, [len(leg.arc) - 1]])
     pieces = np.diff(leg.arc[ends])
     counts = np.ones(len(pieces), dtype=np.int64)
@@ -288,17 +297,17 @@ def _spread(leg: _Leg, anchors: IntArray, spacing: float) -> _Division:
 
 
 def _are_corners(leg: _Leg, vertex: IntArray, spacing: float, tolerance: float) -> BoolArray:
-    """Whether the polyline turns sharply at vertices, seen from a distance of one spacing."""
+    """Whether the polyline turns sharply at vertices, on the scale of one spacing."""
     near = leg.alone.turns(leg.arc[vertex], NEAR * spacing)
     far = leg.alone.turns(leg.arc[vertex], FAR * spacing)
-    # A corner amid a chord deviates by a quarter of the spacing times its turn.
+    # A corner in the middle of a chord deviates by a quarter of the spacing times its turn.
     return (near > 0.5 * far) & (near * spacing / 4.0 > 0.5 * tolerance)
 
 
 def _far_apart(
     leg: _Leg, corners: IntArray, anchors: IntArray, strength: FloatArray, gap: float
 ) -> IntArray:
-    """Those corners that are a gap apart from anchors, the ends and stronger corners."""
+    """The corners that are at least a gap away from anchors, the ends and stronger corners."""
     taken = leg.arc[np.concatenate([[0], anchors, [len(leg.arc) - 1]])]
     after = np.clip(np.searchsorted(taken, leg.arc[corners]), 1, len(taken) - 1)
     at = leg.arc[corners]
@@ -314,7 +323,7 @@ def _far_apart(
 def _without_short_segments(
     leg: _Leg, division: _Division, anchors: IntArray, spacing: float
 ) -> _Division | None:
-    """Give up anchors until no segment is too short; None if there is one without anchors too."""
+    """Remove anchors until no segment is too short; None if one is even without anchors."""
     for number in range(ANCHOR_ROUNDS + 1):
         chords = division.chords()
         short = chords < SHORTEST * chords.mean()
@@ -322,7 +331,7 @@ def _without_short_segments(
             return division
         if len(anchors) == 0:
             break
-        # The nearest anchor on either side of each short segment; in the end all of them.
+        # Remove the nearest anchor on either side of each short segment; in the end, all anchors.
         ends = np.concatenate([[0], anchors, [len(leg.arc) - 1]])
         piece = np.searchsorted(leg.arc[ends], division.at[:-1][short], side="right") - 1
         sides = np.concatenate([ends[piece], ends[np.minimum(piece + 1, len(ends) - 1)]])
@@ -334,12 +343,12 @@ def _without_short_segments(
 def _limit_ratios(
     legs: list[_Leg], divisions: list[_Division], closed: bool, tolerance: float
 ) -> None:
-    """Divide legs again whose spacing is too great next to that of a neighbour."""
+    """Divide legs more finely if their spacing is too great compared with that of a neighbour."""
     number = len(legs)
     pairs = [(i, i + 1) for i in range(number - 1)] + ([(number - 1, 0)] if closed else [])
     pairs += [(j, i) for i, j in pairs]
-    # A spacing becomes at least that of the finer neighbour, so the least one stays, and the
-    # number of rounds is limited; a leg of one segment says nothing about the spacing.
+    # A new spacing is at least that of the finer neighbour, so the least spacing does not change,
+    # and the number of rounds is bounded. A leg of one segment sets no limit to its neighbours.
     changed = number > 1
     while changed:
         changed = False
@@ -349,7 +358,7 @@ def _limit_ratios(
                 continue
             fewest = min(int(np.ceil(leg.length / limit)), leg.most)
             new = _divide(leg, fewest, tolerance) if fewest > old.count else None
-            # The tolerance comes before the ratio.
+            # The tolerance takes precedence over the ratio.
             if new is None or new.deviation > max(old.deviation, tolerance):
                 continue
             if new.count > old.count:

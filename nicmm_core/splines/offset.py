@@ -1,4 +1,4 @@
-"""Points at a distance above the surface."""
+"""Computes points at a given height above the surface."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from ..geometry.normals import vertex_normals
 from ..geometry.surface_points import SurfacePoints
 
 VANISHING = 1e-6
-"""Length of an interpolated normal up to which the normals at the corners cancel."""
+"""Length of an interpolated normal up to which the normals at the corners count as cancelling."""
 
 
 def lifted(mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float) -> FloatArray:
     """Positions of points of a mesh, moved along its normals.
 
-    The normals at the vertices, weighted by angle, are interpolated in the face and scaled to unit
-    length. Where they cancel, the normal of the face counts; where the face has no area either,
-    the point stays where it is.
+    The angle-weighted vertex normals are interpolated in the face and scaled to unit length. Where
+    they cancel, the face normal is used instead; if the face has no area either, the point stays
+    where it is.
 
     Parameters
     ----------
     mesh : Mesh
     faces : (n,) int array
+        The face in which each point lies.
     barycentric : (n, 3) float array
         Coordinates in these faces.
     height : float

@@ -1,4 +1,4 @@
-"""A polyline in the form that both clean versions need: cut at its control points."""
+"""Cuts a polyline at its control points, as both clean versions of a curve require."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 
 CORNER = np.radians(30.0)
-"""Turn at one place from which a polyline has a corner there, in radians."""
+"""Turn at one place, in radians, above which a polyline has a corner there."""
 
 
 @dataclass(frozen=True)
 class CutPolyline:
-    """A polyline that starts at a control point, if it has one.
+    """A polyline divided into legs. A closed one starts at a control point, if it has any.
 
     Attributes
     ----------
     points : (n, 3) float array
-        Positions; of a closed polyline the first one is repeated at the end.
+        Positions. A closed polyline has its first point again at the end.
     arc : (n,) float array
         Arc length from the start.
     closed : bool
     vertex : (n,) int array
-        Index of each point among the points given.
+        Index of each point among the original points.
     bounds : (b,) int array
-        Where the legs begin and end, ascending: the control points, the first point and the last.
+        Indices of the points at which legs begin or end, ascending: the control points, the first
+        point and the last.
     """
 
     points: FloatArray
@@ -38,7 +39,7 @@ class CutPolyline:
     def positions(self, at: FloatArray) -> FloatArray:
         """Positions at arc lengths of any shape (...), shape (..., 3).
 
-        A closed polyline goes round; an open one stays at its ends.
+        On a closed polyline arc lengths wrap around; on an open one they are clamped to its ends.
         """
         if self.closed:
             at = np.mod(at, self.arc[-1])
@@ -46,13 +47,13 @@ class CutPolyline:
         return np.stack(axes, axis=-1)
 
     def turns(self, at: FloatArray, reach: FloatArray | float) -> FloatArray:
-        """Angles between the chords from `reach` before each arc length and to `reach` after it.
+        """Angles at arc lengths between the chord over `reach` before and that over `reach` after.
 
         Parameters
         ----------
         at : (k,) float array
         reach : (k,) float array or float
-            A length. At a corner the angle does not depend on it; on a smooth curve it is
+            Arc length. At a corner the angle does not depend on it; on a smooth curve the angle is
             proportional to it.
 
         Returns
@@ -66,13 +67,13 @@ class CutPolyline:
 
 
 def angles(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Angles between pairs of vectors (k, 3), in radians, shape (k,); 0 where one is zero."""
+    """Angles between pairs of vectors, (k, 3), in radians, (k,); 0 where a vector is zero."""
     sine = np.linalg.norm(np.cross(first, second), axis=1)
     return np.arctan2(sine, (first * second).sum(axis=1))
 
 
 def cut_polyline(points: FloatArray, closed: bool, control_index: IntArray) -> CutPolyline:
-    """A polyline cut at its control points.
+    """Cut a polyline at its control points.
 
     Parameters
     ----------
@@ -80,8 +81,9 @@ def cut_polyline(points: FloatArray, closed: bool, control_index: IntArray) -> C
     closed : bool
         Whether the last point is joined to the first, which is not repeated.
     control_index : (k,) int array
-        Indices of the control points among the points, in any order; -1 for none. A closed
-        polyline without any is cut at its sharpest corner, or at its first point if it has none.
+        Indices of the control points among the points, in any order; -1 is ignored. A closed
+        polyline without control points is cut at its sharpest corner, or at its first point if it
+        has no corner.
     """
     controls = np.unique(control_index[control_index >= 0])
     n = len(points)
@@ -102,5 +104,5 @@ def _sharpest(points: FloatArray) -> int:
     """The sharpest corner of a closed polyline, or 0 if it has no corner."""
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     turn = angles(before, after)
-    # Between corners that differ by rounding, the first one.
+    # Of corners that differ only by rounding, the first one.
     return int((turn >= turn.max() - 1e-9).argmax()) if turn.max() > CORNER else 0
