@@ -18,10 +18,10 @@ from .operators import (
     live_update,
     long_solves,
     maps,
-    turns,
+    time_slices,
     update_curves,
 )
-from .scene import designers, shown_surfaces
+from .scene import designers, surface_cache
 from .tool import (
     draw_operator,
     edit_operator,
@@ -35,8 +35,8 @@ from .tool import (
 MODULES = (
     preferences,
     settings,
-    shown_surfaces,
-    turns,
+    surface_cache,
+    time_slices,
     design_curve,
     convert_curve,
     update_curves,

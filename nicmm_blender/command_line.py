@@ -89,14 +89,16 @@ def _points(options: argparse.Namespace) -> dict:
 
 def parser() -> argparse.ArgumentParser:
     """The argument parser of the command."""
-    made = argparse.ArgumentParser(
+    command_parser = argparse.ArgumentParser(
         prog=f"blender -c {COMMAND}",
         description="Draw a smooth curve on a mesh of a Blender file and write another file.",
     )
-    made.add_argument("--file", required=True, metavar="IN.blend")
-    made.add_argument("--output-file", required=True, metavar="OUT.blend")
-    made.add_argument("--object", metavar="NAME", help="default: the active object of the file")
-    points = made.add_argument_group(
+    command_parser.add_argument("--file", required=True, metavar="IN.blend")
+    command_parser.add_argument("--output-file", required=True, metavar="OUT.blend")
+    command_parser.add_argument(
+        "--object", metavar="NAME", help="default: the active object of the file"
+    )
+    points = command_parser.add_argument_group(
         "control points", "By default, the vertices that are selected in the file."
     ).add_mutually_exclusive_group()
     points.add_argument("--group", metavar="NAME", help="the vertices of a vertex group")
@@ -106,10 +108,10 @@ def parser() -> argparse.ArgumentParser:
         help='vertex indices from 0, or positions in local space: "0.5 0 1, 0 0 2, 41"',
     )
     described = bpy.ops.nicmm.design_curve.get_rna_type().properties
-    options = made.add_argument_group("settings", "The same as in the sidebar.")
+    options = command_parser.add_argument_group("settings", "The same as in the sidebar.")
     for name in settings.PROPERTY_NAMES:
         options.add_argument(f"--{name.replace('_', '-')}", dest=name, **_option(described[name]))
-    return made
+    return command_parser
 
 
 def _option(described) -> dict:

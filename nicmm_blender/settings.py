@@ -82,7 +82,9 @@ class EditingProperties:
 
     __annotations__ = (
         properties_of(
-            option for option in OPTIONS if option.name not in (*curve_record.OF_A_DESIGN, "method")
+            option
+            for option in OPTIONS
+            if option.name not in (*curve_record.NEW_CURVE_OPTIONS, "method")
         )
         | SURFACE
     )

@@ -8,7 +8,7 @@ from .. import settings
 from ..outputs import curve_object, writing
 from ..scene import curve_record, mesh_data
 from . import polls
-from .long_solves import reporting
+from .long_solves import with_error_reports
 
 
 class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
@@ -38,22 +38,22 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         return self.execute(context)
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         original = context.active_object
         name = original.name
-        mesh_object = curve_record.present_mesh(context, original)
+        mesh_object = curve_record.mesh_in_view_layer(context, original)
         mesh_data.synchronise(mesh_object)
         surface = curve_record.surface_of(original, mesh_object)
-        curves = curve_record.recall(original, surface)
-        asked = curve_record.asked_of(original)
-        made = writing.apply(context, mesh_object, surface, curves, self, asked)
+        curves = curve_record.read_curves(original, surface)
+        curve_settings = curve_record.settings_of(original)
+        summary = writing.apply(context, mesh_object, surface, curves, self, curve_settings)
         if not self.keep_original:
             curve_object.remove(original)
         if self.output not in writing.SEPARATE:
             curve_object.select_only(context, mesh_object)
-        self.report({"INFO"}, f"{name}: {made}")
+        self.report({"INFO"}, f"{name}: {summary}")
         return {"FINISHED"}
 
 

@@ -13,7 +13,7 @@ from bpy.props import PointerProperty
 
 from .. import settings
 from ..outputs import curve_object, edited_curve, sticky_curves, writing
-from ..scene import curve_record, shown_surfaces
+from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError
 from .long_solves import answer_all
 
@@ -38,7 +38,7 @@ def _read(group, name: str, default):
         if name in DRAWING:
             drawn = curve_record.drawn_as(curve)
             return default if drawn is None else drawn[name]
-        return getattr(curve_record.asked_of(curve), name)
+        return getattr(curve_record.settings_of(curve), name)
     except InputError:
         return default
 
@@ -64,18 +64,18 @@ def _change(curve, name: str, value) -> None:
         writing.check_replaceable(curve)
         _set_radius(context, curve, value)
         return
-    asked = curve_record.asked_of(curve)
+    curve_settings = curve_record.settings_of(curve)
     if name in DRAWING:
-        opened = edited_curve.opened(context, curve)
+        opened = edited_curve.open_curve(context, curve)
         drawn = curve_record.drawn_as(curve) or {"spline": "EXACT", "offset": 0.0}
-        curves = curve_record.recall(curve, opened.surface) if _has_curve(curve) else []
-        record = curve[curve_record.KEY]
+        curves = curve_record.read_curves(curve, opened.surface) if _has_curve(curve) else []
+        record = curve[curve_record.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         writing.redraw(curve, opened.surface, curves)
-        shown_surfaces.note_change()
+        surface_cache.note_change()
         return
-    wanted = replace(asked, **{name: value})
-    opened = edited_curve.opened(context, curve, wanted, keeps_course=True)
+    wanted = replace(curve_settings, **{name: value})
+    opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)
     curves = edited_curve.curves_of(answer_all(requests, lambda _fraction, _points: True))
     edited_curve.write(context, opened, opened.points, curves, None)
@@ -90,24 +90,24 @@ def _get_radius(group) -> float:
     mesh_object = curve_record.mesh_of(curve) if curve_record.has_record(curve) else None
     if mesh_object is None:
         return 0.0
-    return _own_radius(curve) * curve_object.scale_in_scene(curve, mesh_object)
+    return _radius_in_object_space(curve) * curve_object.scale_in_scene(curve, mesh_object)
 
 
-def _own_radius(curve) -> float:
+def _radius_in_object_space(curve) -> float:
     if curve.type == "CURVES":
         return sticky_curves.radius_of(curve.data)
     return curve.data.bevel_depth
 
 
 def _set_radius(context, curve, value: float) -> None:
-    mesh_object = curve_record.present_mesh(context, curve)
+    mesh_object = curve_record.mesh_in_view_layer(context, curve)
     radius = value / curve_object.scale_in_scene(curve, mesh_object)
     if curve.type == "CURVES":
         sticky_curves.set_radius(curve.data, radius)
     else:
         curve.data.bevel_depth = radius
     curve.data.update_tag()
-    shown_surfaces.note_change()
+    surface_cache.note_change()
 
 
 def _property(name: str, given):

@@ -10,7 +10,7 @@ from .. import settings
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data, selection
 from ..scene.messages import InputError
-from ..scene.surface import read, shown_beyond_the_cage
+from ..scene.surface import active_modifiers_text, read
 from . import polls
 from .long_solves import LongSolves
 
@@ -62,8 +62,8 @@ class NICMM_OT_design_curve(
         mesh_data.synchronise(mesh_object)
         surface = read(mesh_object, self.use_modifiers)
         points, order = self._control_points(mesh_object, surface)
-        asked = curve_record.asked_by(self)
-        request = design_request.for_points(mesh_object, surface, points, order, asked)
+        curve_settings = curve_record.settings_from(self)
+        request = design_request.for_points(mesh_object, surface, points, order, curve_settings)
         if self.alternatives and self.output not in writing.SEPARATE:
             raise InputError(
                 "Alternatives are separate curves. Set Output to Curve or Sticky Curves, or set "
@@ -93,13 +93,15 @@ class NICMM_OT_design_curve(
         if not design.curves:
             raise InputError(str(design.status))
         mesh_object = request.mesh_object()
-        made = [
-            writing.apply(context, mesh_object, request.surface, each.curves, self, request.asked)
+        result = [
+            writing.apply(
+                context, mesh_object, request.surface, each.curves, self, request.settings
+            )
             for each in [*design.alternatives[::-1], design]  # the fairest last, so it is active
         ][-1]
         selected = not (self.points or self.point_group)
         order = ORDER_NAMES[request.order, selected]
-        summary = f"{_summary(mesh_object, design, order, request.asked)}: {made}"
+        summary = f"{_summary(mesh_object, design, order, request.settings)}: {result}"
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
         if self.alternatives:
@@ -111,10 +113,10 @@ class NICMM_OT_design_curve(
         return {"FINISHED"}
 
 
-def _summary(mesh_object, design, order: str, asked) -> str:
+def _summary(mesh_object, design, order: str, curve_settings) -> str:
     curve = design.curves[0]
     summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
-    shown = "" if asked.use_modifiers else shown_beyond_the_cage(mesh_object)
+    shown = "" if curve_settings.use_modifiers else active_modifiers_text(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 

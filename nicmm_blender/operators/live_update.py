@@ -20,11 +20,11 @@ from ..outputs import writing
 from ..scene import curve_record, design_request
 from ..scene.messages import InputError
 from ..scene.surface import read
-from . import turns
-from .long_solves import TURN, answer_all
+from . import time_slices
+from .long_solves import TIME_SLICE, answer_all
 
 PAUSE = 0.01
-"""Seconds between two turns, in which Blender handles events."""
+"""Seconds between two time slices, in which Blender handles events."""
 
 WAIT = 0.1
 """Seconds until the next check whether work may begin or continue."""
@@ -66,7 +66,7 @@ _updates = _Updates()
 
 
 def tick() -> float | None:
-    """Work for one turn; return the seconds until the next turn, or None if nothing is left."""
+    """Work for one time slice; return the seconds until the next, or None if nothing is left."""
     if not _live_scenes():
         _updates.stop()
         return None
@@ -80,7 +80,7 @@ def tick() -> float | None:
         return None
     if _has_to_wait():
         return WAIT
-    if _updates.work.turn(TURN):
+    if _updates.work.run_slice(TIME_SLICE):
         _write()
         return PAUSE if _updates.changed else None
     return PAUSE
@@ -103,10 +103,10 @@ def _begin() -> None:
         for designed in _live_curves():
             mesh_object = curve_record.mesh_of(designed)
             if everything or mesh_object.session_uid in changed:
-                _ask(designed, mesh_object, surfaces)
+                _add_request(designed, mesh_object, surfaces)
     if _updates.requests:
         requests = _updates.requests
-        _updates.work = turns.Work(lambda progress: answer_all(requests, progress))
+        _updates.work = time_slices.Work(lambda progress: answer_all(requests, progress))
 
 
 @contextmanager
@@ -121,27 +121,27 @@ def _unnoticed():
         _updates.is_reading = False
 
 
-def _ask(designed, mesh_object, surfaces: dict) -> None:
+def _add_request(designed, mesh_object, surfaces: dict) -> None:
     """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
     uid = designed.session_uid
     now = ""
     try:
-        asked = curve_record.asked_of(designed)
+        settings = curve_record.settings_of(designed)
         if not curve_record.has_curve(designed):  # a drawing with too few points
             return
-        key = mesh_object, asked.use_modifiers
+        key = mesh_object, settings.use_modifiers
         if key not in surfaces:
-            surfaces[key] = read(mesh_object, asked.use_modifiers, traced=False)
+            surfaces[key] = read(mesh_object, settings.use_modifiers, traced=False)
         surface = surfaces[key]
-        now = curve_record.digest(mesh_object, surface, asked)
+        now = curve_record.digest(mesh_object, surface, settings)
         if curve_record.is_current(designed, now):
             _updates.failed.pop(uid, None)
             return
         if _updates.failed.get(uid, ("",))[0] == now:
             return
         writing.check_replaceable(designed)
-        traced = read(mesh_object, asked.use_modifiers)
-        request = design_request.for_curve(designed, mesh_object, traced, asked)
+        traced = read(mesh_object, settings.use_modifiers)
+        request = design_request.for_curve(designed, mesh_object, traced, settings)
     except InputError as error:
         _updates.failed[uid] = now, f"{designed.name}: {error}"
         return
@@ -158,7 +158,7 @@ def _write() -> None:
         designed = objects.get(uid)
         if designed is None or request.mesh_object() is None:
             continue
-        now = curve_record.digest(request.mesh_object(), request.surface, request.asked)
+        now = curve_record.digest(request.mesh_object(), request.surface, request.settings)
         _updates.failed.pop(uid, None)
         try:
             writing.check_replaceable(designed)

@@ -15,15 +15,15 @@ import bpy
 from .. import preferences
 from ..scene import design_request
 from ..scene.messages import InputError
-from . import turns
+from . import time_slices
 from .partial_curve import PartialCurve
 from .viewports import NAVIGATION
 
-TURN = 0.03
+TIME_SLICE = 0.03
 """Seconds of work for each timer event, about the duration of one frame."""
 
-LONGEST_TURN = 0.25
-"""Maximum duration of a turn in seconds. Up to this limit, a turn takes as long as drawing does."""
+LONGEST_TIME_SLICE = 0.25
+"""Maximum seconds of a time slice. Up to this limit, it takes as long as drawing does."""
 
 PASSED_ON = NAVIGATION | {
     "MOUSEMOVE",
@@ -49,12 +49,12 @@ class LongSolves:
     """Whether the operator has a modal handler already, so that no second one is added."""
 
     def execute(self, context):
-        return reporting(self, lambda: self._all_at_once(context))
+        return with_error_reports(self, lambda: self._all_at_once(context))
 
     def invoke(self, context, _event):
         if bpy.app.background:
             return self.execute(context)
-        return reporting(self, lambda: self._begin(context))
+        return with_error_reports(self, lambda: self._begin(context))
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
@@ -62,12 +62,12 @@ class LongSolves:
             self.report({"INFO"}, "Cancelled without changes")
             return {"CANCELLED"}
         if event.type == "TIMER":
-            drawing = time.perf_counter() - self._turn_ended
-            done = self._work.turn(min(max(TURN, drawing), LONGEST_TURN))
-            self._turn_ended = time.perf_counter()
+            drawing = time.perf_counter() - self._slice_ended
+            done = self._work.run_slice(min(max(TIME_SLICE, drawing), LONGEST_TIME_SLICE))
+            self._slice_ended = time.perf_counter()
             if done:
                 self._tidy(context)
-                return reporting(self, lambda: self._end(context))
+                return with_error_reports(self, lambda: self._end(context))
             self._show(context)
             return {"PASS_THROUGH"}
         return {"PASS_THROUGH" if event.type in PASSED_ON else "RUNNING_MODAL"}
@@ -89,13 +89,13 @@ class LongSolves:
     def answer(self, context, requests: list):
         """Answer requests and finish, immediately if they are quick, otherwise in time slices."""
         self._requests = requests
-        self._work = turns.Work(lambda progress: answer_all(requests, progress))
-        if self._work.turn(preferences.patience()):
+        self._work = time_slices.Work(lambda progress: answer_all(requests, progress))
+        if self._work.run_slice(preferences.patience()):
             return self.finish(context, requests, self._work.result())
         self._partial, self._shown = PartialCurve(), None
-        self._turn_ended = time.perf_counter()
+        self._slice_ended = time.perf_counter()
         window_manager = context.window_manager
-        self._timer = window_manager.event_timer_add(TURN, window=context.window)
+        self._timer = window_manager.event_timer_add(TIME_SLICE, window=context.window)
         if not self.has_handler:
             window_manager.modal_handler_add(self)
         _running.append(self)
@@ -111,8 +111,8 @@ class LongSolves:
     def _show(self, context):
         if self._work.polyline is not self._shown:
             self._shown = self._work.polyline
-            request = self._requests[_place(self._work.fraction, len(self._requests))]
-            self._partial.show(request.in_world(self._shown), request.asked.closed)
+            request = self._requests[_current_index(self._work.fraction, len(self._requests))]
+            self._partial.show(request.in_world(self._shown), request.settings.closed)
         percent = round(100 * self._work.fraction)
         context.workspace.status_text_set(f"{self.bl_label}: {percent}%   |   Esc: Cancel")
 
@@ -153,12 +153,12 @@ def answer_all(requests: list, progress) -> list:
     return answers
 
 
-def _place(fraction: float, count: int) -> int:
+def _current_index(fraction: float, count: int) -> int:
     """The index of the current request at a fraction of the total work."""
     return min(int(fraction * count), count - 1)
 
 
-def reporting(operator, work):
+def with_error_reports(operator, work):
     """Run the work of an operator and turn expected errors into reports."""
     from ... import nicmm_core as nicmm
 

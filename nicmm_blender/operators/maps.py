@@ -11,7 +11,7 @@ from ..scene.messages import InputError
 from ..scene.selection import selected_vertices
 from ..scene.surface import read, vertex_group
 from . import polls
-from .long_solves import reporting
+from .long_solves import with_error_reports
 
 ROLES = (
     ("OBSTACLES", "Obstacles", "Weights that keep curves away"),
@@ -85,7 +85,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         layout.prop(self, "show")
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         mesh_object = mesh_data.mesh_object(context)
@@ -120,7 +120,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
         return _poll(cls, context)
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         mesh_object = mesh_data.mesh_object(context)
@@ -167,7 +167,7 @@ def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
         weights[selected_vertices(mesh_object)] = 1.0
         return weights
     surface = read(mesh_object, use_modifiers=False)
-    mesh = nicmm.Mesh(surface.solved, surface.faces)
+    mesh = nicmm.Mesh(surface.core_positions, surface.faces)
     if source == "CURVATURE":
         return nicmm.curvature_map(mesh)
     if source == "SHARP_EDGES":

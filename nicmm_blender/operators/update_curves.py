@@ -43,7 +43,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         self._names = [designed.name for designed in curves]
         chosen = None
         if self.use_panel:
-            chosen = curve_record.asked_by(context.scene.nicmm_curves)
+            chosen = curve_record.settings_from(context.scene.nicmm_curves)
         return [request_again(designed, chosen) for designed in curves]
 
     def _curves(self, context) -> list:
@@ -88,11 +88,11 @@ def named(name: str):
 
 def request_again(designed, chosen=None):
     """A request to design a curve again, with its recorded settings or with `chosen`."""
-    mesh_object = curve_record.existing_mesh(designed)
+    mesh_object = curve_record.mesh_in_any_scene(designed)
     mesh_data.synchronise(mesh_object)
-    asked = curve_record.asked_of(designed) if chosen is None else chosen
-    surface = read(mesh_object, asked.use_modifiers)
-    return design_request.for_curve(designed, mesh_object, surface, asked)
+    settings = curve_record.settings_of(designed) if chosen is None else chosen
+    surface = read(mesh_object, settings.use_modifiers)
+    return design_request.for_curve(designed, mesh_object, surface, settings)
 
 
 def register() -> None:

@@ -53,7 +53,7 @@ def splines(surface, curves, drawing: Drawing) -> list:
     if drawing.spline == BEZIER:
         return [_knots(surface, curve, drawing) for curve in curves]
     return [
-        Polyline(curve.closed, _lifted(surface, curve, drawing.offset))
+        Polyline(curve.closed, _offset_points(surface, curve, drawing.offset))
         for curve in on_surface(surface, curves, drawing)
     ]
 
@@ -77,10 +77,10 @@ def _knots(surface, curve, drawing: Drawing) -> Knots:
     from ...nicmm_core.splines.bezier import fit_bezier
 
     mesh = _core_mesh(surface)
-    points = _lifted(surface, curve, drawing.offset) @ surface.linear.T
+    points = _offset_points(surface, curve, drawing.offset) @ surface.local_to_core.T
     tolerance = _tolerance(surface, mesh, drawing)
     fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance)
-    back = np.linalg.inv(surface.linear).T
+    back = np.linalg.inv(surface.local_to_core).T
     left, right = fitted.left - fitted.knots, fitted.right - fitted.knots
     across = np.linalg.norm(np.cross(left, right), axis=1)
     sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=1)
@@ -88,7 +88,7 @@ def _knots(surface, curve, drawing: Drawing) -> Knots:
     return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
 
 
-def _lifted(surface, curve, offset: float) -> np.ndarray:
+def _offset_points(surface, curve, offset: float) -> np.ndarray:
     """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)
@@ -96,7 +96,7 @@ def _lifted(surface, curve, offset: float) -> np.ndarray:
 
     height = offset / surface.unit
     points = lifted(_core_mesh(surface), curve.faces, curve.barycentric, height)
-    return points @ np.linalg.inv(surface.linear).T
+    return points @ np.linalg.inv(surface.local_to_core).T
 
 
 def _tolerance(surface, mesh, drawing: Drawing) -> float:
@@ -106,4 +106,4 @@ def _tolerance(surface, mesh, drawing: Drawing) -> float:
 
 
 def _core_mesh(surface):
-    return designers.mesh_for(surface.solved, surface.faces)
+    return designers.mesh_for(surface.core_positions, surface.faces)

@@ -19,73 +19,73 @@ def new_object(mesh_object, surface, splines, radius: float):
     curve = bpy.data.curves.new(name, "CURVE")
     curve.dimensions = "3D"
     curve.use_fill_caps = True
-    made = bpy.data.objects.new(name, curve)
-    adopt(made, mesh_object, surface)
-    curve.bevel_depth = radius / scale_of(made, surface)
-    write_splines(made, splines)
-    return made
+    curve_object = bpy.data.objects.new(name, curve)
+    parent_to_mesh(curve_object, mesh_object, surface)
+    curve.bevel_depth = radius / scale_of(curve_object, surface)
+    write_splines(curve_object, splines)
+    return curve_object
 
 
-def adopt(made, mesh_object, surface) -> None:
+def parent_to_mesh(curve_object, mesh_object, surface) -> None:
     """Make an object a child of the mesh, in the mesh's local space or in an unscaled one."""
-    made.parent = mesh_object
+    curve_object.parent = mesh_object
     if surface.keeps_proportions:
-        made.matrix_parent_inverse = Matrix()
+        curve_object.matrix_parent_inverse = Matrix()
         return
-    to_world = surface.placement
+    to_world = surface.local_to_world
     left, _, right = np.linalg.svd(to_world[:3, :3])
     rigid = np.eye(4)
     rigid[:3, :3] = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     rigid[:3, 3] = to_world[:3, 3]
-    made.matrix_parent_inverse = Matrix((np.linalg.inv(to_world) @ rigid).tolist())
+    curve_object.matrix_parent_inverse = Matrix((np.linalg.inv(to_world) @ rigid).tolist())
 
 
-def scale_of(made, surface) -> float:
+def scale_of(curve_object, surface) -> float:
     """Length in the scene of one unit of the space of a child object."""
-    inverse = np.array(made.matrix_parent_inverse)[:3, :3]
+    inverse = np.array(curve_object.matrix_parent_inverse)[:3, :3]
     return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
 
 
-def scale_in_scene(made, mesh_object) -> float:
+def scale_in_scene(curve_object, mesh_object) -> float:
     """The same as `scale_of`, from the parent `mesh_object` instead of its surface."""
-    placement = np.array(mesh_object.matrix_world @ made.matrix_parent_inverse)[:3, :3]
+    placement = np.array(mesh_object.matrix_world @ curve_object.matrix_parent_inverse)[:3, :3]
     return float(np.cbrt(abs(np.linalg.det(placement)))) or 1.0
 
 
-def in_its_space(made, points: np.ndarray) -> np.ndarray:
+def to_object_space(curve_object, points: np.ndarray) -> np.ndarray:
     """Transform points (n, 3) from the mesh's local space to the space of a child object."""
-    if made.parent is None or made.matrix_parent_inverse == Matrix():
+    if curve_object.parent is None or curve_object.matrix_parent_inverse == Matrix():
         return points
-    to_child = np.linalg.inv(np.array(made.matrix_parent_inverse))
+    to_child = np.linalg.inv(np.array(curve_object.matrix_parent_inverse))
     return points @ to_child[:3, :3].T + to_child[:3, 3]
 
 
-def write_splines(made, splines) -> None:
+def write_splines(curve_object, splines) -> None:
     """Replace the splines of a curve object; their materials, radii and tilts are kept."""
-    curve = made.data
+    curve = curve_object.data
     before = [_Profile(spline) for spline in curve.splines]
     curve.splines.clear()
     for number, given in enumerate(splines):
         if isinstance(given, Knots):
-            spline = _bezier_spline(made, given)
+            spline = _bezier_spline(curve_object, given)
         else:
-            spline = _poly_spline(made, given)
+            spline = _poly_spline(curve_object, given)
         spline.use_cyclic_u = given.closed
         if number < len(before):
             before[number].give_to(spline)
 
 
-def _poly_spline(made, polyline):
-    spline = made.data.splines.new("POLY")
+def _poly_spline(curve_object, polyline):
+    spline = curve_object.data.splines.new("POLY")
     spline.points.add(len(polyline.points) - 1)
     homogeneous = np.ones((len(polyline.points), 4), dtype=np.float32)
-    homogeneous[:, :3] = in_its_space(made, polyline.points)
+    homogeneous[:, :3] = to_object_space(curve_object, polyline.points)
     spline.points.foreach_set("co", homogeneous.ravel())
     return spline
 
 
-def _bezier_spline(made, knots: Knots):
-    spline = made.data.splines.new("BEZIER")
+def _bezier_spline(curve_object, knots: Knots):
+    spline = curve_object.data.splines.new("BEZIER")
     spline.bezier_points.add(len(knots.points) - 1)
     for point, smooth in zip(spline.bezier_points, knots.smooth.tolist(), strict=True):
         kind = "ALIGNED" if smooth else "FREE"
@@ -95,7 +95,7 @@ def _bezier_spline(made, knots: Knots):
         ("handle_left", knots.left),
         ("handle_right", knots.right),
     ):
-        values = in_its_space(made, values).astype(np.float32)
+        values = to_object_space(curve_object, values).astype(np.float32)
         spline.bezier_points.foreach_set(name, values.ravel())
     return spline
 

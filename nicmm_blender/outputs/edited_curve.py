@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_OPEN
-from ..scene import curve_record, design_request, mesh_data, shown_surfaces
-from ..scene.curve_record import Asked
+from ..scene import curve_record, design_request, mesh_data, surface_cache
+from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError
-from ..scene.surface import Surface, shown_beyond_the_cage
+from ..scene.surface import Surface, active_modifiers_text
 from . import curve_object, writing
 
 MAPS = ("obstacle_group", "alignment_group")
@@ -29,7 +29,7 @@ class Opened:
         The session_uid of the curve object, 0 for a new curve, and of the mesh object.
     surface : Surface
         The current surface.
-    asked : Asked
+    settings : CurveSettings
         Settings of the curve.
     points : SurfacePoints of the core
         Control points on the surface.
@@ -42,7 +42,7 @@ class Opened:
     curve_uid: int
     mesh_uid: int
     surface: Surface
-    asked: Asked
+    settings: CurveSettings
     points: object
     curve: object
     remark: str
@@ -111,7 +111,9 @@ def active(context):
     return curves[0] if len(curves) == 1 else None
 
 
-def opened(context, edited, asked: Asked | None = None, keeps_course: bool = False) -> Opened:
+def open_curve(
+    context, edited, settings: CurveSettings | None = None, keeps_course: bool = False
+) -> Opened:
     """Read a curve and its surface, or the active mesh for a new curve.
 
     Parameters
@@ -119,7 +121,7 @@ def opened(context, edited, asked: Asked | None = None, keeps_course: bool = Fal
     context : bpy.types.Context
     edited : bpy.types.Object or None
         The curve object; None for a new curve.
-    asked : Asked, optional
+    settings : CurveSettings, optional
         Settings to use instead of those of the curve, or of the sidebar for a new curve.
     keeps_course : bool, default False
         Whether the curve keeps its course if only the smoothness differs. With any other change of
@@ -131,45 +133,45 @@ def opened(context, edited, asked: Asked | None = None, keeps_course: bool = Fal
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is None:
             raise InputError("Make a mesh or a designed curve active")
-        before = replace(curve_record.asked_by(context.scene.nicmm_curves), method="NICMM")
+        before = replace(curve_record.settings_from(context.scene.nicmm_curves), method="NICMM")
     else:
-        mesh_object = curve_record.present_mesh(context, edited)
+        mesh_object = curve_record.mesh_in_view_layer(context, edited)
         writing.check_replaceable(edited)
-        before = curve_record.asked_of(edited)
-    asked = before if asked is None else asked
-    surface = shown_surfaces.shown(mesh_object, asked.use_modifiers)
+        before = curve_record.settings_of(edited)
+    settings = before if settings is None else settings
+    surface = surface_cache.get(mesh_object, settings.use_modifiers)
     if not len(surface.faces):
         raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
     remarks = []
-    beyond = shown_beyond_the_cage(mesh_object)
-    if beyond and not asked.use_modifiers:
+    beyond = active_modifiers_text(mesh_object)
+    if beyond and not settings.use_modifiers:
         remarks.append(f"on the mesh without its {beyond}")
     for name in MAPS:
-        group = getattr(asked, name)
+        group = getattr(settings, name)
         if edited is not None and group and group not in mesh_object.vertex_groups:
-            asked = replace(asked, **{name: ""})
+            settings = replace(settings, **{name: ""})
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     curve = None
     if edited is not None:
-        points, moved = curve_record.controls_now(edited, mesh_object, surface)
+        points, moved = curve_record.current_control_points(edited, mesh_object, surface)
         if moved:
             remarks.append(f"the mesh has changed: {moved} points moved to the nearest positions")
         else:
             kept = {"smoothness": before.smoothness} if keeps_course else {}
-            if replace(asked, method=before.method, **kept) == before:
+            if replace(settings, method=before.method, **kept) == before:
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
-    return Opened(uid, mesh_object.session_uid, surface, asked, points, curve, remark)
+    return Opened(uid, mesh_object.session_uid, surface, settings, points, curve, remark)
 
 
 def request(edited: Opened, points) -> list:
     """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:
         return []
-    asked = replace(edited.asked, method="NICMM")
-    found = design_request.for_drawing(edited.mesh_object, edited.surface, points, asked)
+    settings = replace(edited.settings, method="NICMM")
+    found = design_request.for_drawing(edited.mesh_object, edited.surface, points, settings)
     return [replace(found, start=edited.curve)]
 
 
@@ -188,21 +190,23 @@ def write(context, edited: Opened, points, curves: list, settings):
 
     `settings` holds the output settings of a new object.
     """
-    mesh_object, made = edited.mesh_object, edited.curve_object
-    if made is None:
-        made = writing.as_object(mesh_object, edited.surface, curves, settings)
+    mesh_object, result = edited.mesh_object, edited.curve_object
+    if result is None:
+        result = writing.as_object(mesh_object, edited.surface, curves, settings)
         drawn = writing.drawn_as(settings)
     else:
-        writing.redraw(made, edited.surface, curves)
-        drawn = curve_record.drawn_as(made)
-    asked = replace(edited.asked, method="NICMM")
-    curve_record.remember(made, mesh_object, edited.surface, curves, asked, drawn, points)
+        writing.redraw(result, edited.surface, curves)
+        drawn = curve_record.drawn_as(result)
+    curve_settings = replace(edited.settings, method="NICMM")
+    curve_record.write_record(
+        result, mesh_object, edited.surface, curves, curve_settings, drawn, points
+    )
     if not edited.curve_uid:
-        curve_object.place(context, mesh_object, made)
-    return made
+        curve_object.place(context, mesh_object, result)
+    return result
 
 
-def located(edited: Opened, positions: np.ndarray, name: str):
+def surface_points_at(edited: Opened, positions: np.ndarray, name: str):
     """SurfacePoints of the core at positions (k, 3) on the surface, in the object's local space.
 
     `name` is the name of the argument in error messages.
@@ -211,8 +215,8 @@ def located(edited: Opened, positions: np.ndarray, name: str):
     from ..scene import designers
 
     surface = edited.surface
-    mesh = designers.mesh_for(surface.solved, surface.faces)
-    return locate_points(mesh, positions @ surface.linear.T, name)
+    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    return locate_points(mesh, positions @ surface.local_to_core.T, name)
 
 
 def with_point(points, number: int, place, replaced: bool = False):
@@ -237,6 +241,6 @@ def _curve_of(edited, surface):
     """The recorded curve of an object, or None if it has to be designed again."""
     if not curve_record.lies_on(edited, surface):
         return None
-    curves = curve_record.recall(edited, surface)
+    curves = curve_record.read_curves(edited, surface)
     whole = len(curves) == 1 and (curves[0].control_index >= 0).all()
     return curves[0] if whole else None

@@ -74,8 +74,8 @@ class CornerNormals:
 
     def __init__(self, mesh_object) -> None:
         mesh = mesh_object.data
-        self.kept = mesh.has_custom_normals and mesh_object.mode == "OBJECT"
-        if self.kept:
+        self.has_values = mesh.has_custom_normals and mesh_object.mode == "OBJECT"
+        if self.has_values:
             self.values = np.empty((len(mesh.loops), 3), dtype=np.float32)
             mesh.corner_normals.foreach_get("vector", self.values.ravel())
             self.loop_starts = _loop_starts(mesh)
@@ -163,7 +163,7 @@ def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
 
 
 def _new_vertices(edited, surface, cut, vertices: list) -> list:
-    made = []
+    new_vertices = []
     for face, weight in zip(cut.new_face.tolist(), cut.new_barycentric, strict=True):
         around = [
             (float(w), vertices[v])
@@ -180,14 +180,14 @@ def _new_vertices(edited, surface, cut, vertices: list) -> list:
             between.copy_from_vert_interp((one, other), second / (first + second))
             new.copy_from_vert_interp((between, around[2][1]), around[2][0])
             edited.verts.remove(between)
-        made.append(new)
-    return made
+        new_vertices.append(new)
+    return new_vertices
 
 
 def _split_edges(edited, surface, cut, vertices: list) -> list:
     """Add the parts of the cut edges, with their attributes; return the old edges."""
     along: dict = {}
-    n_input = len(surface.local)
+    n_input = len(surface.local_positions)
     for new, (face, weight) in enumerate(
         zip(cut.new_face.tolist(), cut.new_barycentric.tolist(), strict=True)
     ):

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import sticky_nodes
 from .clean_curves import on_surface
-from .curve_object import adopt, in_its_space, scale_of
+from .curve_object import parent_to_mesh, scale_of, to_object_space
 
 RADIUS = "nicmm_radius"
 """Custom property that keeps the radius of a drawing while it has no curve."""
@@ -30,21 +30,23 @@ def are_drawn_with_all_points() -> bool:
 def add(mesh_object, surface, curves, drawing, tube: bool):
     """Create the hair curves object without linking it to a collection."""
     name = f"{mesh_object.name} Curve"
-    made = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
-    adopt(made, mesh_object, surface)
-    write(made, surface, curves, drawing)
-    radius = np.full(len(made.data.points), drawing.radius / scale_of(made, surface))
-    _set(made.data, "radius", "FLOAT", "POINT", radius)
-    sticky_nodes.add_modifier(made, mesh_object, tube)
-    return made
+    curve_object = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
+    parent_to_mesh(curve_object, mesh_object, surface)
+    write(curve_object, surface, curves, drawing)
+    radius = np.full(
+        len(curve_object.data.points), drawing.radius / scale_of(curve_object, surface)
+    )
+    _set(curve_object.data, "radius", "FLOAT", "POINT", radius)
+    sticky_nodes.add_modifier(curve_object, mesh_object, tube)
+    return curve_object
 
 
-def write(made, surface, curves, drawing) -> None:
+def write(curve_object, surface, curves, drawing) -> None:
     """Replace the curves of a hair curves object; the radii along them are kept."""
-    data = made.data
+    data = curve_object.data
     radii = _radii(data)
     if not len(data.points):
-        radii = np.zeros(1), np.array([drawing.radius / scale_of(made, surface)])
+        radii = np.zeros(1), np.array([drawing.radius / scale_of(curve_object, surface)])
     curves = on_surface(surface, curves, drawing)
     if len(data.curves):
         data.remove_curves()
@@ -54,16 +56,16 @@ def write(made, surface, curves, drawing) -> None:
     data.add_curves([len(curve.faces) for curve in curves])
     faces = np.concatenate([curve.faces for curve in curves])
     barycentric = np.concatenate([curve.barycentric for curve in curves])
-    points = in_its_space(made, surface.points(faces, barycentric))
+    points = to_object_space(curve_object, surface.points(faces, barycentric))
     data.points.foreach_set("position", points.astype(np.float32).ravel())
     shares = (np.arange(len(faces)) + 0.5) / len(faces)
     _set(data, "radius", "FLOAT", "POINT", np.interp(shares, *radii))
     _set(data, "cyclic", "BOOLEAN", "CURVE", np.array([curve.closed for curve in curves]))
     _set(data, "face", "INT", "POINT", surface.polygons[faces])
-    vertices = np.full(len(faces), len(surface.local))
+    vertices = np.full(len(faces), len(surface.local_positions))
     _set(data, sticky_nodes.VERTICES, "INT", "POINT", vertices)
     _set(data, sticky_nodes.BARYCENTRIC, "FLOAT_VECTOR", "POINT", barycentric)
-    offset = np.full(len(faces), drawing.offset / scale_of(made, surface))
+    offset = np.full(len(faces), drawing.offset / scale_of(curve_object, surface))
     _set(data, sticky_nodes.OFFSET, "FLOAT", "POINT", offset)
     cage_corners, cage_offset = on_cage(surface, faces, barycentric)
     _set(data, sticky_nodes.CAGE_OFFSET, "FLOAT_VECTOR", "POINT", cage_offset)
@@ -127,7 +129,9 @@ def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:
     polygons = cage.faces[faces]
     corners = np.where(polygons[:, None] >= 0, cage.corners[polygons], -1)
     in_front = (cage.vertices[corners] == corners).all(axis=1) & (polygons >= 0)
-    first, second, last = np.moveaxis(surface.local[np.where(in_front[:, None], corners, 0)], 1, 0)
+    first, second, last = np.moveaxis(
+        surface.local_positions[np.where(in_front[:, None], corners, 0)], 1, 0
+    )
     along, across = second - first, last - first
     normal = np.cross(along, across)
     length = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -46,7 +46,7 @@ def add_modifier(curves_object, mesh_object, tube: bool) -> None:
 def node_group():
     """The node group of the file, created if it is missing or incomplete."""
     group = bpy.data.node_groups.get((GROUP_NAME, None))  # None: no group linked from a library
-    return group if group is not None and _is_whole(group) else _new_group()
+    return group if group is not None and _is_complete(group) else _new_group()
 
 
 def _new_group():
@@ -157,16 +157,16 @@ def _with_tube(column, curves, inputs):
     return column.switch(10, _output(inputs, TUBE), curves, _output(mesh, "Mesh"))
 
 
-def _is_whole(group) -> bool:
+def _is_complete(group) -> bool:
     """Whether a group has the parts that the modifier needs."""
     return (
         group.bl_idname == "GeometryNodeTree"
         and _interface_input(group, SURFACE) is not None
-        and _made(group) is not None
+        and _output_source(group) is not None
     )
 
 
-def _made(group):
+def _output_source(group):
     """The socket linked to the output of a group, or None."""
     outputs = _group_output(group)
     links = () if outputs is None else outputs.inputs[0].links

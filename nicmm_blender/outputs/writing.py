@@ -37,15 +37,17 @@ class _Cutting:
     weights: np.ndarray
 
 
-def apply(context, mesh_object, surface, curves, settings, asked) -> str:
+def apply(context, mesh_object, surface, curves, settings, curve_settings) -> str:
     """Create the chosen output and return a summary for the report.
 
-    `settings` holds the output settings, `asked` the settings of the curves.
+    `settings` holds the output settings, `curve_settings` the settings of the curves.
     """
     if settings.output in SEPARATE:
-        made = as_object(mesh_object, surface, curves, settings)
-        curve_record.remember(made, mesh_object, surface, curves, asked, drawn_as(settings))
-        curve_object.place(context, mesh_object, made)
+        new_object = as_object(mesh_object, surface, curves, settings)
+        curve_record.write_record(
+            new_object, mesh_object, surface, curves, curve_settings, drawn_as(settings)
+        )
+        curve_object.place(context, mesh_object, new_object)
         return f"{sum(len(curve.faces) for curve in curves)} points"
     if len(curves) != 1:
         raise InputError(
@@ -78,7 +80,7 @@ def redraw(drawn, surface, curves) -> None:
     if kind is None:  # an object of an earlier version is in the space of its mesh
         kind = {"spline": EXACT, "offset": 0.0}
     elif drawn.parent is not None and drawn.parent == curve_record.mesh_of(drawn):
-        curve_object.adopt(drawn, drawn.parent, surface)
+        curve_object.parent_to_mesh(drawn, drawn.parent, surface)
     scale = curve_object.scale_of(drawn, surface)
     if drawn.type == "CURVES":
         radius = sticky_curves.radius_of(drawn.data)
@@ -122,12 +124,12 @@ def replace(designed, request, answer) -> None:
     if not answer.curves:
         raise InputError(str(answer.status))
     redraw(designed, request.surface, answer.curves)
-    curve_record.remember(
+    curve_record.write_record(
         designed,
         request.mesh_object(),
         request.surface,
         answer.curves,
-        request.asked,
+        request.settings,
         curve_record.drawn_as(designed),
     )
 
@@ -136,7 +138,7 @@ def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cut
     from ... import nicmm_core as nicmm
     from ...nicmm_core.outputs.polygons import cut_polygons
 
-    core_mesh = nicmm.Mesh(surface.solved, surface.faces)
+    core_mesh = nicmm.Mesh(surface.core_positions, surface.faces)
     deviation = settings.simplify * core_mesh.mean_edge_length
     cut = nicmm.cut_mesh(core_mesh, curve, deviation=deviation)
     joined = joined and settings.cut_faces == "POLYGONS"
@@ -156,7 +158,7 @@ def _cut_edges(context, mesh_object, surface, curve, settings) -> str:
             edge.seam = edge.seam or settings.mark_seam
             edge.smooth = edge.smooth and not settings.mark_sharp
     _set_normals(mesh_object, normals, cutting)
-    return f"cut, with {len(edges)} edges along the curve{_normals_in_words(mesh_object)}"
+    return f"cut, with {len(edges)} edges along the curve{_custom_normals_note(mesh_object)}"
 
 
 def _region(context, mesh_object, surface, curve, settings) -> str:
@@ -193,7 +195,7 @@ def _region(context, mesh_object, surface, curve, settings) -> str:
     what = {"SELECTION": "selected", "FACE_SET": "now a face set"}.get(
         settings.region_as, f'in the vertex group "{group.name}"' if group else ""
     )
-    words = _normals_in_words(mesh_object) if settings.region_cut else ""
+    words = _custom_normals_note(mesh_object) if settings.region_cut else ""
     return f"{len(chosen)} faces inside the curve are {what}{words}"
 
 
@@ -216,11 +218,11 @@ def _parts(context, mesh_object, surface, curve, settings) -> str:
             _take_inside(edited, other_data)
     if not as_objects:
         _set_normals(mesh_object, normals, cutting)
-        return f"separated along {len(edges)} edges{_normals_in_words(mesh_object)}"
+        return f"separated along {len(edges)} edges{_custom_normals_note(mesh_object)}"
     other = mesh_object.copy()
     other.data = other_data
     curve_object.link(context, mesh_object, other)
-    if normals.kept:
+    if normals.has_values:
         values = normals.after_cut(surface, cutting.cut, cutting.polygons, cutting.weights)
         sizes = _corner_counts(normals, cutting)
         mesh_object.data.normals_split_custom_set(values[np.repeat(~inside, sizes)].tolist())
@@ -310,7 +312,7 @@ def _select_only(edited, mode: str, elements: list) -> None:
 
 
 def _set_normals(mesh_object, normals, cutting: _Cutting) -> None:
-    if normals.kept:
+    if normals.has_values:
         values = normals.after_cut(cutting.surface, cutting.cut, cutting.polygons, cutting.weights)
         mesh_object.data.normals_split_custom_set(values.tolist())
 
@@ -323,7 +325,7 @@ def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
     return np.concatenate([counts[stays], [len(c) for c in cutting.polygons.corners]]).astype(int)
 
 
-def _normals_in_words(mesh_object) -> str:
+def _custom_normals_note(mesh_object) -> str:
     if mesh_object.data.has_custom_normals and mesh_object.mode == "EDIT":
         return (
             ". Custom normals near the cut are approximate; cut in Object Mode to interpolate them"

@@ -10,17 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .apart import evaluated_apart
+from .isolation import evaluated_in_isolation
 from .mesh_arrays import corner_vertices, read, triangle_faces
 from .mesh_arrays import positions as positions_of
 
-VERTEX, FACE, PLACE = "nicmm_vertex", "nicmm_face", "nicmm_place"
+VERTEX, FACE, FACE_COORDINATES = "nicmm_vertex", "nicmm_face", "nicmm_place"
 """Names of the attributes of the copy."""
 
 INSIDE = -1e-4
 """Smallest barycentric coordinate that counts as inside: attributes have single precision."""
 
-SAME_PLACE = 1e-5
+SAME_POSITION = 1e-5
 """Distance up to which two positions count as the same, relative to the surface's diagonal."""
 
 
@@ -28,8 +28,8 @@ SAME_PLACE = 1e-5
 class CageTrace:
     """How a generated surface is related to its cage.
 
-    A place in a face of the cage is given by two coordinates, in which the corners of the face are
-    those of a regular polygon on the unit circle.
+    A point in a face of the cage is given by two face coordinates, in which the corners of the face
+    are those of a regular polygon on the unit circle.
 
     Attributes
     ----------
@@ -43,8 +43,8 @@ class CageTrace:
         First three vertices of each face of the cage.
     faces : (F,) int array
         Face of the cage that each triangle of the surface comes from; -1 if unknown.
-    places : (F, 3, 2) float array
-        Places of the corners of each triangle in that face.
+    face_coordinates : (F, 3, 2) float array
+        Face coordinates of the corners of each triangle in that face.
     """
 
     positions: np.ndarray
@@ -52,26 +52,26 @@ class CageTrace:
     sizes: tuple
     corners: np.ndarray
     faces: np.ndarray
-    places: np.ndarray
+    face_coordinates: np.ndarray
 
 
 @dataclass(frozen=True)
-class CagePlaces:
+class CagePoints:
     """Points in faces of the cage.
 
     Attributes
     ----------
     faces : (k,) int array
         Face of the cage for each point; -1 if unknown.
-    places : (k, 2) float array
-        Place of each point in its face.
+    face_coordinates : (k, 2) float array
+        Face coordinates of each point.
     copies : (k,) int array
         Index of the copy of the face, among all copies that modifiers make of it, in the order of
         the surface's triangles.
     """
 
     faces: np.ndarray
-    places: np.ndarray
+    face_coordinates: np.ndarray
     copies: np.ndarray
 
 
@@ -101,22 +101,22 @@ def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
         return _Copy(mesh_object, cage).trace(shown, loops)
 
 
-def with_own_cage(surface):
+def with_identity_trace(surface):
     """Describe the surface of a cage as generated from itself, each face being its own source."""
     polygons, loops = surface.polygons, surface.loops
     totals = np.bincount(polygons) + 2
     starts = np.full(len(totals), np.iinfo(np.int64).max)
     np.minimum.at(starts, polygons, loops.min(axis=1))
     number = loops - starts[polygons][:, None]
-    own = CageTrace(
-        positions=surface.local,
-        vertices=np.arange(len(surface.local)),
-        sizes=(len(surface.local), len(totals), int(loops.max()) + 1),
+    identity = CageTrace(
+        positions=surface.local_positions,
+        vertices=np.arange(len(surface.local_positions)),
+        sizes=(len(surface.local_positions), len(totals), int(loops.max()) + 1),
         corners=surface.faces[np.unique(polygons, return_index=True)[1]],
         faces=polygons,
-        places=_on_circle(number, totals[polygons][:, None]),
+        face_coordinates=_on_circle(number, totals[polygons][:, None]),
     )
-    return replace(surface, cage=own)
+    return replace(surface, cage=identity)
 
 
 def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
@@ -125,7 +125,7 @@ def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces:
+def to_cage_points(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePoints:
     """Find points of a generated surface in faces of the cage.
 
     Parameters
@@ -138,20 +138,20 @@ def places_of(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePlaces
         Barycentric coordinates of each point in its triangle.
     """
     cage = surface.cage
-    places = np.einsum("nj,njk->nk", barycentric, cage.places[faces])
-    found = CagePlaces(cage.faces[faces], places, np.zeros(len(faces), dtype=np.int64))
+    coordinates = np.einsum("nj,njk->nk", barycentric, cage.face_coordinates[faces])
+    found = CagePoints(cage.faces[faces], coordinates, np.zeros(len(faces), dtype=np.int64))
     triangles = _TrianglesOf(surface, found.faces)
     for number, position in enumerate(surface.points(faces, barycentric)):
-        copies = triangles.at(int(found.faces[number]), places[number])
+        copies = triangles.at(int(found.faces[number]), coordinates[number])
         away = [np.linalg.norm(surface.points(*copy)[0] - position) for copy in copies]
-        if not copies or min(away) > SAME_PLACE * surface.diagonal:
+        if not copies or min(away) > SAME_POSITION * surface.diagonal:
             found.faces[number] = -1
         else:
             found.copies[number] = int(np.argmin(away))
     return found
 
 
-def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
+def to_surface_points(surface, cage_points: CagePoints) -> tuple[np.ndarray, np.ndarray]:
     """Find points in faces of the cage on a generated surface.
 
     Returns
@@ -161,10 +161,10 @@ def points_at(surface, places: CagePlaces) -> tuple[np.ndarray, np.ndarray]:
     barycentric : (k, 3) float array
         Barycentric coordinates of each point in its triangle.
     """
-    faces, barycentric = np.full(len(places.faces), -1), np.zeros((len(places.faces), 3))
-    triangles = _TrianglesOf(surface, places.faces)
-    for number, (face, copy) in enumerate(zip(places.faces, places.copies, strict=True)):
-        copies = triangles.at(int(face), places.places[number])
+    faces, barycentric = np.full(len(cage_points.faces), -1), np.zeros((len(cage_points.faces), 3))
+    triangles = _TrianglesOf(surface, cage_points.faces)
+    for number, (face, copy) in enumerate(zip(cage_points.faces, cage_points.copies, strict=True)):
+        copies = triangles.at(int(face), cage_points.face_coordinates[number])
         if copy < len(copies):
             (faces[number],), (barycentric[number],) = copies[copy]
     return faces, barycentric
@@ -179,13 +179,13 @@ class _TrianglesOf:
         self.order = from_these[np.argsort(surface.cage.faces[from_these], kind="stable")]
         self.sorted = surface.cage.faces[self.order]
 
-    def at(self, face: int, place: np.ndarray) -> list:
-        """All copies of a place, each as triangle (1,) and barycentric coordinates (1, 3)."""
+    def at(self, face: int, coordinates: np.ndarray) -> list:
+        """All copies of a point, each as triangle (1,) and barycentric coordinates (1, 3)."""
         if face < 0:
             return []
         first, last = np.searchsorted(self.sorted, [face, face + 1])
         triangles = self.order[first:last]
-        barycentric = _barycentric(self.surface.cage.places[triangles], place)
+        barycentric = _barycentric(self.surface.cage.face_coordinates[triangles], coordinates)
         inside = np.flatnonzero(barycentric.min(axis=1, initial=1.0) >= INSIDE)
         weights = np.clip(barycentric[inside], 0.0, None)
         weights /= weights.sum(axis=1, keepdims=True)
@@ -193,17 +193,17 @@ class _TrianglesOf:
         copies: list = []
         where: list = []
         for triangle, weight, position in zip(triangles[inside], weights, positions, strict=True):
-            near = SAME_PLACE * self.surface.diagonal
+            near = SAME_POSITION * self.surface.diagonal
             if all(np.linalg.norm(position - other) > near for other in where):
                 where.append(position)
                 copies.append((np.array([triangle]), weight[None]))
         return copies
 
 
-def _barycentric(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (n, 3) of a place in triangles (n, 3, 2); -1 in degenerate ones."""
+def _barycentric(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (n, 3) of a point in triangles (n, 3, 2); -1 in degenerate ones."""
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    to = place - triangles[:, 0]
+    to = point - triangles[:, 0]
     area = _cross(first, second)
     flat = np.abs(area) <= np.finfo(np.float32).eps
     area = np.where(flat, 1.0, area)
@@ -227,29 +227,29 @@ class _Copy:
         copy = self.mesh_object.copy()
         copy.data = self.cage.copy()
         self._write(copy.data)
-        with evaluated_apart(copy) as evaluated:
+        with evaluated_in_isolation(copy) as evaluated:
             return self._read(evaluated, shown, loops)
 
     def _write(self, data) -> None:
         starts, totals = (
             read(data.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total")
         )
-        places = np.zeros((len(data.loops), 3), dtype=np.float32)
-        number = np.arange(len(places)) - np.repeat(starts, totals)
-        places[:, :2] = _on_circle(number, np.repeat(totals, totals))
+        coordinates = np.zeros((len(data.loops), 3), dtype=np.float32)
+        number = np.arange(len(coordinates)) - np.repeat(starts, totals)
+        coordinates[:, :2] = _on_circle(number, np.repeat(totals, totals))
         faces = np.arange(len(data.polygons), dtype=np.int32)
         for name, kind, domain, field, values in (
             (VERTEX, "FLOAT_VECTOR", "POINT", "vector", self.identities),
             (FACE, "INT", "FACE", "value", faces),
-            (PLACE, "FLOAT_VECTOR", "CORNER", "vector", places),
+            (FACE_COORDINATES, "FLOAT_VECTOR", "CORNER", "vector", coordinates),
         ):
             data.attributes.new(name, kind, domain).data.foreach_set(field, values.ravel())
 
     def _read(self, mesh, shown, loops: np.ndarray) -> CageTrace:
         positions = positions_of(self.cage)
         vertices = np.full(len(positions), -1)
-        faces, places = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
-        domains = {VERTEX: "POINT", FACE: "FACE", PLACE: "CORNER"}
+        faces, coordinates = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
+        domains = {VERTEX: "POINT", FACE: "FACE", FACE_COORDINATES: "CORNER"}
         # A simulation may run differently in the copy, and nodes may remove attributes or move them
         # to another domain.
         if _have_equal_faces(mesh, shown):
@@ -263,14 +263,14 @@ class _Copy:
                 vertices = _first_equal(
                     self.identities, read(kept[VERTEX].data, "vector", 3, np.float32)
                 )
-            if FACE in kept and PLACE in kept:
+            if FACE in kept and FACE_COORDINATES in kept:
                 number = read(kept[FACE].data, "value", 1, np.int32)
                 faces = number[triangle_faces(shown)].astype(np.int64)
-                places = read(kept[PLACE].data, "vector", 3, np.float32)[loops, :2]
+                coordinates = read(kept[FACE_COORDINATES].data, "vector", 3, np.float32)[loops, :2]
         starts = read(self.cage.polygons, "loop_start", 1, np.int32)
         corners = corner_vertices(self.cage)[starts[:, None] + np.arange(3)]
         sizes = _sizes(self.cage)
-        return CageTrace(positions, vertices, sizes, corners, faces, places)
+        return CageTrace(positions, vertices, sizes, corners, faces, coordinates)
 
 
 def _have_equal_faces(one, other) -> bool:

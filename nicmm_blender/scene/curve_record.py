@@ -15,13 +15,13 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import OPTIONS, Kind
-from . import designers, mesh_data, record_check, shown_surfaces
-from .cage_trace import CagePlaces, places_of, points_at, with_own_cage
+from . import designers, mesh_data, record_check, surface_cache
+from .cage_trace import CagePoints, to_cage_points, to_surface_points, with_identity_trace
 from .membership import is_in
 from .messages import InputError
 from .surface import group_weights, read
 
-KEY = "nicmm_curve"
+RECORD_KEY = "nicmm_curve"
 """Custom property of the object that holds the record."""
 
 KINDS = ("CURVE", "CURVES")
@@ -31,7 +31,7 @@ VERSION = 2
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
 of version 1 do not store whether modifiers are used."""
 
-DESIGNED_ON = "nicmm_designed_on"
+DIGEST_KEY = "nicmm_designed_on"
 """Custom property of the object's data that holds the digest at the time of the design."""
 
 
@@ -56,18 +56,18 @@ def _default(option):
 
 WITHOUT_MODIFIERS = ", use_modifiers=False"
 
-OF_A_DESIGN = ("order", "alternatives")
+NEW_CURVE_OPTIONS = ("order", "alternatives")
 """Options that matter only once, since control points are stored in the order visited."""
 
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind is not Kind.POINTS and option.name not in OF_A_DESIGN
+    if option.kind is not Kind.POINTS and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 
-Asked = make_dataclass(
-    "Asked",
+CurveSettings = make_dataclass(
+    "CurveSettings",
     [
         (property_name(option), type(_default(option)), field(default=_default(option)))
         for option in RECORDED
@@ -78,20 +78,20 @@ Asked = make_dataclass(
 )
 
 
-def groups_of(asked: Asked) -> list:
+def groups_of(settings: CurveSettings) -> list:
     """Names of the vertex groups that a curve depends on; an empty name means none."""
     names = [property_name(option) for option in RECORDED if option.kind is Kind.WEIGHTS]
-    return [getattr(asked, name) for name in names]
+    return [getattr(settings, name) for name in names]
 
 
-def arguments_of(asked: Asked, weights) -> dict:
+def arguments_of(settings: CurveSettings, weights) -> dict:
     """Settings as keyword arguments for the core.
 
     `weights` is a function from the name of a vertex group to its weights, and from "" to None.
     """
     values = {}
     for option in RECORDED:
-        value = getattr(asked, property_name(option))
+        value = getattr(settings, property_name(option))
         if option.kind is Kind.WEIGHTS:
             value = weights(value)
         elif option.kind is Kind.CHOICE:
@@ -103,13 +103,21 @@ def arguments_of(asked: Asked, weights) -> dict:
     return values
 
 
-def asked_by(properties) -> Asked:
+def settings_from(properties) -> CurveSettings:
     """The settings of a curve from the properties of an operator or the scene."""
-    return Asked(**{field.name: getattr(properties, field.name) for field in fields(Asked)})
+    return CurveSettings(
+        **{field.name: getattr(properties, field.name) for field in fields(CurveSettings)}
+    )
 
 
-def remember(
-    curve_object, mesh_object, surface, curves, asked: Asked, drawn: dict | None, controls=None
+def write_record(
+    curve_object,
+    mesh_object,
+    surface,
+    curves,
+    settings: CurveSettings,
+    drawn: dict | None,
+    controls=None,
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
@@ -123,7 +131,7 @@ def remember(
         Its surface.
     curves : list of SurfaceCurve
         The curves; empty for a drawing that has too few points for a curve.
-    asked : Asked
+    settings : CurveSettings
         Settings of the curves.
     drawn : dict or None
         Spline type and offset of the drawing; None for an object of an earlier version, which drew
@@ -140,15 +148,15 @@ def remember(
         control_faces, control_barycentric = controls.faces, controls.barycentric
     known = {"positions": surface.points(control_faces, control_barycentric)}
     if surface.cage is not None:
-        places = places_of(surface, control_faces, control_barycentric)
-        known |= {"cage_faces": places.faces, "cage_places": places.places}
-        known["cage_copies"] = places.copies
-    curve_object[KEY] = {
+        cage_points = to_cage_points(surface, control_faces, control_barycentric)
+        known |= {"cage_faces": cage_points.faces, "cage_places": cage_points.face_coordinates}
+        known["cage_copies"] = cage_points.copies
+    curve_object[RECORD_KEY] = {
         "version": VERSION,
         "mesh": mesh_object,
         "cage": [] if surface.cage is None else list(surface.cage.sizes),
         "faces": _fingerprint(surface),
-        "vertices": len(surface.local),
+        "vertices": len(surface.local_positions),
         "counts": [len(curve.faces) for curve in curves],
         "closed": [int(curve.closed) for curve in curves],
         "corners": _flat([surface.faces[curve.faces] for curve in curves]),
@@ -158,12 +166,12 @@ def remember(
         "control_corners": surface.faces[control_faces].ravel().tolist(),
         "control_barycentric": control_barycentric.ravel().tolist(),
         **{f"control_{name}": values.ravel().tolist() for name, values in known.items()},
-        "asked": asdict(asked),
+        "asked": asdict(settings),
         **({} if drawn is None else {"drawn": drawn}),
     }
     # Stored in the same data-block as the points, so that undo restores both together.
-    curve_object.data[DESIGNED_ON] = digest(mesh_object, surface, asked)
-    shown_surfaces.note_change()
+    curve_object.data[DIGEST_KEY] = digest(mesh_object, surface, settings)
+    surface_cache.note_change()
 
 
 def _flat(arrays: list) -> list:
@@ -171,14 +179,16 @@ def _flat(arrays: list) -> list:
     return [value for array in arrays for value in array.ravel().tolist()]
 
 
-def digest(mesh_object, surface, asked: Asked) -> str:
+def digest(mesh_object, surface, settings: CurveSettings) -> str:
     """A hash of everything that a curve depends on besides its control points."""
-    # Without modifiers the text is that of version 1, so that its digests remain valid.
-    words = repr(asked).replace(WITHOUT_MODIFIERS, "")
+    # Digests in saved files must remain valid: the text begins with the first name of the class,
+    # and without modifiers it is that of version 1.
+    words = "Asked" + repr(settings).removeprefix(CurveSettings.__name__)
+    words = words.replace(WITHOUT_MODIFIERS, "")
     found = hashlib.blake2b(words.encode(), digest_size=16)
-    found.update(surface.solved.tobytes())
+    found.update(surface.core_positions.tobytes())
     found.update(surface.faces.tobytes())
-    for name in groups_of(asked):
+    for name in groups_of(settings):
         if name in mesh_object.vertex_groups:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
             found.update(weights.tobytes())
@@ -192,19 +202,19 @@ def _fingerprint(surface) -> str:
 
 def is_current(curve_object, now: str) -> bool:
     """Whether a curve was designed with the digest `now`."""
-    return curve_object.data.get(DESIGNED_ON) == now
+    return curve_object.data.get(DIGEST_KEY) == now
 
 
-def _readable(curve_object):
+def _checked_record(curve_object):
     """The record of a curve; an error if its version, settings or points cannot be used."""
-    record = _with_settings(curve_object)
+    record = _record_with_checked_settings(curve_object)
     _refuse(curve_object, record_check.problem_of(record))
     return record
 
 
-def _with_settings(curve_object):
+def _record_with_checked_settings(curve_object):
     """The record of a curve; an error if its version or settings cannot be used."""
-    record = curve_object[KEY]
+    record = curve_object[RECORD_KEY]
     version = record.get("version", 0)
     if not isinstance(version, int):
         _refuse(curve_object, f"its version is {version!r}")
@@ -213,7 +223,7 @@ def _with_settings(curve_object):
             f'"{curve_object.name}" was designed by a newer version of NICMM Curves. '
             "Update the extension to use it"
         )
-    _refuse(curve_object, record_check.problem_of_settings(record, Asked))
+    _refuse(curve_object, record_check.problem_of_settings(record, CurveSettings))
     return record
 
 
@@ -228,39 +238,39 @@ def _refuse(curve_object, problem: str) -> None:
 
 def has_record(candidate) -> bool:
     """Whether an object is a designed curve."""
-    if candidate is None or candidate.type not in KINDS or KEY not in candidate:
+    if candidate is None or candidate.type not in KINDS or RECORD_KEY not in candidate:
         return False
-    return record_check.is_group(candidate[KEY])
+    return record_check.is_group(candidate[RECORD_KEY])
 
 
 def has_curve(curve_object) -> bool:
     """Whether a designed curve has enough points for a curve."""
-    return len(_readable(curve_object)["counts"]) > 0
+    return len(_checked_record(curve_object)["counts"]) > 0
 
 
 def mesh_of(curve_object):
     """The mesh object that a curve was designed on, or None if it no longer exists."""
-    found = curve_object[KEY].get("mesh")
+    found = curve_object[RECORD_KEY].get("mesh")
     return found if isinstance(found, bpy.types.Object) and found.type == "MESH" else None
 
 
-def present_mesh(context, curve_object):
+def mesh_in_view_layer(context, curve_object):
     """The mesh object that a curve was designed on; an error if it is not in the view layer."""
     found = mesh_of(curve_object)
     if found is None or not is_in(context.view_layer, found):
-        raise _absent(curve_object)
+        raise _missing_mesh_error(curve_object)
     return found
 
 
-def existing_mesh(curve_object):
+def mesh_in_any_scene(curve_object):
     """The mesh object that a curve was designed on; an error if it is in no scene."""
     found = mesh_of(curve_object)
     if found is None or not found.users_scene:
-        raise _absent(curve_object)
+        raise _missing_mesh_error(curve_object)
     return found
 
 
-def _absent(curve_object) -> InputError:
+def _missing_mesh_error(curve_object) -> InputError:
     return InputError(
         f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
         "Bring it back, or draw the curve again"
@@ -284,18 +294,18 @@ def curves_on(context, mesh_object) -> list:
     ]
 
 
-def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
+def positions_of(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
     """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's local space.
 
     Points whose triangle no longer exists are left out; a closed curve ends with its first point.
     """
-    record = _readable(curve_object)
+    record = _checked_record(curve_object)
     found = []
     for kind in ("control_", ""):
         names = (f"{kind}corners", f"{kind}barycentric")
         faces, barycentric = (np.zeros(0, np.int64), np.zeros((0, 3)))
         if names[0] in record:
-            faces, barycentric = _recalled(record, *names, surface)
+            faces, barycentric = _find_points(record, *names, surface)
         there = faces >= 0
         found.append(surface.points(faces[there], barycentric[there]))
     points, line = found
@@ -306,9 +316,9 @@ def places(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
 
 def lies_on(curve_object, surface) -> bool:
     """Whether all triangles of a curve still exist; False if it has no curve yet."""
-    record = _readable(curve_object)
+    record = _checked_record(curve_object)
     return len(record["counts"]) > 0 and bool(
-        (_recalled(record, "corners", "barycentric", surface)[0] >= 0).all()
+        (_find_points(record, "corners", "barycentric", surface)[0] >= 0).all()
     )
 
 
@@ -318,30 +328,30 @@ def designed_on(mesh_object) -> list:
     return sorted(found, key=lambda each: each.name)
 
 
-def asked_of(curve_object) -> Asked:
+def settings_of(curve_object) -> CurveSettings:
     """The settings of a curve."""
-    record = _with_settings(curve_object)
+    record = _record_with_checked_settings(curve_object)
     stored = record.get("asked")
     if stored is None:  # an early record without settings
-        return Asked(closed=bool(record["closed"][0]), use_modifiers=False)
+        return CurveSettings(closed=bool(record["closed"][0]), use_modifiers=False)
     before = {"use_modifiers": False}  # how versions behaved that did not record a setting
-    return Asked(
+    return CurveSettings(
         **{
             field.name: field.type(stored.get(field.name, before.get(field.name, field.default)))
-            for field in fields(Asked)
+            for field in fields(CurveSettings)
         }
     )
 
 
 def drawn_as(curve_object) -> dict | None:
     """How a curve is drawn; None if an earlier version made it, which drew all points."""
-    found = _with_settings(curve_object).get("drawn")
+    found = _record_with_checked_settings(curve_object).get("drawn")
     return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
 
 
-def without_curve(curve_object) -> str:
+def no_curve_message(curve_object) -> str:
     """The message for a drawing that has too few points for a curve."""
-    count = len(_readable(curve_object)["control_corners"]) // 3
+    count = len(_checked_record(curve_object)["control_corners"]) // 3
     return (
         f'"{curve_object.name}" has {count} control point{"" if count == 1 else "s"} and no curve '
         "yet. Add points with the Surface Curve tool, or delete it"
@@ -350,17 +360,17 @@ def without_curve(curve_object) -> str:
 
 def surface_of(curve_object, mesh_object):
     """The current surface that a curve lies on."""
-    return read(mesh_object, asked_of(curve_object).use_modifiers)
+    return read(mesh_object, settings_of(curve_object).use_modifiers)
 
 
-def recall(curve_object, surface) -> list:
+def read_curves(curve_object, surface) -> list:
     """The recorded curves as curves of the core, on the current surface."""
     from ... import nicmm_core as nicmm
 
-    record = _readable(curve_object)
+    record = _checked_record(curve_object)
     if not len(record["counts"]):
-        raise InputError(without_curve(curve_object))
-    faces, barycentric = _recalled(record, "corners", "barycentric", surface)
+        raise InputError(no_curve_message(curve_object))
+    faces, barycentric = _find_points(record, "corners", "barycentric", surface)
     if (faces < 0).any():
         raise InputError(
             f'The mesh has changed since "{curve_object.name}" was designed: '
@@ -374,14 +384,14 @@ def recall(curve_object, surface) -> list:
     ):
         here = slice(start, start + count)
         weights, on = barycentric[here], faces[here]
-        points = np.einsum("nj,njk->nk", weights, surface.solved[surface.faces[on]])
+        points = np.einsum("nj,njk->nk", weights, surface.core_positions[surface.faces[on]])
         index = np.array(record["control_index"], dtype=np.int64)[control : control + controls]
         curves.append(nicmm.SurfaceCurve(bool(closed), on, weights, points, index))
         start, control = start + count, control + controls
     return curves
 
 
-def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
+def read_control_points(curve_object, surface) -> tuple[object, np.ndarray | None]:
     """The control points of a curve as SurfacePoints, and their positions when it was designed.
 
     The face of a point is -1 if its triangle no longer exists. Positions, (k, 3), are in the local
@@ -389,18 +399,18 @@ def recall_controls(curve_object, surface) -> tuple[object, np.ndarray | None]:
     """
     from ... import nicmm_core as nicmm
 
-    record = _readable(curve_object)
+    record = _checked_record(curve_object)
     if "control_corners" not in record:  # an early record without control points
-        (curve,) = recall(curve_object, surface)
+        (curve,) = read_curves(curve_object, surface)
         index = curve.control_index
         found = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
         return found, surface.points(found.faces, found.barycentric)
     names = ("control_corners", "control_barycentric")
-    found = nicmm.SurfacePoints(*_recalled(record, *names, surface))
+    found = nicmm.SurfacePoints(*_find_points(record, *names, surface))
     return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
 
 
-def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
+def current_control_points(curve_object, mesh_object, surface) -> tuple[object, int]:
     """The control points of a curve on the current surface, and how many of them were moved.
 
     A point whose triangle no longer exists is located by the face of the cage that it came from. If
@@ -411,48 +421,48 @@ def controls_now(curve_object, mesh_object, surface) -> tuple[object, int]:
 
     if not len(surface.faces):
         raise InputError(f'"{mesh_object.name}" has no faces to draw on. Choose another mesh')
-    points, positions = recall_controls(curve_object, surface)
+    points, positions = read_control_points(curve_object, surface)
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
     lost = faces < 0
     if lost.any():
-        traced = with_own_cage(surface) if surface.cage is None else surface
-        places = _cage_places(curve_object, mesh_object, traced.cage.sizes)
-        if places is not None:
-            there, weights = points_at(traced, places)
+        traced = with_identity_trace(surface) if surface.cage is None else surface
+        cage_points = _cage_points(curve_object, mesh_object, traced.cage.sizes)
+        if cage_points is not None:
+            there, weights = to_surface_points(traced, cage_points)
             faces[lost], barycentric[lost] = there[lost], weights[lost]
     lost = faces < 0
     if lost.any():
-        mesh = designers.mesh_for(surface.solved, surface.faces)
-        nearest, _ = nearest_points(mesh, positions[lost] @ surface.linear.T)
+        mesh = designers.mesh_for(surface.core_positions, surface.faces)
+        nearest, _ = nearest_points(mesh, positions[lost] @ surface.local_to_core.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
     return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
-def _cage_places(curve_object, mesh_object, sizes: tuple) -> CagePlaces | None:
+def _cage_points(curve_object, mesh_object, sizes: tuple) -> CagePoints | None:
     """The control points of a curve in faces of the cage; None if unknown.
 
     `sizes` are the current numbers of vertices, faces and corners of the cage.
     """
-    record = curve_object[KEY]
+    record = curve_object[RECORD_KEY]
     if record.get("cage"):
         if tuple(record["cage"]) != sizes:
             return None
-        return CagePlaces(
+        return CagePoints(
             np.array(record["control_cage_faces"], dtype=np.int64),
             np.array(record["control_cage_places"], dtype=np.float64).reshape(-1, 2),
             np.array(record["control_cage_copies"], dtype=np.int64),
         )
     cage = read(mesh_object, use_modifiers=False)
-    points, _ = recall_controls(curve_object, cage)
+    points, _ = read_control_points(curve_object, cage)
     there = points.faces >= 0
     if not there.any():
         return None
-    found = places_of(with_own_cage(cage), points.faces, points.barycentric)
+    found = to_cage_points(with_identity_trace(cage), points.faces, points.barycentric)
     found.faces[~there] = -1
     return found
 
 
-def _recalled(record, corners_name: str, weights_name: str, surface):
+def _find_points(record, corners_name: str, weights_name: str, surface):
     """Triangles (n,) and barycentric coordinates (n, 3) of recorded points.
 
     The triangle is -1 if it no longer exists.
@@ -461,7 +471,7 @@ def _recalled(record, corners_name: str, weights_name: str, surface):
     barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
     faces, order = _find_triangles(surface.faces, corners)
     generated = bool(record.get("cage")) or surface.cage is not None
-    changed = record["vertices"] > len(surface.local)
+    changed = record["vertices"] > len(surface.local_positions)
     if changed or (generated and record.get("faces") != _fingerprint(surface)):
         # Vertices may have been renumbered, so equal indices prove nothing.
         faces = np.full(len(corners), -1, dtype=np.int64)

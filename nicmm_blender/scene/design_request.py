@@ -2,7 +2,7 @@
 """A request for a curve as plain arrays: read from Blender's data, then answered by the core.
 
 The main thread reads the data. `answer` does not access Blender's data, so it can run in time
-slices (`operators.turns`).
+slices (`operators.time_slices`).
 """
 
 import contextlib
@@ -12,9 +12,9 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
-from . import curve_record, designers, shown_surfaces
-from .curve_record import Asked
-from .messages import InputError, in_words
+from . import curve_record, designers, surface_cache
+from .curve_record import CurveSettings
+from .messages import InputError, user_message
 from .surface import Surface, group_weights, read
 
 
@@ -31,7 +31,7 @@ class DesignRequest:
     surface: Surface
     points: object
     order: str
-    asked: Asked
+    settings: CurveSettings
     options: dict
     start: object = None
     moved: int = 0
@@ -46,11 +46,11 @@ class DesignRequest:
     def check_unchanged(self) -> None:
         """Raise an error if the mesh has changed since it was read."""
         found = self.mesh_object()
-        if found and shown_surfaces.known(found, self.surface.with_modifiers) is self.surface:
+        if found and surface_cache.cached(found, self.surface.with_modifiers) is self.surface:
             return
         now = found and read(found, self.surface.with_modifiers, traced=False)
         if not now or not (
-            np.array_equal(now.solved, self.surface.solved)
+            np.array_equal(now.core_positions, self.surface.core_positions)
             and np.array_equal(now.faces, self.surface.faces)
         ):
             raise InputError(
@@ -58,14 +58,14 @@ class DesignRequest:
                 "again"
             )
 
-    def in_world(self, solved: np.ndarray) -> np.ndarray:
+    def in_world(self, core_positions: np.ndarray) -> np.ndarray:
         """World positions of points (n, 3) that are given in the space of the core."""
-        local = solved @ np.linalg.inv(self.surface.linear).T
-        placement = self.surface.placement
-        return local @ placement[:3, :3].T + placement[:3, 3]
+        local = core_positions @ np.linalg.inv(self.surface.local_to_core).T
+        local_to_world = self.surface.local_to_world
+        return local @ local_to_world[:3, :3].T + local_to_world[:3, 3]
 
 
-def for_points(mesh_object, surface, points, order: str, asked: Asked) -> DesignRequest:
+def for_points(mesh_object, surface, points, order: str, settings: CurveSettings) -> DesignRequest:
     """A request for a curve through points on a surface.
 
     Parameters
@@ -78,7 +78,7 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
         Control points as the core takes them.
     order : {"given", "shortest"}
         Order of the control points, by the core's name.
-    asked : Asked
+    settings : CurveSettings
         Settings of the curve.
     """
     return DesignRequest(
@@ -87,29 +87,29 @@ def for_points(mesh_object, surface, points, order: str, asked: Asked) -> Design
         surface=surface,
         points=points,
         order=order,
-        asked=asked,
+        settings=settings,
         options=curve_record.arguments_of(
-            asked, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
+            settings, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
         ),
     )
 
 
-def for_drawing(mesh_object, surface, points, asked: Asked) -> DesignRequest:
+def for_drawing(mesh_object, surface, points, settings: CurveSettings) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
-    request = for_points(mesh_object, surface, points, "given", asked)
-    closed = asked.closed and len(points) >= FEWEST_CLOSED
+    request = for_points(mesh_object, surface, points, "given", settings)
+    closed = settings.closed and len(points) >= FEWEST_CLOSED
     return replace(request, options={**request.options, "closed": closed})
 
 
-def for_curve(curve_object, mesh_object, surface, asked: Asked) -> DesignRequest:
+def for_curve(curve_object, mesh_object, surface, settings: CurveSettings) -> DesignRequest:
     """A request to design a curve again on the current surface, along the same course."""
-    points, moved = curve_record.controls_now(curve_object, mesh_object, surface)
+    points, moved = curve_record.current_control_points(curve_object, mesh_object, surface)
     if len(points) < FEWEST_OPEN:
-        raise InputError(curve_record.without_curve(curve_object))
-    request = for_drawing(mesh_object, surface, points, asked)
+        raise InputError(curve_record.no_curve_message(curve_object))
+    request = for_drawing(mesh_object, surface, points, settings)
     start = None
-    if asked.method == "NICMM" and curve_record.lies_on(curve_object, surface):
-        curves = curve_record.recall(curve_object, surface)
+    if settings.method == "NICMM" and curve_record.lies_on(curve_object, surface):
+        curves = curve_record.read_curves(curve_object, surface)
         start = curves[0] if len(curves) == 1 else None
     return replace(request, start=start, moved=moved)
 
@@ -118,8 +118,8 @@ def answer(request: DesignRequest, progress):
     """Design the curve with the core, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 
-    asked = request.asked
-    with designers.exclusive(request.surface.solved, request.surface.faces) as designer:
+    settings = request.settings
+    with designers.exclusive(request.surface.core_positions, request.surface.faces) as designer:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
             if request.start is not None:
@@ -132,4 +132,4 @@ def answer(request: DesignRequest, progress):
         except nicmm.NicmmError as error:
             vertices = request.points if isinstance(request.points, np.ndarray) else None
             at = vertices if vertices is not None and vertices.ndim == 1 else None
-            raise InputError(in_words(error, asked.obstacle_group, at)) from error
+            raise InputError(user_message(error, settings.obstacle_group, at)) from error

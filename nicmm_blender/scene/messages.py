@@ -6,7 +6,7 @@ class InputError(Exception):
     """Blender's data cannot be used; the message says what to change."""
 
 
-def in_words(error: Exception, obstacle_group: str = "", vertices=None) -> str:
+def user_message(error: Exception, obstacle_group: str = "", vertices=None) -> str:
     """Reword a message of the core: points are counted from one, and the obstacle map is named.
 
     `vertices` are the vertex indices of the control points, or None if they are not at vertices.

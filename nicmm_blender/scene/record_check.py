@@ -22,9 +22,9 @@ def problem_of(record) -> str:
     return _problem(_check_points, record)
 
 
-def problem_of_settings(record, asked_type) -> str:
-    """The problem with the settings of a record, whose class is `asked_type`; empty if none."""
-    return _problem(_check_settings, record, asked_type)
+def problem_of_settings(record, settings_type) -> str:
+    """The problem with the settings of a record, whose class is `settings_type`; empty if none."""
+    return _problem(_check_settings, record, settings_type)
 
 
 def _problem(check, *arguments) -> str:
@@ -72,16 +72,16 @@ def _check_points(record) -> None:
         _whole(record, "control_cage_copies", count, least=0)
 
 
-def _check_settings(record, asked_type) -> None:
-    asked, drawn = record.get("asked"), record.get("drawn")
-    if asked is None:
+def _check_settings(record, settings_type) -> None:
+    settings, drawn = record.get("asked"), record.get("drawn")
+    if settings is None:
         if not len(_whole(record, "closed")):
             raise _DamagedError("it has neither settings nor a curve")
-    elif not is_group(asked):
+    elif not is_group(settings):
         raise _DamagedError("asked is not a group of properties")
     else:
-        for field in fields(asked_type):
-            value = asked.get(field.name, field.default)
+        for field in fields(settings_type):
+            value = settings.get(field.name, field.default)
             if not (isinstance(value, str) if field.type is str else _is_finite(value)):
                 raise _DamagedError(f"its setting {field.name} is {value!r}")
     if drawn is not None and not (

@@ -86,14 +86,14 @@ def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
     "12, 80, 0.5 0 1".
     """
     core_order = "shortest" if order == "SHORTEST" else "given"
-    count = len(surface.local) if surface.cage is None else len(surface.cage.vertices)
+    count = len(surface.local_positions) if surface.cage is None else len(surface.cage.vertices)
     given = [_given_point(word, count) for word in text.split(",")]
     if all(isinstance(point, int) for point in given):
         return points_at(surface, np.array(given, dtype=np.int64)), core_order
     places = [
         positions_at(surface, np.array([point]))[0]
         if isinstance(point, int)
-        else surface.linear @ point
+        else surface.local_to_core @ point
         for point in given
     ]
     return np.array(places), core_order
@@ -115,8 +115,8 @@ def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
     """Positions (k, 3) on the surface, in the core's space, of vertices (k,) of the mesh."""
     points = points_at(surface, vertices)
     if isinstance(points, np.ndarray):
-        return surface.solved[points]
-    corners = surface.solved[surface.faces[points.faces]]
+        return surface.core_positions[points]
+    corners = surface.core_positions[surface.faces[points.faces]]
     return np.einsum("nj,njk->nk", points.barycentric, corners)
 
 
@@ -125,9 +125,9 @@ def _nearest(surface: Surface, vertices: np.ndarray):
     from ...nicmm_core.geometry.surface_points import nearest_points
 
     found = surface.cage.vertices[vertices]
-    before = surface.cage.positions[vertices] @ surface.linear.T
-    wanted = np.where(found[:, None] >= 0, surface.solved[found], before)
-    mesh = designers.mesh_for(surface.solved, surface.faces)
+    before = surface.cage.positions[vertices] @ surface.local_to_core.T
+    wanted = np.where(found[:, None] >= 0, surface.core_positions[found], before)
+    mesh = designers.mesh_for(surface.core_positions, surface.faces)
     return nearest_points(mesh, wanted)[0]
 
 

@@ -36,7 +36,7 @@ class Surface:
 
     Attributes
     ----------
-    local, solved : (V, 3) float array
+    local_positions, core_positions : (V, 3) float array
         Positions of the vertices in the object's local space, and in the space of the core, where
         lengths are proportional to those in the scene.
     faces : (F, 3) int array
@@ -47,9 +47,9 @@ class Surface:
         Face of the Blender mesh that each triangle belongs to.
     hidden : (F,) bool array
         Whether the user has hidden the triangle; always False in Object Mode.
-    linear : (3, 3) float array
+    local_to_core : (3, 3) float array
         Linear map from local space to the space of the core.
-    placement : (4, 4) float array
+    local_to_world : (4, 4) float array
         Transform from local space to world space.
     with_modifiers : bool
         Whether the surface includes the effect of modifiers and shape keys.
@@ -58,30 +58,30 @@ class Surface:
         the cage was not traced.
     """
 
-    local: np.ndarray
-    solved: np.ndarray
+    local_positions: np.ndarray
+    core_positions: np.ndarray
     faces: np.ndarray
     loops: np.ndarray
     polygons: np.ndarray
     hidden: np.ndarray
-    linear: np.ndarray
-    placement: np.ndarray
+    local_to_core: np.ndarray
+    local_to_world: np.ndarray
     with_modifiers: bool
     cage: CageTrace | None
 
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions in local space of points given by triangle and barycentric coordinates."""
-        return np.einsum("nj,njk->nk", barycentric, self.local[self.faces[faces]])
+        return np.einsum("nj,njk->nk", barycentric, self.local_positions[self.faces[faces]])
 
     @cached_property
     def diagonal(self) -> float:
         """Length of the diagonal of the bounding box in local space."""
-        return float(np.linalg.norm(np.ptp(self.local, axis=0)))
+        return float(np.linalg.norm(np.ptp(self.local_positions, axis=0)))
 
     @property
     def scale(self) -> float:
         """Length in the scene of one unit of local space, as a geometric mean over the axes."""
-        return float(np.cbrt(abs(np.linalg.det(self.placement[:3, :3]))))
+        return float(np.cbrt(abs(np.linalg.det(self.local_to_world[:3, :3]))))
 
     @property
     def unit(self) -> float:
@@ -91,7 +91,7 @@ class Surface:
     @property
     def keeps_proportions(self) -> bool:
         """Whether the object is scaled uniformly, so that the core works in local space."""
-        return bool((self.linear == np.eye(3)).all())
+        return bool((self.local_to_core == np.eye(3)).all())
 
 
 def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
@@ -100,7 +100,7 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
     Quads and larger faces are triangulated as Blender draws them.
     """
     with shown_mesh(mesh_object, use_modifiers) as (mesh, matrix):
-        local = mesh_arrays.positions(mesh)
+        local_positions = mesh_arrays.positions(mesh)
         loops = mesh_arrays.triangle_corners(mesh).astype(np.int64)
         faces = mesh_arrays.corner_vertices(mesh).astype(np.int64)[loops]
         polygons = mesh_arrays.triangle_faces(mesh).astype(np.int64)
@@ -108,25 +108,25 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
         if mesh_object.mode in MODES_THAT_HIDE:
             hidden = mesh_arrays.read(mesh.polygons, "hide", 1, bool)[polygons]
         cage = trace(mesh_object, mesh, loops, cage_mesh) if use_modifiers and traced else None
-    linear = np.array(matrix.to_3x3(), dtype=np.float64)
-    stretches = np.linalg.svd(linear, compute_uv=False)
+    local_to_core = np.array(matrix.to_3x3(), dtype=np.float64)
+    stretches = np.linalg.svd(local_to_core, compute_uv=False)
     if stretches[-1] <= FLAT * stretches[0]:
         raise InputError(
             f'The scale of "{mesh_object.name}" is zero or nearly zero along an axis. Reset it '
             "(Object > Clear > Scale)"
         )
-    if _keeps_proportions(linear):
-        linear = np.eye(3)
-    placement = np.array(matrix, dtype=np.float64)
+    if _keeps_proportions(local_to_core):
+        local_to_core = np.eye(3)
+    local_to_world = np.array(matrix, dtype=np.float64)
     return Surface(
-        local,
-        local @ linear.T,
+        local_positions,
+        local_positions @ local_to_core.T,
         faces,
         loops,
         polygons,
         hidden,
-        linear,
-        placement,
+        local_to_core,
+        local_to_world,
         use_modifiers,
         cage,
     )
@@ -168,7 +168,7 @@ def cage_mesh(mesh_object):
         bpy.data.meshes.remove(copy)
 
 
-def shown_beyond_the_cage(mesh_object) -> str:
+def active_modifiers_text(mesh_object) -> str:
     """Words for what the viewport shows besides the cage: modifiers, shape keys, both or empty."""
     shown = []
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
@@ -215,7 +215,7 @@ def _is_sculpted_without_modifiers(mesh_object) -> bool:
             f'"{mesh_object.name}" is sculpted with dynamic topology, whose faces extensions '
             "cannot read. Turn Dyntopo off, or leave Sculpt Mode"
         )
-    return not shown_beyond_the_cage(mesh_object)
+    return not active_modifiers_text(mesh_object)
 
 
 def _depsgraph_of(mesh_object):

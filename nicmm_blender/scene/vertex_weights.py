@@ -9,7 +9,7 @@ in one call.
 import bpy
 import numpy as np
 
-from .apart import evaluated_apart
+from .isolation import evaluated_in_isolation
 
 STORED = "nicmm_weights"
 
@@ -19,11 +19,11 @@ def weights_on(mesh, group: str) -> np.ndarray:
 
     `mesh` may be the evaluated mesh of an object. It is not changed.
     """
-    nodes = _storing(group)
+    nodes = _new_node_group(group)
     try:
         temporary = bpy.data.objects.new("NICMM weights", mesh.copy())
         temporary.modifiers.new("NICMM weights", "NODES").node_group = nodes
-        with evaluated_apart(temporary) as stored:
+        with evaluated_in_isolation(temporary) as stored:
             weights = np.zeros(len(stored.vertices), dtype=np.float32)
             stored.attributes[STORED].data.foreach_get("value", weights)
     finally:
@@ -31,22 +31,22 @@ def weights_on(mesh, group: str) -> np.ndarray:
     return weights.astype(np.float64)
 
 
-def _storing(group: str):
+def _new_node_group(group: str):
     """A new node group that stores a vertex group as an attribute."""
-    made = bpy.data.node_groups.new("NICMM weights", "GeometryNodeTree")
+    tree = bpy.data.node_groups.new("NICMM weights", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
-        made.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    read = made.nodes.new("GeometryNodeInputNamedAttribute")
-    store = made.nodes.new("GeometryNodeStoreNamedAttribute")
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    read = tree.nodes.new("GeometryNodeInputNamedAttribute")
+    store = tree.nodes.new("GeometryNodeStoreNamedAttribute")
     read.data_type = store.data_type = "FLOAT"
     store.domain = "POINT"
     read.inputs["Name"].default_value = group
     store.inputs["Name"].default_value = STORED
-    first, last = made.nodes.new("NodeGroupInput"), made.nodes.new("NodeGroupOutput")
+    first, last = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     for start, end in (
         (first.outputs[0], store.inputs["Geometry"]),
         (read.outputs["Attribute"], store.inputs["Value"]),
         (store.outputs["Geometry"], last.inputs[0]),
     ):
-        made.links.new(start, end)
-    return made
+        tree.links.new(start, end)
+    return tree

@@ -3,8 +3,8 @@
 
 import bpy
 
-from ..operators import turns
-from ..operators.long_solves import LONGEST_TURN, PASSED_ON, reporting
+from ..operators import time_slices
+from ..operators.long_solves import LONGEST_TIME_SLICE, PASSED_ON, with_error_reports
 from ..operators.viewports import redraw
 from ..scene import designers
 from . import modes, picking
@@ -37,7 +37,7 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
     def invoke(self, context, event):
         if context.mode not in modes.TOOLS or not picking.is_view(context):
             return PASS
-        return reporting(self, lambda: self._invoke(context, event))
+        return with_error_reports(self, lambda: self._invoke(context, event))
 
     def _invoke(self, context, event):
         mesh_object, curve = picking.mesh_and_curve(context)
@@ -47,7 +47,7 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if picking.is_ready(context, mesh_object, curve):
             return self._act(context)
         self._work, self._surface = None, None
-        self._turns = 0
+        self._slices = 0
         self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
         context.window_manager.modal_handler_add(self)
         self._show(context)
@@ -60,7 +60,7 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
         if event.type == "TIMER":
-            result = reporting(self, lambda: self._prepare(context))
+            result = with_error_reports(self, lambda: self._prepare(context))
             if result & {"FINISHED", "CANCELLED"}:
                 self._tidy(context)
             return result
@@ -73,19 +73,19 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         self._tidy(context)
 
     def _prepare(self, context):
-        """Work for one turn; after the last turn, do what the click was for."""
+        """Work for one time slice; after the last one, do what the click was for."""
         mesh_object, curve = picking.mesh_and_curve(context)
         if mesh_object is None:
             return {"CANCELLED"}
-        self._turns += 1
-        if self._turns == 1:
+        self._slices += 1
+        if self._slices == 1:
             return PASS  # so that the message is drawn before the mesh is read
         if self._surface is None:
             self._surface = surface = picking.surface_for(context, mesh_object, curve)
-            self._work = turns.Work(
-                lambda progress: designers.prepare(surface.solved, surface.faces, progress)
+            self._work = time_slices.Work(
+                lambda progress: designers.prepare(surface.core_positions, surface.faces, progress)
             )
-        elif self._work.turn(LONGEST_TURN):
+        elif self._work.run_slice(LONGEST_TIME_SLICE):
             self._work.result()
             self._tidy(context)
             return self._act(context)

@@ -8,17 +8,17 @@ import numpy as np
 
 from .. import settings
 from ..operators import polls
-from ..operators.long_solves import answer_all, pointer_progress, reporting
+from ..operators.long_solves import answer_all, pointer_progress, with_error_reports
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, mesh_data
 from ..scene.messages import InputError
 from . import modes
 
-DRAWN = ("spline", "radius", "thickness", "offset")
+OBJECT_SETTINGS = ("spline", "radius", "thickness", "offset")
 """Properties of a new curve object, shown in the redo panel."""
 
-FEWEST = "A curve needs at least two points, a closed curve at least three. Add more points"
+TOO_FEW_POINTS = "A curve needs at least two points, a closed curve at least three. Add more points"
 
 _OUTPUT = settings.OutputProperties.__annotations__
 
@@ -83,7 +83,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             layout.prop_search(self, name, mesh_object, "vertex_groups")
         layout.prop(self, "clearance")
         if not self.curve:
-            for name in ("output", *DRAWN):
+            for name in ("output", *OBJECT_SETTINGS):
                 if name != "thickness" or not self.radius:
                     layout.prop(self, name)
             if self.output == "STICKY":
@@ -95,27 +95,27 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         in_view = context.space_data is not None and context.space_data.type == "VIEW_3D"
         if len(self.points) or not in_view:
             return self.execute(context)
-        return reporting(self, lambda: self._choose_tool(context))
+        return with_error_reports(self, lambda: self._choose_tool(context))
 
     def _choose_tool(self, context):
         edited = edited_curve.chosen(context, self.curve)
         if context.mode not in modes.TOOLS:
-            raise InputError(modes.DRAWS_IN)
+            raise InputError(modes.WRONG_MODE)
         if edited is not None:
             modes.make_active(context, edited)
         bpy.ops.wm.tool_set_by_id(name=modes.TOOLS[context.mode])
         return {"FINISHED"}
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         edited = edited_curve.chosen(context, self.curve)
-        opened = edited_curve.opened(context, edited, self._asked_for(context, edited))
+        opened = edited_curve.open_curve(context, edited, self._settings_for(context, edited))
         points = opened.points
         if len(self.points):
             positions = np.array([point.position[:] for point in self.points])
-            points = edited_curve.located(opened, positions, "points")
+            points = edited_curve.surface_points_at(opened, positions, "points")
         elif edited is None:
             raise InputError(
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
@@ -123,39 +123,39 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             )
         curves = [opened.curve]
         if len(self.points) or opened.curve is None:
-            curves = _designed(context, opened, points)
-        made = edited_curve.write(context, opened, points, curves, self)
+            curves = _design_curves(context, opened, points)
+        result = edited_curve.write(context, opened, points, curves, self)
         self._store(opened, points)
-        self.report({"INFO"}, f'"{made.name}" through {len(points)} points{opened.remark}')
+        self.report({"INFO"}, f'"{result.name}" through {len(points)} points{opened.remark}')
         return {"FINISHED"}
 
-    def _asked_for(self, context, edited):
+    def _settings_for(self, context, edited):
         """The settings of the curve, or of the sidebar, replaced by those given in this call."""
         if edited is None:
-            asked = curve_record.asked_by(context.scene.nicmm_curves)
+            curve_settings = curve_record.settings_from(context.scene.nicmm_curves)
         else:
-            asked = curve_record.asked_of(edited)
+            curve_settings = curve_record.settings_of(edited)
         given = {
             name: getattr(self, name)
             for name in settings.EditingProperties.__annotations__
             if self.properties.is_property_set(name)
         }
-        return replace(asked, method="NICMM", **given)
+        return replace(curve_settings, method="NICMM", **given)
 
     def _store(self, opened: Opened, points) -> None:
         """Store points and settings for the redo panel."""
         for name in settings.EditingProperties.__annotations__:
-            setattr(self, name, getattr(opened.asked, name))
+            setattr(self, name, getattr(opened.settings, name))
         self.points.clear()
         for position in opened.surface.points(points.faces, points.barycentric):
             self.points.add().position = position
 
 
-def _designed(context, opened: Opened, points) -> list:
+def _design_curves(context, opened: Opened, points) -> list:
     """The curve through points, as a list; an error if there is none."""
     requests = edited_curve.request(opened, points)
     if not requests:
-        raise InputError(FEWEST)
+        raise InputError(TOO_FEW_POINTS)
     with pointer_progress(context) as progress:
         return edited_curve.curves_of(answer_all(requests, progress))
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ..scene import designers
 from ..scene.design_request import DesignRequest
-from ..scene.messages import in_words
+from ..scene.messages import user_message
 
 ITERATIONS = 3
 """Maximum number of iterations for each move; they take one or two frames."""
@@ -54,7 +54,7 @@ class LiveCurve:
         if not self.waiting:
             self.step()
 
-    def take(self, design) -> None:
+    def set_result(self, design) -> None:
         """Store the result of a design from scratch, which may be an exception."""
         self.waiting, self.steps_left = False, 0
         if isinstance(design, Exception):
@@ -70,7 +70,7 @@ class LiveCurve:
             return
         self.steps_left -= 1
         request, surface = self.request, self.request.surface
-        designer = designers.designer_for(surface.solved, surface.faces)
+        designer = designers.designer_for(surface.core_positions, surface.faces)
         iterations = min(max(POINTS // len(self.curve.faces), 1), ITERATIONS)
         bounds = {"order": "given", "max_iterations": iterations, "start": request.start}
         try:
@@ -78,7 +78,7 @@ class LiveCurve:
         except nicmm.CurveError:
             self.waiting, self.steps_left = True, 0
         except nicmm.NicmmError as error:
-            self.problem, self.steps_left = in_words(error, request.asked.obstacle_group), 0
+            self.problem, self.steps_left = user_message(error, request.settings.obstacle_group), 0
         else:
             self.request, self.problem = replace(request, start=design), ""
             if design.status is not nicmm.Status.ITERATION_LIMIT:

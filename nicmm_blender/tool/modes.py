@@ -18,7 +18,7 @@ TOOLS = {
 }
 """The identifier of the tool in each mode of the context."""
 
-DRAWS_IN = (
+WRONG_MODE = (
     "The Surface Curve tool works in Object Mode, Sculpt Mode and Weight Paint. In Edit Mode, "
     "select vertices and run Design Curve on Surface"
 )

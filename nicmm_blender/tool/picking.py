@@ -11,7 +11,7 @@ from mathutils import Vector
 
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
-from ..scene import curve_record, designers, shown_surfaces
+from ..scene import curve_record, designers, surface_cache
 from ..scene.membership import is_in
 from ..scene.messages import InputError
 from .view import View, view_of
@@ -64,7 +64,7 @@ class Line:
     radius: float
 
 
-class _Places:
+class _VisibleCurves:
     """The curves that the viewport shows, read again only after changes."""
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ class _Places:
         self.lines: list[Line] = []
 
 
-_places = _Places()
+_visible_curves = _VisibleCurves()
 
 
 def mesh_and_curve(context) -> tuple:
@@ -92,16 +92,16 @@ def mesh_and_curve(context) -> tuple:
 
 def is_ready(context, mesh_object, curve) -> bool:
     """Whether what is under the mouse is known without a long computation."""
-    surface = shown_surfaces.known(mesh_object, _uses_modifiers(context, curve))
+    surface = surface_cache.cached(mesh_object, _uses_modifiers(context, curve))
     if surface is None:
-        return shown_surfaces.has_few_faces(mesh_object)
-    few = len(surface.faces) <= 2 * shown_surfaces.FEW_FACES
-    return few or designers.is_prepared(surface.solved, surface.faces)
+        return surface_cache.has_few_faces(mesh_object)
+    few = len(surface.faces) <= 2 * surface_cache.FEW_FACES
+    return few or designers.is_prepared(surface.core_positions, surface.faces)
 
 
 def surface_for(context, mesh_object, curve):
     """The surface that a click draws on."""
-    return shown_surfaces.shown(mesh_object, _uses_modifiers(context, curve))
+    return surface_cache.get(mesh_object, _uses_modifiers(context, curve))
 
 
 def opened_now(context) -> Opened:
@@ -121,7 +121,7 @@ def pixel_of(event) -> np.ndarray:
 
 def view_on(context, mesh_object, surface) -> View:
     """The view of the context's region on a mesh."""
-    mesh = designers.mesh_for(surface.solved, surface.faces)
+    mesh = designers.mesh_for(surface.core_positions, surface.faces)
     region = context.region
     return view_of(region, region.data, mesh_object, surface, mesh, is_xray(context.space_data))
 
@@ -148,7 +148,7 @@ def under_mouse(context, pixel) -> Hit | None:
     return hit
 
 
-def _hit(context, view: View, pixel, found: _Places, name: str, curve) -> Hit | None:
+def _hit(context, view: View, pixel, found: _VisibleCurves, name: str, curve) -> Hit | None:
     opened, scale = found.opened, context.preferences.system.ui_scale
     positions = opened.positions()
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
@@ -163,7 +163,7 @@ def _hit(context, view: View, pixel, found: _Places, name: str, curve) -> Hit | 
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
             return Hit(Kind.CURVE, line.name, 0, tuple(line.positions[on_line[0]]))
-    place = view.place_at(pixel)
+    place = view.surface_point_at(pixel)
     if place is None:
         return None
     position = opened.surface.points(place.faces, place.barycentric)[0]
@@ -179,16 +179,18 @@ def _on_line(opened: Opened, mesh, name: str, segment: int, share: float) -> Hit
     return Hit(Kind.LINE, name, number, tuple(position))
 
 
-def _read(context) -> _Places:
+def _read(context) -> _VisibleCurves:
     mesh_object, curve = mesh_and_curve(context)
     uid = 0 if curve is None else curve.session_uid
     panel = context.scene.nicmm_curves.use_modifiers
-    key = shown_surfaces.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode
-    if key != _places.key:
-        _places.opened = edited_curve.opened(context, curve)
-        _places.lines = _other_lines(context, mesh_object, curve, _places.opened.surface)
-        _places.key = shown_surfaces.changes(), *key[1:]
-    return _places
+    key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode
+    if key != _visible_curves.key:
+        _visible_curves.opened = edited_curve.open_curve(context, curve)
+        _visible_curves.lines = _other_lines(
+            context, mesh_object, curve, _visible_curves.opened.surface
+        )
+        _visible_curves.key = surface_cache.changes(), *key[1:]
+    return _visible_curves
 
 
 def _other_lines(context, mesh_object, active, surface) -> list:
@@ -198,10 +200,10 @@ def _other_lines(context, mesh_object, active, surface) -> list:
             continue
         try:
             on = surface
-            asked = curve_record.asked_of(curve)
-            if asked.use_modifiers != surface.with_modifiers:
-                on = shown_surfaces.shown(mesh_object, asked.use_modifiers)
-            _, line = curve_record.places(curve, on)
+            settings = curve_record.settings_of(curve)
+            if settings.use_modifiers != surface.with_modifiers:
+                on = surface_cache.get(mesh_object, settings.use_modifiers)
+            _, line = curve_record.positions_of(curve, on)
         except InputError:
             continue  # the error is reported where the curve is used
         lines.append(Line(curve.name, line, radius_of(curve, surface)))
@@ -211,7 +213,7 @@ def _other_lines(context, mesh_object, active, surface) -> list:
 def _uses_modifiers(context, curve) -> bool:
     if curve is None:
         return context.scene.nicmm_curves.use_modifiers
-    return curve_record.asked_of(curve).use_modifiers
+    return curve_record.settings_of(curve).use_modifiers
 
 
 def radius_of(curve, surface) -> float:
@@ -278,7 +280,7 @@ def _meets_box(candidate, start, along) -> bool:
 
 def forget() -> None:
     """Drop all curves that were read."""
-    _places.key, _places.opened, _places.lines = (), None, []
+    _visible_curves.key, _visible_curves.opened, _visible_curves.lines = (), None, []
 
 
 def register() -> None:

@@ -10,8 +10,8 @@ import time
 import bpy
 import numpy as np
 
-from ..operators import turns
-from ..operators.long_solves import TURN, answer_all, reporting
+from ..operators import time_slices
+from ..operators.long_solves import TIME_SLICE, answer_all, with_error_reports
 from ..operators.viewports import NAVIGATION, redraw
 from ..outputs import edited_curve, writing
 from . import overlay, picking
@@ -27,7 +27,7 @@ HINT = "Release: Confirm   |   Esc, Right Mouse: Cancel"
 
 
 class PointDrag:
-    """A mixin for operators with `opened(context)` and `changed(opened)`.
+    """A mixin for operators with `open_curve(context)` and `changed(opened)`.
 
     `dragged` is the current position of the point, as a point of the core, or None in a script.
     """
@@ -45,15 +45,15 @@ class PointDrag:
     def invoke(self, context, event):
         if not self.from_mouse:
             return super().invoke(context, event)
-        return reporting(self, lambda: self._press(context, event))
+        return with_error_reports(self, lambda: self._press(context, event))
 
     def _press(self, context, event):
-        self._opened = self.opened(context)
+        self._opened = self.open_curve(context)
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
         pixel = picking.pixel_of(event)
         self._pressed, self._grip = pixel, np.zeros(2)
         given = np.array([self.position[:]], dtype=float)
-        self.dragged = place = edited_curve.located(self._opened, given, "position")
+        self.dragged = place = edited_curve.surface_points_at(self._opened, given, "position")
         positions = self._opened.surface.points(place.faces, place.barycentric)
         on_screen = self._view.project(positions)[0]
         if np.isfinite(on_screen).all():
@@ -79,13 +79,13 @@ class PointDrag:
         try:
             return self._modal(context, event)
         except Exception:
-            self._let_go(context)
+            self._end_drag(context)
             raise
 
     def cancel(self, context):
         """Stop the drag; called by Blender when it ends the operator, for example when it quits."""
         if getattr(self, "_is_dragging", False):
-            self._let_go(context)
+            self._end_drag(context)
         else:
             super().cancel(context)
 
@@ -97,7 +97,7 @@ class PointDrag:
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             return self._release(context)
         elif event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
-            self._let_go(context)
+            self._end_drag(context)
             return {"CANCELLED"}
         elif event.type in NAVIGATION:
             return {"PASS_THROUGH"}
@@ -110,7 +110,7 @@ class PointDrag:
         self._pressed = np.full(2, np.nan)  # from now on every move counts, even back to the start
         self._last_move = time.monotonic()
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
-        place = self._view.place_at(pixel + self._grip)
+        place = self._view.surface_point_at(pixel + self._grip)
         if place is None:
             return
         self._stop_scratch()
@@ -129,12 +129,12 @@ class PointDrag:
                 return
             if self._scratch is None:
                 requests = edited_curve.request(self._opened, live.request.points)
-                self._scratch = turns.Work(lambda progress: answer_all(requests, progress))
-            if not self._scratch.turn(TURN):
+                self._scratch = time_slices.Work(lambda progress: answer_all(requests, progress))
+            if not self._scratch.run_slice(TIME_SLICE):
                 return
             (answer,) = self._scratch.result()
             self._scratch = None
-            live.take(answer)
+            live.set_result(answer)
         elif live.steps_left:
             live.step()
         else:
@@ -155,7 +155,7 @@ class PointDrag:
         live, opened = self._live, self._opened
         moved = np.isnan(self._pressed).any()
         if not moved and not self._is_new:
-            self._let_go(context)
+            self._end_drag(context)
             return {"CANCELLED"}
         self._points = self.changed(opened)
         self.position = opened.surface.points(self.dragged.faces, self.dragged.barycentric)[0]
@@ -166,10 +166,10 @@ class PointDrag:
             requests = [live.request]
             if not live.steps_left and hasattr(live.request.start, "curves"):
                 design = live.request.start
-        self._let_go(context)
-        return reporting(self, lambda: self._keep(context, requests, design))
+        self._end_drag(context)
+        return with_error_reports(self, lambda: self._commit(context, requests, design))
 
-    def _keep(self, context, requests: list, design):
+    def _commit(self, context, requests: list, design):
         if design is not None:
             return self.finish(context, requests, [design])
         # The points stay visible during a long computation.
@@ -191,7 +191,7 @@ class PointDrag:
             self._scratch.cancel()
             self._scratch = None
 
-    def _let_go(self, context) -> None:
+    def _end_drag(self, context) -> None:
         """End the drag: restore the window and the object."""
         self._is_dragging = False
         self._stop_scratch()
@@ -207,7 +207,7 @@ class _Preview:
 
     def __init__(self, opened) -> None:
         self._opened = opened
-        self._kept = self._copy = ""
+        self._original = self._copy = ""
 
     def show(self, curve) -> None:
         """Draw a curve."""
@@ -216,7 +216,7 @@ class _Preview:
             return
         if not self._copy:
             copy = shown.data.copy()
-            self._kept, self._copy = shown.data.name, copy.name
+            self._original, self._copy = shown.data.name, copy.name
             shown.data = copy
         writing.show_unfinished(shown, self._opened.surface, curve)
 
@@ -226,9 +226,9 @@ class _Preview:
         if not self._copy or shown is None:
             return
         all_data = bpy.data.curves if shown.type == "CURVE" else bpy.data.hair_curves
-        kept, copy = all_data.get(self._kept), all_data.get(self._copy)
-        if kept is not None:
-            shown.data = kept
+        original, copy = all_data.get(self._original), all_data.get(self._copy)
+        if original is not None:
+            shown.data = original
         if copy is not None and copy != shown.data:
             all_data.remove(copy)
         self._copy = ""

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..operators import polls
-from ..operators.long_solves import LongSolves, reporting
+from ..operators.long_solves import LongSolves, with_error_reports
 from ..outputs import edited_curve
 from ..outputs.writing import SEPARATE
 from ..scene import curve_record
@@ -48,25 +48,25 @@ class _ChangesPoints(LongSolves):
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
     def requests(self, context) -> list:
-        self._opened = self.opened(context)
+        self._opened = self.open_curve(context)
         self._points = self.changed(self._opened)
         return edited_curve.request(self._opened, self._points)
 
-    def opened(self, context):
+    def open_curve(self, context):
         """Open the curve to change."""
         edited = edited_curve.chosen(context, self.curve)
         if edited is None:
             raise InputError(polls.NO_CURVE)
-        return edited_curve.opened(context, edited)
+        return edited_curve.open_curve(context, edited)
 
     def finish(self, context, _requests: list, answers: list) -> set:
         curves = edited_curve.curves_of(answers)
         panel = context.scene.nicmm_curves
         opened, points = self._opened, self._points
-        made = edited_curve.write(context, opened, points, curves, _Output(panel))
-        modes.make_active(context, made)
+        result = edited_curve.write(context, opened, points, curves, _Output(panel))
+        modes.make_active(context, result)
         if opened.remark:
-            self.report({"WARNING"}, f'"{made.name}" through {len(points)} points{opened.remark}')
+            self.report({"WARNING"}, f'"{result.name}" through {len(points)} points{opened.remark}')
         return {"FINISHED"}
 
     def checked_index(self, opened) -> int:
@@ -82,7 +82,9 @@ class _ChangesPoints(LongSolves):
         """The position of the new or moved point on the surface, as a point of the core."""
         if self.dragged is not None:
             return self.dragged
-        return edited_curve.located(opened, np.array([self.position[:]], dtype=float), "position")
+        return edited_curve.surface_points_at(
+            opened, np.array([self.position[:]], dtype=float), "position"
+        )
 
 
 class _Output:
@@ -105,8 +107,8 @@ class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def opened(self, context):
-        return edited_curve.opened(context, edited_curve.chosen(context, self.curve))
+    def open_curve(self, context):
+        return edited_curve.open_curve(context, edited_curve.chosen(context, self.curve))
 
     def changed(self, opened):
         return edited_curve.with_point(opened.points, len(opened.points), self.place(opened))
@@ -182,13 +184,13 @@ class NICMM_OT_activate_curve(bpy.types.Operator):
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         chosen = edited_curve.chosen(context, self.curve)
         if chosen is None:
             raise InputError(polls.NO_CURVE)
-        curve_record.present_mesh(context, chosen)
+        curve_record.mesh_in_view_layer(context, chosen)
         modes.make_active(context, chosen)
         return {"FINISHED"}
 
@@ -206,13 +208,13 @@ class NICMM_OT_end_curve(bpy.types.Operator):
         return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
     def execute(self, context):
-        return reporting(self, lambda: self._execute(context))
+        return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
         ended = edited_curve.active(context)
         if not curve_record.has_curve(ended):
-            raise InputError(curve_record.without_curve(ended))
-        curve_record.present_mesh(context, ended)
+            raise InputError(curve_record.no_curve_message(ended))
+        curve_record.mesh_in_view_layer(context, ended)
         modes.make_active(context, None)
         self.report({"INFO"}, f'"{ended.name}" is complete')
         return {"FINISHED"}

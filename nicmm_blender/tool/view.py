@@ -63,11 +63,13 @@ class View:
         (near,), (direction,) = self.rays(np.asarray(pixel, dtype=np.float64)[None])
         return near, direction
 
-    def place_at(self, pixel):
+    def surface_point_at(self, pixel):
         """The visible point of the surface under a pixel, as a point of the core, or None."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
-        origin, direction = (vector[None] @ self.surface.linear.T for vector in self.ray(pixel))
+        origin, direction = (
+            vector[None] @ self.surface.local_to_core.T for vector in self.ray(pixel)
+        )
         while True:
             points, along = first_hits(self.mesh, origin, direction)
             face = int(points.faces[0])
@@ -90,8 +92,8 @@ class View:
         origins, _ = self.rays(np.where(seen[:, None], pixels, 0.0))
         directions = np.where(seen[:, None], positions, origins) - origins
         lengths = np.linalg.norm(directions, axis=1)
-        linear = self.surface.linear.T
-        _, along = first_hits(self.mesh, origins @ linear, directions @ linear)
+        local_to_core = self.surface.local_to_core.T
+        _, along = first_hits(self.mesh, origins @ local_to_core, directions @ local_to_core)
         room = OFFSET * self.surface.diagonal / np.maximum(lengths, np.finfo(float).tiny)
         return seen & (along >= 1.0 - room)
 

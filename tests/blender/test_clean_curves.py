@@ -8,7 +8,7 @@ import pytest
 from mathutils import Euler
 
 from tests.blender import scenes
-from tests.blender.test_shown_surface import CHOSEN, away, in_world, shown
+from tests.blender.test_shown_surface import CHOSEN, curve_deviation, in_world, shown
 
 SINGLE = 1e-6
 """Rounding of single precision, in diagonals."""
@@ -94,7 +94,7 @@ def test_clean_splines_are_near_the_exact_one(monkey, spline, scale):
 
 def test_even_points_are_on_the_surface_and_evenly_spaced(monkey):
     curve = draw(monkey)
-    assert away(curve, monkey) < SINGLE
+    assert curve_deviation(curve, monkey) < SINGLE
     points = in_world(curve)
     vertices, _ = shown(monkey)
     controls = [int(np.linalg.norm(points - vertices[v], axis=1).argmin()) for v in CHOSEN]

@@ -72,10 +72,10 @@ def test_settings_are_those_of_the_operator(command, file, tmp_path):
     curve = drawn(out)
     assert curve.type == "CURVES"
     assert not curve.data.attributes["cyclic"].data[0].value
-    asked = curve["nicmm_curve"]["asked"]
-    assert asked["obstacle_group"] == "Wall"
-    assert asked["clearance"] == pytest.approx(0.1)
-    assert asked["smoothness"] == 2.0
+    settings = curve["nicmm_curve"]["asked"]
+    assert settings["obstacle_group"] == "Wall"
+    assert settings["clearance"] == pytest.approx(0.1)
+    assert settings["smoothness"] == 2.0
 
 
 def test_every_setting_is_an_option(command, extension, capsys):

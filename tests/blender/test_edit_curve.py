@@ -167,8 +167,8 @@ def test_edited_again_after_reopening(empty_scene, sphere, places, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     curve = bpy.data.objects["Icosphere Curve"]
     bpy.context.view_layer.objects.active = curve
-    opened = module(empty_scene, "outputs.edited_curve").opened(bpy.context, curve)
-    assert not opened.asked.closed and opened.asked.smoothness == 2.0
+    opened = module(empty_scene, "outputs.edited_curve").open_curve(bpy.context, curve)
+    assert not opened.settings.closed and opened.settings.smoothness == 2.0
     np.testing.assert_allclose(opened.positions(), places, atol=ROUNDING)
     np.testing.assert_allclose(opened.polyline(), before, atol=ROUNDING)
 

@@ -174,9 +174,9 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
             continue
         name = record.property_name(option)
         assert designing[name].name == option.label
-        of_a_design = option.name in ("order", "alternatives")
-        assert (name in editing) == (not of_a_design and option.name != "method")
-        assert (name in record.Asked.__dataclass_fields__) == (not of_a_design)
+        is_new_curve_option = option.name in ("order", "alternatives")
+        assert (name in editing) == (not is_new_curve_option and option.name != "method")
+        assert (name in record.CurveSettings.__dataclass_fields__) == (not is_new_curve_option)
     added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
     whole = table.Option("turns", table.Kind.COUNT, 1, "Turns", "Winds", limits=(0.0, 9.0))
     made = settings.properties_of((*table.OPTIONS, added, whole))

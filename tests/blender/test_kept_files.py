@@ -34,7 +34,7 @@ def drawn(curve):
 
 def controls(extension, curve):
     surface = module(extension, "scene.surface").read(bpy.data.objects["Body"], False)
-    points, positions = module(extension, "scene.curve_record").recall_controls(curve, surface)
+    points, positions = module(extension, "scene.curve_record").read_control_points(curve, surface)
     assert (points.faces >= 0).all()
     return positions
 
@@ -49,22 +49,22 @@ def test_a_curve_is_recalled_as_it_was_drawn(kept, name):
     body, curve = bpy.data.objects["Body"], bpy.data.objects[name]
     assert record.has_record(curve) and record.mesh_of(curve) == body
     surface = module(kept, "scene.surface").read(body, False)
-    (recalled,) = record.recall(curve, surface)
+    (recalled,) = record.read_curves(curve, surface)
     np.testing.assert_allclose(drawn(curve), recalled.points, atol=ROUNDING)
-    asked = record.asked_of(curve)
-    assert asked.closed == recalled.closed == (name not in ("Open", "Tube"))
-    assert record.is_current(curve, record.digest(body, surface, asked))
+    settings = record.settings_of(curve)
+    assert settings.closed == recalled.closed == (name not in ("Open", "Tube"))
+    assert record.is_current(curve, record.digest(body, surface, settings))
     at_controls = recalled.points[recalled.control_index]
     np.testing.assert_allclose(controls(kept, curve), at_controls, atol=ROUNDING)
 
 
-def test_what_curves_were_asked_for(kept):
+def test_settings_of_curves(kept):
     record = module(kept, "scene.curve_record")
-    asked = {name: record.asked_of(bpy.data.objects[name]) for name in CURVES}
-    assert asked["Open"].smoothness == 2.0
-    assert asked["Variational"].method == "VARIATIONAL"
-    assert (asked["Maps"].obstacle_group, asked["Maps"].alignment_group) == ("Wall", "Lane")
-    assert asked["Maps"].clearance == pytest.approx(0.05)
+    settings = {name: record.settings_of(bpy.data.objects[name]) for name in CURVES}
+    assert settings["Open"].smoothness == 2.0
+    assert settings["Variational"].method == "VARIATIONAL"
+    assert (settings["Maps"].obstacle_group, settings["Maps"].alignment_group) == ("Wall", "Lane")
+    assert settings["Maps"].clearance == pytest.approx(0.05)
     panel = bpy.context.scene.nicmm_curves
     assert (panel.smoothness, panel.obstacle_group) == (3.0, "Wall")
 
@@ -93,7 +93,7 @@ def test_a_curve_is_edited_in_place(kept, name):
     before, at = drawn(curve), controls(kept, curve)
     assert bpy.ops.nicmm.edit_curve(smoothness=0.1) == {"FINISHED"}
     assert bpy.context.active_object == curve
-    assert module(kept, "scene.curve_record").asked_of(curve).smoothness == pytest.approx(0.1)
+    assert module(kept, "scene.curve_record").settings_of(curve).smoothness == pytest.approx(0.1)
     assert scenes.distances_to(at, drawn(curve)).max() < ROUNDING
     assert len(drawn(curve)) != len(before) or not np.allclose(drawn(curve), before)
 

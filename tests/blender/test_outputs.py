@@ -113,7 +113,7 @@ def test_open_curve_is_cut(monkey):
     assert (np.bincount(chain.ravel()) == 1).sum() == 2
 
 
-def with_everything(mesh_object):
+def add_layers_of_all_types(mesh_object):
     """Add layers of all types whose values identify their source; return the UV maps of faces."""
     data = mesh_object.data
     generator = np.random.default_rng(0)
@@ -157,7 +157,7 @@ def with_everything(mesh_object):
 def test_everything_on_the_mesh_comes_along(monkey, mode, cut_faces):
     n_edges, n_vertices = len(monkey.data.edges), len(monkey.data.vertices)
     old_edges = get(monkey.data.edges, "vertices", 2, np.int32)
-    maps = with_everything(monkey)
+    maps = add_layers_of_all_types(monkey)
     design(mode, output="EDGES", cut_faces=cut_faces)
     data = monkey.data
     place = scenes.positions(monkey)
@@ -306,7 +306,7 @@ def test_parts_stay_in_the_mesh(monkey, mode):
 @MODES
 def test_parts_become_objects(monkey, mode):
     before, whole = components(monkey), area(monkey)
-    maps = with_everything(monkey)
+    maps = add_layers_of_all_types(monkey)
     monkey.location = (1, 2, 3)
     design(mode, output="PARTS", parts_as="OBJECTS", cut_faces="TRIANGLES")
     (other,) = [found for found in bpy.data.objects if found is not monkey]

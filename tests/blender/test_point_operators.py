@@ -343,10 +343,10 @@ def test_another_property_of_that_name_is_no_record(curve, value, sphere):
 def live_of(extension, curve, number):
     """A `LiveCurve`, a function that returns its points with one moved, and the opened curve."""
     edited_curve = module(extension, "outputs.edited_curve")
-    opened = edited_curve.opened(bpy.context, curve)
+    opened = edited_curve.open_curve(bpy.context, curve)
 
     def moved(position):
-        place = edited_curve.located(opened, np.array([position]), "position")
+        place = edited_curve.surface_points_at(opened, np.array([position]), "position")
         return edited_curve.with_point(opened.points, number, place, replaced=True)
 
     (request,) = edited_curve.request(opened, opened.points)
@@ -357,7 +357,7 @@ def test_every_move_of_a_drag_is_bounded(empty_scene, curve, sphere, places, mon
     """A move takes a few iterations of the relaxation and never a design from scratch."""
     live, moved, opened = live_of(empty_scene, curve, 1)
     designers = module(empty_scene, "scene.designers")
-    designer = designers.designer_for(opened.surface.solved, opened.surface.faces)
+    designer = designers.designer_for(opened.surface.core_positions, opened.surface.faces)
     spent, design = [], designer.design
 
     def counted(*arguments, **named):

@@ -65,7 +65,7 @@ def test_preferences_have_the_usual_values(empty_scene, preferences):
 
 
 @pytest.mark.slow
-def test_so_many_meshes_are_kept(empty_scene, preferences):
+def test_number_of_meshes_in_memory(empty_scene, preferences):
     designers = import_module(f"{empty_scene.name}.nicmm_blender.scene.designers")
     found = bpy.context.preferences.addons[empty_scene.name].preferences
     designers.forget()

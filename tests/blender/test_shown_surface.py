@@ -42,12 +42,12 @@ def in_world(curve):
     return local @ world[:3, :3].T + world[:3, 3]
 
 
-def away(curve, mesh_object):
+def curve_deviation(curve, mesh_object):
     """Largest distance of a curve's points from the shown surface, in diagonals."""
-    return points_away(in_world(curve), mesh_object)
+    return point_deviation(in_world(curve), mesh_object)
 
 
-def points_away(points, mesh_object):
+def point_deviation(points, mesh_object):
     vertices, faces = shown(mesh_object)
     squared, *_ = igl.point_mesh_squared_distance(points, vertices, faces)
     return float(np.sqrt(squared.max()) / np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -195,7 +195,7 @@ def test_curves_lie_on_the_shown_surface(monkey, change, output):
     change(monkey)
     before = scenes.positions(monkey), len(monkey.data.attributes)
     curve = draw(monkey, output=output)
-    assert away(curve, monkey) < EXACT
+    assert curve_deviation(curve, monkey) < EXACT
     np.testing.assert_array_equal(scenes.positions(monkey), before[0])
     assert len(monkey.data.attributes) == before[1]
     assert len(bpy.data.scenes) == 1
@@ -210,7 +210,7 @@ def test_even_curves_are_near_the_shown_surface_and_evenly_spaced(monkey, change
     points = in_world(curve)
     following = np.roll(points, -1, axis=0)
     for share in (0.0, 0.25, 0.5, 0.75):
-        assert points_away((1.0 - share) * points + share * following, monkey) < 1e-4
+        assert point_deviation((1.0 - share) * points + share * following, monkey) < 1e-4
     record = np.reshape(curve["nicmm_curve"]["control_positions"], (-1, 3))
     placement = np.array(monkey.matrix_world)
     controls = record @ placement[:3, :3].T + placement[:3, 3]
@@ -239,7 +239,7 @@ def test_every_mode_shows_the_same_surface(monkey, empty_scene, mode):
     before = surface.read(monkey, True)
     bpy.ops.object.mode_set(mode=mode)
     now = surface.read(monkey, True)
-    for name in ("local", "faces", "loops", "polygons"):
+    for name in ("local_positions", "faces", "loops", "polygons"):
         np.testing.assert_array_equal(getattr(now, name), getattr(before, name))
     np.testing.assert_array_equal(now.cage.vertices, before.cage.vertices)
 
@@ -284,7 +284,7 @@ def test_a_wall_keeps_the_curve_away_on_the_shown_surface(monkey):
     near[list(CHOSEN)] = False
     group.add(np.flatnonzero(near).tolist(), 1.0, "REPLACE")
     curve = draw(monkey, obstacle_group="Wall")
-    assert away(curve, monkey) < EXACT
+    assert curve_deviation(curve, monkey) < EXACT
     assert np.linalg.norm(in_world(curve) - place, axis=1).min() > 0.05
 
 
@@ -305,7 +305,7 @@ def test_points_survive_a_change_of_level(monkey, levels):
     ends = in_world(curve)[[0, -1]]
     # Another level changes the shape of the surface too.
     assert scenes.distances_to(places[[0, -1]], ends).max() < 0.02 * diagonal
-    assert away(curve, monkey) < 1e-4
+    assert curve_deviation(curve, monkey) < 1e-4
 
 
 @pytest.mark.slow
@@ -343,7 +343,7 @@ def test_the_pose_is_followed(monkey):
     for frame in range(1, 21):
         bpy.context.scene.frame_set(frame)
         assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
-        assert away(curve, monkey) < EXACT
+        assert curve_deviation(curve, monkey) < EXACT
 
 
 def test_sticky_curves_follow_an_animated_pose(monkey):
@@ -351,7 +351,7 @@ def test_sticky_curves_follow_an_animated_pose(monkey):
     curve = draw(monkey, output="STICKY")
     for frame in range(1, 21):
         bpy.context.scene.frame_set(frame)
-        assert away(curve, monkey) < EXACT
+        assert curve_deviation(curve, monkey) < EXACT
 
 
 @pytest.mark.parametrize("level", [0, 2, 3])
@@ -363,7 +363,7 @@ def test_sticky_curves_follow_another_level(monkey, level):
     monkey.modifiers["Subdivision"].levels = level
     for frame in (20, 5):
         bpy.context.scene.frame_set(frame)
-        assert away(curve, monkey) < EXACT
+        assert curve_deviation(curve, monkey) < EXACT
     bpy.context.scene.frame_set(20)
     # Without the modifier Suzanne is larger.
     assert scenes.distances_to(before, in_world(curve)).max() < (0.05 if level else 0.15)
@@ -406,7 +406,7 @@ def test_a_linked_mesh_is_not_written_to(monkey, tmp_path):
     (linked,) = wanted.objects
     bpy.context.scene.collection.objects.link(linked)
     curve = draw(linked)
-    assert away(curve, linked) < EXACT
+    assert curve_deviation(curve, linked) < EXACT
 
 
 def test_hidden_faces_are_known_in_edit_mode(monkey, empty_scene):

@@ -38,12 +38,12 @@ def drawn(extension, mesh_object):
     points = [{"name": "", "position": place} for place in places]
     bpy.ops.nicmm.edit_curve(points=points, spline="EXACT")
     edited_curve = module(extension, "outputs.edited_curve")
-    return edited_curve.opened(bpy.context, bpy.context.active_object)
+    return edited_curve.open_curve(bpy.context, bpy.context.active_object)
 
 
 def looking(extension, opened, eye=-5.0, perspective=True, xray=False):
     surface = opened.surface
-    mesh = module(extension, "scene.designers").mesh_for(surface.solved, surface.faces)
+    mesh = module(extension, "scene.designers").mesh_for(surface.core_positions, surface.faces)
     view = module(extension, "tool.view").View
     size = np.array([800.0, 600.0])
     return view(matrices(eye, perspective), size, surface, mesh, xray)
@@ -58,13 +58,13 @@ def test_pixels_and_places(empty_scene, perspective, scale):
     opened = drawn(empty_scene, sphere)
     view = looking(empty_scene, opened, perspective=perspective)
     for pixel in ([400.0, 300.0], [450.0, 330.0], [370.0, 280.0]):
-        found = view.place_at(pixel)
+        found = view.surface_point_at(pixel)
         place = opened.surface.points(found.faces, found.barycentric)
         np.testing.assert_allclose(view.project(place)[0], pixel, atol=1e-3)
         assert place[0, 1] < 0  # on the side that faces the eye
         assert view.visible(place).all()
         assert not view.visible(place * [1, -1, 1]).any()
-    assert view.place_at([10.0, 10.0]) is None
+    assert view.surface_point_at([10.0, 10.0]) is None
     behind = np.array([[0.0, -6.0, 0.0]])
     assert np.isnan(view.project(behind)).all() == perspective
 

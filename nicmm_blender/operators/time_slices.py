@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work in time slices ("turns"): a thread that runs only while the caller waits for it.
+"""Long work in time slices: a thread that runs only while the caller waits for it.
 
 The core computes a curve in one call and calls a progress function now and then. So that Blender
 can draw its window in between, the work runs in a thread that blocks inside the progress function
-at the end of each turn. Caller and thread never run at the same time, so at any time only one of
-them uses Blender's Python. The work must not access Blender's data.
+at the end of each time slice. Caller and thread never run at the same time, so at any time only one
+of them uses Blender's Python. The work must not access Blender's data.
 """
 
 import atexit
@@ -21,7 +21,7 @@ _parked: set = set()
 
 
 class Work:
-    """A function that takes a progress function, run in turns.
+    """A function that takes a progress function, run in time slices.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Work:
         self.fraction, self.polyline = 0.0, np.zeros((0, 3))
         self.done = False
 
-    def turn(self, seconds: float) -> bool:
+    def run_slice(self, seconds: float) -> bool:
         """Continue for about this many seconds; return whether the work is done."""
         if self.done:
             return True
@@ -69,7 +69,7 @@ class Work:
         if self._thread is None:
             self.done = True
         while not self.done:
-            self.turn(0.0)
+            self.run_slice(0.0)
 
     def _start(self) -> None:
         before = threading.stack_size(STACK)

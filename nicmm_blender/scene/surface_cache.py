@@ -40,14 +40,14 @@ def note_change() -> None:
     _cache.changes += 1
 
 
-def known(mesh_object, use_modifiers: bool) -> Surface | None:
+def cached(mesh_object, use_modifiers: bool) -> Surface | None:
     """The surface of an object if it has been read since the object's last change, or None."""
     return _cache.surfaces.get(_key(mesh_object, use_modifiers))
 
 
-def shown(mesh_object, use_modifiers: bool) -> Surface:
+def get(mesh_object, use_modifiers: bool) -> Surface:
     """The surface of an object, read again only if the object has changed."""
-    found = known(mesh_object, use_modifiers)
+    found = cached(mesh_object, use_modifiers)
     if found is None:
         found = read(mesh_object, use_modifiers)
         bpy.context.view_layer.update()  # handles the reports caused by reading itself

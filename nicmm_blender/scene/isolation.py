@@ -7,7 +7,7 @@ import bpy
 
 
 @contextmanager
-def evaluated_apart(temporary):
+def evaluated_in_isolation(temporary):
     """Yield the evaluated mesh of an object that is in no scene; it is valid inside the block only.
 
     The object and its mesh are removed afterwards, so no other object may use that mesh.

@@ -1,4 +1,4 @@
-"""Long work in time slices (turns), and the operators that use it, without a window."""
+"""Long work in time slices, and the operators that use it, without a window."""
 
 import threading
 from importlib import import_module
@@ -14,8 +14,8 @@ from tests.blender import scenes
 
 
 @pytest.fixture
-def turns(extension):
-    return import_module(f"{extension.name}.nicmm_blender.operators.turns")
+def time_slices(extension):
+    return import_module(f"{extension.name}.nicmm_blender.operators.time_slices")
 
 
 def counting(steps, seen, thread=None):
@@ -31,58 +31,58 @@ def counting(steps, seen, thread=None):
     return work
 
 
-def test_work_goes_on_by_turns_and_only_in_them(turns):
+def test_work_runs_only_in_time_slices(time_slices):
     seen = []
-    work = turns.Work(counting(5, seen))
+    work = time_slices.Work(counting(5, seen))
     assert not seen
     for step in range(5):
-        assert not work.turn(0.0)
+        assert not work.run_slice(0.0)
         assert len(seen) == step + 1
         assert work.fraction == step / 5
         np.testing.assert_array_equal(work.polyline, np.full((2, 3), float(step)))
-    assert work.turn(0.0)
+    assert work.run_slice(0.0)
     assert work.result() == "finished"
     assert set(seen) == {"nicmm"}
 
 
-def test_short_work_is_done_in_the_first_turn(turns):
-    work = turns.Work(counting(5, []))
-    assert work.turn(60.0)
+def test_short_work_is_done_in_the_first_time_slice(time_slices):
+    work = time_slices.Work(counting(5, []))
+    assert work.run_slice(60.0)
     assert work.result() == "finished"
 
 
-def test_cancelled_work_leaves_no_thread(turns):
+def test_cancelled_work_leaves_no_thread(time_slices):
     before = threading.active_count()
     seen = []
-    work = turns.Work(counting(100, seen))
-    work.turn(0.0)
+    work = time_slices.Work(counting(100, seen))
+    work.run_slice(0.0)
     assert threading.active_count() == before + 1
     work.cancel()
     assert threading.active_count() == before
     assert work.result() == "stopped"
     assert len(seen) == 1
-    turns.Work(counting(1, seen)).cancel()  # cancelled before its first turn
+    time_slices.Work(counting(1, seen)).cancel()  # cancelled before its first time slice
     assert len(seen) == 1
 
 
-def test_errors_come_to_the_caller(turns):
+def test_errors_come_to_the_caller(time_slices):
     def work(progress):
         progress(0.5, np.zeros((0, 3)))
         raise ValueError("broken")
 
-    failing = turns.Work(work)
-    failing.turn(0.0)
-    assert failing.turn(0.0)
+    failing = time_slices.Work(work)
+    failing.run_slice(0.0)
+    assert failing.run_slice(0.0)
     with pytest.raises(ValueError, match="broken"):
         failing.result()
 
 
 @pytest.mark.slow
-def test_disabling_ends_what_is_parked(empty_scene, turns):
+def test_disabling_ends_what_is_parked(empty_scene, time_slices):
     before = threading.active_count()
-    parked = [turns.Work(counting(9, [])) for _ in range(3)]
+    parked = [time_slices.Work(counting(9, [])) for _ in range(3)]
     for work in parked:
-        work.turn(0.0)
+        work.run_slice(0.0)
     addon_utils.disable(empty_scene.name, default_set=True)
     try:
         assert threading.active_count() == before
@@ -123,7 +123,7 @@ def window(empty_scene, monkeypatch):
     design_curve = import_module(f"{empty_scene.name}.nicmm_blender.operators.design_curve")
     long_solves = import_module(f"{empty_scene.name}.nicmm_blender.operators.long_solves")
     monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
-    monkeypatch.setattr(long_solves, "LONGEST_TURN", 0.0)
+    monkeypatch.setattr(long_solves, "LONGEST_TIME_SLICE", 0.0)
     monkeypatch.setattr(long_solves, "answer_all", slow(long_solves.answer_all))
     sphere = scenes.sphere(5)
     scenes.select(sphere, scenes.ring(sphere, 4, height=0.3))
