@@ -122,15 +122,16 @@ def ensure_environment() -> None:
         return
     if VENV.is_symlink():
         raise BuildError(
-            f"{VENV.name}/ is a link and lacks what {REQUIREMENTS.name} asks for. It is not "
-            "emptied for another project: remove the link, or bring its target up to date there"
+            f"{VENV.name}/ is a symbolic link without the packages in {REQUIREMENTS.name}. It is "
+            "not overwritten, since another project may use it: remove the link, or update its "
+            "target"
         )
     say(f"Making {VENV.name}/ and installing {REQUIREMENTS.name} (some minutes, once)")
     if run([sys.executable, "-m", "venv", "--clear", VENV]) != 0:
-        raise BuildError(f"{VENV.name}/ could not be made: see the lines above")
+        raise BuildError(f"{VENV.name}/ could not be created; see the output above")
     if run([VENV_PYTHON, "-m", "pip", "install", "-r", REQUIREMENTS]) != 0:
         raise BuildError(
-            "A package could not be installed: see pip's lines above, check the network "
+            "A package could not be installed; see pip's output above, check the network "
             "connection and run the same command again"
         )
     stamp.write_text(fingerprint)
@@ -241,11 +242,11 @@ def package(
             ["validate", str(archive)],
         ):
             if run([VENV_PYTHON, tool, *arguments, "--valid-tags", tags]) != 0:
-                raise BuildError("Blender's tool refused the extension: see the lines above")
+                raise BuildError("Blender's tool rejected the extension; see the output above")
     size = archive.stat().st_size
     if size > LARGEST_ZIP and not with_torch:
         raise BuildError(
-            f"{archive.name} has {size / 1e6:.0f} MB, more than {LARGEST_ZIP / 1e6:.0f} MB. "
+            f"{archive.name} is {size / 1e6:.0f} MB large, more than {LARGEST_ZIP / 1e6:.0f} MB. "
             "Build it for fewer versions of Python (--python)"
         )
     return archive

@@ -44,7 +44,11 @@ def _parser() -> argparse.ArgumentParser:
     design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
     for option in options.OPTIONS:
         design.add_argument(f"--{option.flag or option.name}", dest=option.name, **_flag(option))
-    design.add_argument("--angle", type=float, help="degrees from which edges are sharp, 30")
+    design.add_argument(
+        "--angle",
+        type=float,
+        help="least angle between face normals at a sharp edge, in degrees (default: 30)",
+    )
     design.set_defaults(run=_design)
 
     pretrain = commands.add_parser("pretrain", help="train the network (stage 1 of the paper)")
@@ -74,7 +78,8 @@ def _design(given: argparse.Namespace) -> None:
         points = [int(index) for index in given.points.split(",")]
     except ValueError as error:
         raise ArgumentError(
-            f"--points is {given.points!r}; give vertex indices with commas, such as 12,80,41"
+            f"--points is {given.points!r}; give vertex indices separated by commas, such as "
+            "12,80,41"
         ) from error
     design = design_curve(
         mesh,

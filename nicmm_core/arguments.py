@@ -42,7 +42,10 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     for each in options.OPTIONS:
         value = checked[each.name]
         if each.needs and value != each.default and checked[each.needs] is None:
-            raise ArgumentError(f"{each.name} is {value!r} without {each.needs}; pass both")
+            raise ArgumentError(
+                f"{each.name} has no effect without {each.needs}; pass both, or leave {each.name} "
+                "out"
+            )
     return checked
 
 
@@ -130,7 +133,7 @@ def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -
         raise ArgumentError(f"{name} cannot be read as numbers ({error})") from error
     if checked.shape != (len(mesh.vertices),):
         raise ArgumentError(
-            f"{name} has shape {checked.shape}; pass one {kind} a vertex, ({len(mesh.vertices)},)"
+            f"{name} has shape {checked.shape}; pass one {kind} per vertex, ({len(mesh.vertices)},)"
         )
     return checked
 

@@ -44,8 +44,9 @@ from .status import Status
 from .surface_designer import SurfaceDesigner
 
 PARTS = (
-    "control_points, or via points, lie on parts of the mesh that meet in single vertices only, "
-    "which no curve crosses; join the parts along an edge, or choose points on one of them"
+    "control_points, or via points, lie on parts of the mesh that share only single vertices; a "
+    "curve cannot pass from one part to the other there; join the parts along an edge, or choose "
+    "points on one of them"
 )
 
 
@@ -137,14 +138,14 @@ class Designer:
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         try:
-            with watched(progress), self._its_turn():
+            with watched(progress), self._exclusive():
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
                 if method == "nicmm-paper":
                     check_torch()
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)
                 options["via_points"] = located_via_points(
-                    self.mesh, points, options["via_points"] or {}, order, closed
+                    self.mesh, points, options["via_points"], order, closed
                 )
                 request = Request(points=points, **options)
                 mapped, designer, there = self._on_manifold(request)
@@ -158,7 +159,7 @@ class Designer:
             return cancelled_design(time.perf_counter() - started)
 
     @contextlib.contextmanager
-    def _its_turn(self) -> Iterator[None]:
+    def _exclusive(self) -> Iterator[None]:
         """Wait until no other thread uses this Designer; the caller may cancel while waiting."""
         while not self._lock.acquire(timeout=INTERVAL):
             checkpoint()

@@ -85,7 +85,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.SWITCH,
         True,
         "Closed",
-        "Join the last control point to the first. Otherwise the curve ends there",
+        "Join the last control point to the first",
         flag="open",
     ),
     Option(
@@ -114,7 +114,7 @@ OPTIONS: tuple[Option, ...] = (
         "Method",
         "How the curve is computed",
         choices=(
-            Choice("nicmm", "NICMM", "The default method"),
+            Choice("nicmm", "NICMM", "Compare many courses and relax the best one"),
             Choice(
                 "nicmm-paper",
                 "NICMM (Paper)",
@@ -128,7 +128,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.NUMBER,
         1.0,
         "Smoothness",
-        "Weight of a fair curve against a short one, relative to the usual balance",
+        "Weight of fairness relative to length; larger values give fairer, longer curves",
         limits=(1e-3, 1e3),
         usual=(0.1, 10.0),
     ),
@@ -137,7 +137,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.WEIGHTS,
         None,
         "Obstacles",
-        "Weights that keep the curve away. It never enters faces where all weights are 1",
+        "Weights that keep the curve away. It never enters faces whose vertices all have weight 1",
         flag="avoid",
     ),
     Option(
@@ -145,7 +145,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.LENGTH,
         0.0,
         "Clearance",
-        "Distance along the surface that the curve keeps from obstacles of weight 1",
+        "Minimum distance along the surface between the curve and obstacles of weight 1",
         needs="obstacles",
     ),
     Option(
@@ -161,7 +161,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.COUNT,
         0,
         "Alternatives",
-        "Number of curves along other courses to design too, the fairest first",
+        "Maximum number of additional curves along other courses, the fairest first",
         usual=(0.0, 5.0),
     ),
 )

@@ -82,11 +82,11 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
         components = mapped.mesh.face_component[request.points.faces]
         return request if (components == components[0]).all() else None
     sets = [request.points, *request.via_points.values()]
-    holding = [mapped.holding(points) for points in sets]
-    component = mapped.common_component([point for of_set in holding for point in of_set])
+    representations = [mapped.representations(points) for points in sets]
+    component = mapped.common_component([point for of_set in representations for point in of_set])
     if component is None:
         return None
-    points, *via_points = (mapped.points(of_set, component) for of_set in holding)
+    points, *via_points = (mapped.points(of_set, component) for of_set in representations)
     return replace(
         request,
         points=points,
@@ -118,7 +118,7 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
         if len(start.curves) != 1:
             raise CurveError(
                 f"start has {len(start.curves)} curves ({start.status.name}); pass a design with "
-                "one"
+                "exactly one curve"
             )
         start = start.curves[0]
     original = mapped.original
@@ -127,15 +127,16 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     first = int(index.argmin()) if curve.closed and len(index) else 0
     if len(index) < 2 or (index < 0).any() or (np.diff(np.roll(index, -first)) <= 0).any():
         raise CurveError(
-            f"start has the control_index {index.tolist()}; pass a curve that passes at least two "
-            "control points, all of them, each once and in order"
+            f"start has the control_index {index.tolist()}; pass a curve with at least two "
+            "control points that visits each of them once and in order"
         )
     points = SurfacePoints(curve.faces, curve.barycentric)
     away = np.abs(points.positions(original) - curve.points).max(initial=0.0)
     if not away <= tolerances.SAME_CURVE * original.diagonal:
         raise CurveError(
-            f"start lies on another mesh: its points are up to {away:g} from where their faces and "
-            "coordinates are on this one; pass the mesh that it was designed on"
+            f"start lies on another mesh: its points differ by up to {away:g} from the positions "
+            "that their faces and barycentric coordinates give on this mesh; pass the mesh that it "
+            "was designed on"
         )
     if not curve.closed:
         segment_faces[-1] = curve.faces[-1]
@@ -143,13 +144,13 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     curve = replace(curve, faces=points.faces, barycentric=points.barycentric)
     if not curve.closed:
         curve = _between_ends(original, curve)
-    carried = mapped.carried(curve)
-    if carried is None:
+    mapped_curve = mapped.curve_from_original(curve)
+    if mapped_curve is None:
         raise CurveError(
-            "start enters faces that obstacles of weight 1 or the clearance from them close to "
-            f"curves, or passes a non-manifold edge{WITHOUT_START}"
+            "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
+            f"non-manifold edge{WITHOUT_START}"
         )
-    return carried
+    return mapped_curve
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
@@ -165,11 +166,11 @@ def design_on_original(mapped: MappedMesh, design: Design) -> Design:
         return design
     return replace(
         design,
-        curves=[mapped.curve(curve) for curve in design.curves],
+        curves=[mapped.curve_to_original(curve) for curve in design.curves],
         alternatives=[design_on_original(mapped, other) for other in design.alternatives],
         find_field=partial(_field_on_original, mapped, design),
     )
 
 
 def _field_on_original(mapped: MappedMesh, design: Design) -> FloatArray:
-    return mapped.field(design.field)
+    return mapped.field_to_original(design.field)

@@ -60,10 +60,10 @@ class Request:
 
 def renumbered_request(there: Renumbered, request: Request) -> Request:
     """Map a request from the original of a renumbered mesh to the renumbered copy."""
-    via_points = {key: there.points(points) for key, points in request.via_points.items()}
+    via_points = {key: there.points_to_copy(points) for key, points in request.via_points.items()}
     return replace(
         request,
-        points=there.points(request.points),
+        points=there.points_to_copy(request.points),
         via_points=via_points,
         obstacles=there.values(request.obstacles),
         alignment=there.values(request.alignment),
@@ -80,6 +80,8 @@ def same_request(one: Request, other: Request) -> bool:
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
         return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return np.array_equal(one, other)
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
-    return np.array_equal(one, other) if isinstance(one, np.ndarray) else bool(one == other)
+    return bool(one == other)

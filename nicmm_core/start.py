@@ -23,10 +23,10 @@ from .relaxation.curve_nodes import CurveSurface
 from .relaxation.node_spacing import arc_lengths
 from .relaxation.noded_curve import NodedCurve, is_simple, noded_curve
 from .relaxation.relaxing import relax
-from .relaxation.warm_start import LONGEST_MOVE, WARM, moved_along
+from .relaxation.warm_start import LONGEST_MOVE, WARM, with_moved_controls
 from .request import Request
 
-WITHOUT_START = "; design it without start"
+WITHOUT_START = "; leave start out"
 
 LONGEST_TRACE = 1.5
 """Longest trace of a control point to its new position, relative to the straight distance."""
@@ -114,10 +114,10 @@ def moved_start(
     else:
         curve, visited = _with_other_points(surface, curve, request)
     if request.order == "given" and visited[0] != 0:
-        curve, visited = _begun_at_first(surface, curve, visited)
+        curve, visited = _rotated_to_first(surface, curve, visited)
     _check_moves(surface.mesh, curve, visited, request.points)
     points = request.points[visited]
-    moved = moved_along(surface, curve, points)
+    moved = with_moved_controls(surface, curve, points)
     if moved is None:
         moved = _moved_in_steps(surface, curve, points, request.smoothness)
     if moved is None:
@@ -141,11 +141,11 @@ def _moved_in_steps(
     config = replace(WARM, most_iterations=ITERATIONS_OF_A_STEP)
     for step in range(1, STEPS):
         there = [route[np.array([(len(route) - 1) * step // STEPS])] for route in routes]
-        moved = moved_along(surface, curve, joined(there))
+        moved = with_moved_controls(surface, curve, joined(there))
         if moved is None:
             return None
         curve = relax(surface, moved, smoothness, config).noded_curve
-    return moved_along(surface, curve, points)
+    return with_moved_controls(surface, curve, points)
 
 
 def _routes(
@@ -211,7 +211,7 @@ def _ascending(numbers: IntArray, closed: bool) -> bool:
     return bool((np.diff(np.roll(numbers, -first)) > 0).all())
 
 
-def _begun_at_first(
+def _rotated_to_first(
     surface: CurveSurface, curve: NodedCurve, visited: IntArray
 ) -> tuple[NodedCurve, IntArray]:
     """Rotate a closed curve so that it begins at control point 0; return it and its indices."""
@@ -239,7 +239,7 @@ def _with_other_points(
     at_controls = line.arc[curve.node_place[curve.control_nodes]]
     distance = np.linalg.norm(there[:, None] - curve.nodes.positions[curve.control_nodes], axis=2)
     nearest = distance.argmin(axis=1)
-    same = distance.min(axis=1) <= tolerances.AT_ONE_PLACE * mesh.diagonal
+    same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal
     if not same.any():
         raise CurveError(
             f"start passes {len(curve.control_nodes)} control points, {len(there)} are requested, "
@@ -305,7 +305,7 @@ class _Line:
         """The curve with control points at ascending arc lengths; an open one is trimmed there."""
         n = len(self.polyline)
         apart = np.abs(self.arc[:n, None] - arcs)
-        at_point = apart <= tolerances.AT_ONE_PLACE * self.mesh.diagonal
+        at_point = apart <= tolerances.SAME_POSITION * self.mesh.diagonal
         # Rounding must not put a point of the polyline at the end of the segment before it.
         arcs = np.where(at_point.any(axis=0), self.arc[apart.argmin(axis=0)], arcs)
         segment = np.clip(np.searchsorted(self.arc, arcs, side="right") - 1, 0, len(self.arc) - 2)

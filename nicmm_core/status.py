@@ -14,16 +14,16 @@ class Status(enum.Enum):
         "mesh, one without defects, or other control points may make it fairer"
     )
     DIVERGED = (
-        "the energy left the range of numbers and the best curve before is returned; look for "
-        "faces without area, or merge vertices by distance"
+        "the energy became infinite or NaN; the best earlier curve is returned; look for faces "
+        "without area, or merge vertices by distance"
     )
     UNRELAXED = (
-        "strands of the curve are so close to one another that it is returned as the level set "
-        "gives it; use a finer mesh, fewer points or another order"
+        "strands of the curve are too close together to relax; the unrelaxed curve is returned; "
+        "use a finer mesh, fewer points or another order"
     )
     CANCELLED = (
         "cancelled by the progress function; the curve, if there was one already, is the best so "
-        "far, and the same request gives the whole one"
+        "far, and the same request without cancelling gives the finished curve"
     )
     NOT_ONE_CURVE = (
         "the level set is not one simple curve through all control points; the mesh may be too "

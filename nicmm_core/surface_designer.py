@@ -14,7 +14,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
-from .courses.course_search import APART, farthest_between
+from .courses.course_search import SAME_COURSE, farthest_between
 from .courses.course_surface import CourseSurface
 from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
@@ -42,10 +42,10 @@ from .request import Request, renumbered_request
 from .start import Resumable, moved_start
 from .status import Status
 
-STARTED = 0.6
+START_FRACTION = 0.6
 """Approximate fraction of the total time that passes before the relaxation."""
 
-SOON_DONE = 10
+LIMIT_TO_USUAL_ITERATIONS = 10
 """Limit on the iterations of a relaxation, relative to the number that most curves need.
 
 Since most curves converge long before the limit, reported progress rises quickly at first.
@@ -58,13 +58,13 @@ It is twice the value of a circle. Curves above it wind around thin limbs, where
 more courses.
 """
 
-DRAWS = 2
+RANDOM_SEARCHES = 2
 """Number of searches with random lengths."""
 
 MOST_TRACED = 20_000
 """Sum of points times iterations over the relaxations above which the search is not repeated."""
 
-MOST_TRIED = 10
+MAX_COURSES_RELAXED = 10
 """Courses relaxed for alternatives, in addition to two for each alternative.
 
 Many courses relax to the same curve.
@@ -161,43 +161,45 @@ class SurfaceDesigner:
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the curve of the network if no course is found."""
         config = RelaxationConfig() if request.alignment is None else GUIDED
-        with subrange(0.0, STARTED):
+        with subrange(0.0, START_FRACTION):
             courses = self._course_starts(request)
             start = next(courses, None)
             by_course = start is not None
             if start is None:
                 start = self._start_by_network(request)
-        with subrange(STARTED, 1.0):
+        with subrange(START_FRACTION, 1.0):
             designs = [self._relaxed(request, start, config, max_iterations, started)]
             if max_iterations is not None or designs[0].status is Status.CANCELLED:
                 return designs[0]
-            drawn = self._drawn_courses(request)
+            drawn = self._random_courses(request)
             try:
                 for draw in drawn:
-                    if by_course and _repay_another_search(designs):
+                    if by_course and _worth_another_search(designs):
                         for other in itertools.islice(draw, 1):
                             designs.append(self._relaxed(request, other, config, None, started))
                 if request.alternatives:
                     others = itertools.chain(courses, *drawn)
                     new = (start for start in others if _differs(start, designs))
-                    for other in itertools.islice(new, MOST_TRIED + 2 * request.alternatives):
+                    for other in itertools.islice(
+                        new, MAX_COURSES_RELAXED + 2 * request.alternatives
+                    ):
                         designs.append(self._relaxed(request, other, config, None, started))
             except CancelledError:
                 return replace(_fairest(start.surface, designs, request), status=Status.CANCELLED)
             return _fairest(start.surface, designs, request)
 
-    def _drawn_courses(self, request: Request) -> list[Iterator[_Start]]:
+    def _random_courses(self, request: Request) -> list[Iterator[_Start]]:
         """The courses of each search with random lengths. A search begins on first use."""
-        return [self._course_starts(request, draw) for draw in range(1, 1 + DRAWS)]
+        return [self._course_starts(request, seed) for seed in range(1, 1 + RANDOM_SEARCHES)]
 
-    def _course_starts(self, request: Request, draw: int = 0) -> Iterator[_Start]:
-        """Courses that are simple on the mesh, the best first; draws above 0 use random lengths."""
+    def _course_starts(self, request: Request, seed: int = 0) -> Iterator[_Start]:
+        """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths."""
         there, unit = self._curve_surface(request), self._unit(request)
         if self._coarse_starts.is_large(request):
-            for found in self._coarse_starts.courses(request, draw):
+            for found in self._coarse_starts.courses(request, seed):
                 yield _Start(found.curve, found.visited, there, unit)
             return
-        for course in self._courses.courses(request, draw):
+        for course in self._courses.courses(request, seed):
             checkpoint()
             controls = request.points[course.visited]
             faces, barycentric = (
@@ -231,7 +233,7 @@ class SurfaceDesigner:
         one = zeros.is_simple_curve(there.mesh, request.closed)
         curve = zeros.curves[0] if one else path_curve(there.mesh, problem.working, problem.loop)
         return _Start(
-            curve=there.curve(curve),
+            curve=there.curve_to_original(curve),
             visited=problem.loop.order,
             surface=self._curve_surface(request),
             unit=problem.unit,
@@ -251,7 +253,7 @@ class SurfaceDesigner:
             config = replace(config, most_iterations=max_iterations)
 
         def watch(done: float, points: FloatArray) -> bool:
-            checkpoint(1.0 - (1.0 - done) ** SOON_DONE, lambda: points)
+            checkpoint(1.0 - (1.0 - done) ** LIMIT_TO_USUAL_ITERATIONS, lambda: points)
             return True
 
         surface, unit = start.surface, start.unit
@@ -319,7 +321,7 @@ class SurfaceDesigner:
         return CoarseStarts(self._surface)
 
 
-def _repay_another_search(designs: list[Design]) -> bool:
+def _worth_another_search(designs: list[Design]) -> bool:
     """Whether the first curve bends so much that the search may have missed a far better one.
 
     False if the relaxations took long, as on needles, since another one would take as long.
@@ -343,7 +345,7 @@ def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> 
         for curve in curves
     ]
     best, *others = np.argsort(energy, kind="stable").tolist()
-    limit = APART * surface.mesh.diagonal
+    limit = SAME_COURSE * surface.mesh.diagonal
     chosen = [best]
     for number in others:
         positions = curves[number].nodes.positions
@@ -358,7 +360,7 @@ def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> 
 def _differs(start: _Start, designs: list[Design]) -> bool:
     """Whether a course is apart from the curves of all designs so far."""
     assert isinstance(start.curve, NodedCurve)
-    positions, limit = start.curve.nodes.positions, APART * start.surface.mesh.diagonal
+    positions, limit = start.curve.nodes.positions, SAME_COURSE * start.surface.mesh.diagonal
     return all(
         farthest_between(positions, design.resumable.curve.nodes.positions) > limit
         for design in designs

@@ -92,10 +92,10 @@ def _offset_points(surface, curve, offset: float) -> np.ndarray:
     """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)
-    from ...nicmm_core.splines.offset import lifted
+    from ...nicmm_core.splines.offset import offset_points
 
     height = offset / surface.unit
-    points = lifted(_core_mesh(surface), curve.faces, curve.barycentric, height)
+    points = offset_points(_core_mesh(surface), curve.faces, curve.barycentric, height)
     return points @ np.linalg.inv(surface.local_to_core).T
 
 

@@ -25,7 +25,7 @@ from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
-from ..repair.degenerate_faces import degenerate_faces, with_areas
+from ..repair.degenerate_faces import degenerate_faces, perturbed
 
 TIE_BREAK = 1e-6
 """Greatest relative change of the length of an edge due to each of its ends."""
@@ -126,7 +126,7 @@ def build_coarse_mesh(
     Raises
     ------
     MeshError
-        If the cells meet in no face.
+        If no three cells meet in a face.
     """
     inside = mesh.face_component == component
     faces = mesh.faces[inside]
@@ -152,19 +152,19 @@ def build_coarse_mesh(
     corners = corners[apart]
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
-        raise MeshError("the cells of the coarse mesh meet in no face")
+        raise MeshError("no three cells of the coarse mesh meet in a face")
     return CoarseMesh(_with_areas(Mesh(mesh.vertices[seed], corners[first])), seed, cell)
 
 
 def _with_areas(mesh: Mesh) -> Mesh:
     """The mesh with area given to degenerate faces: on a grid, three seeds may be collinear."""
     vertices, faces = mesh.vertices, mesh.faces
-    short = tolerances.AT_ONE_PLACE * mesh.diagonal
+    short = tolerances.SAME_POSITION * mesh.diagonal
     flat = degenerate_faces(vertices, faces, short)
     if not flat.any():
         return mesh
     origin = vertices[faces[0, 0]]
-    return Mesh(origin + with_areas(vertices - origin, faces, short, flat), faces)
+    return Mesh(origin + perturbed(vertices - origin, faces, short, flat), faces)
 
 
 def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:

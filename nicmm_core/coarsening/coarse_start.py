@@ -87,18 +87,18 @@ class CoarseStarts:
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._large: dict[int, bool] = {}
 
-    def courses(self, request: Request, draw: int = 0) -> Iterator[CoarseStart]:
+    def courses(self, request: Request, seed: int = 0) -> Iterator[CoarseStart]:
         """Yield the courses on a coarse mesh that are simple on the fine mesh, the best first.
 
         A small mesh has no coarse mesh and so no courses, and none may be found where points are
-        close together. `draw` is that of `CourseSurface.courses`.
+        close together. `seed` is that of `CourseSurface.courses`.
         """
         level = next(self._levels(request), None)
         if level is None:
             return
         with contextlib.suppress(NicmmError):
             on_coarse = _on_coarse(self._mesh, level.coarse, request)
-            for course in level.courses.courses(on_coarse, draw):
+            for course in level.courses.courses(on_coarse, seed):
                 checkpoint()
                 nodes = noded(level.surface, course.places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
@@ -153,7 +153,7 @@ class CoarseStarts:
             zeros = infer(copy.mesh, renumbered_request(copy, on_coarse)).zeros
         if not zeros.is_simple_curve(copy.mesh, request.closed):
             return None
-        curve = copy.curve(zeros.curves[0])
+        curve = copy.curve_to_original(zeros.curves[0])
         visited = _visited(curve, on_coarse.points.positions(coarse.mesh))
         result = curve_on_fine_mesh(
             self._fine, coarse, level.surface, curve, request.points[visited]

@@ -33,7 +33,7 @@ Finer detail of the coarse curve would come from the coarse mesh and not from th
 strands are close together, traces between other nodes may avoid a crossing.
 """
 
-WIDENED = 3
+MOST_RINGS = 3
 """Number of rings of cells around two nodes in which a path between them is searched for."""
 
 
@@ -63,44 +63,44 @@ def curve_on_fine_mesh(
     """
     for count in NODES:
         checkpoint()
-        exact = noded_curve(coarse_surface, curve, count)
-        result = nodes_on_fine_mesh(surface, coarse, exact, controls)
+        coarse_curve = noded_curve(coarse_surface, curve, count)
+        result = nodes_on_fine_mesh(surface, coarse, coarse_curve, controls)
         if result is not None:
             return result.surface_curve(surface.mesh)
     return None
 
 
 def nodes_on_fine_mesh(
-    surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
+    surface: CurveSurface, coarse: CoarseMesh, coarse_curve: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
     """The curve on the fine mesh through the nodes of a coarse curve; None if it is not simple.
 
-    Only the nodes of the coarse curve, `exact`, are used. The other parameters are those of
+    Only the nodes of `coarse_curve` are used. The other parameters are those of
     `curve_on_fine_mesh`.
     """
-    result = _through_nodes(surface, coarse, exact, controls)
+    result = _through_nodes(surface, coarse, coarse_curve, controls)
     return result if result is not None and is_simple(surface, result) else None
 
 
 def _through_nodes(
-    surface: CurveSurface, coarse: CoarseMesh, exact: NodedCurve, controls: SurfacePoints
+    surface: CurveSurface, coarse: CoarseMesh, coarse_curve: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
     """The curve through the nodes of a coarse curve, simple or not; None if a gap remains."""
     fine = surface.mesh
-    places, cell = _nearest_points(fine, coarse, exact.nodes.places)
+    places, cell = _nearest_points(fine, coarse, coarse_curve.nodes.places)
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
-    faces[exact.control_nodes] = controls.faces
-    barycentric[exact.control_nodes] = controls.barycentric
-    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), exact.closed)
+    faces[coarse_curve.control_nodes] = controls.faces
+    barycentric[coarse_curve.control_nodes] = controls.barycentric
+    nodes = nodes_at(surface, SurfacePoints(faces, barycentric), coarse_curve.closed)
     # Normals of the coarse mesh, since they ignore small dents that a trace has to cross.
-    smooth = replace(nodes, normals=exact.nodes.normals)
-    polyline, node_place, lost = straight_traces(surface, exact, smooth)
+    smooth = replace(nodes, normals=coarse_curve.nodes.normals)
+    polyline, node_place, lost = straight_traces(surface, coarse_curve, smooth)
     bridges: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()
         following = (node + 1) % len(cell)
         around, bridge = np.unique(cell[[node, following]]), None
-        for _ in range(WIDENED):
+        for _ in range(MOST_RINGS):
             around = coarse.cells_around(around)
             inside = coarse.faces_of_cells(fine, around)
             bridge = _path_along_edges(fine, inside, nodes, node, following)
@@ -109,7 +109,7 @@ def _through_nodes(
         if bridge is None:
             return None
         bridges[node] = bridge
-    return _with_bridges(exact, nodes, polyline, node_place, bridges)
+    return _with_bridges(coarse_curve, nodes, polyline, node_place, bridges)
 
 
 def _nearest_points(

@@ -20,7 +20,13 @@ from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.node_traces import traces_between_nodes, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .hop_graph import HopGraph, with_control_points
-from .leg_combinations import combined, course_nodes, crossing_routes, different, laid_routes
+from .leg_combinations import (
+    cheapest_combinations,
+    course_nodes,
+    crossing_routes,
+    distinct_combinations,
+    nodes_on_routes,
+)
 from .leg_routes import routes_of_legs
 from .uncrossing import uncrossed
 
@@ -33,13 +39,13 @@ It is greater than 1 because hops overestimate bending: they turn only at cells.
 CANDIDATES, FINALISTS = 24, 6
 """Number of courses relaxed with few nodes, and number of the best relaxed with twice as many."""
 
-SPARSE = 8
+FIRST_STRIDE = 8
 """Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
 
-APART = 0.02
+SAME_COURSE = 0.02
 """Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
 
-DRAWN = 0.4
+LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
 
 MOST_LEGS = 60
@@ -57,7 +63,7 @@ def find_courses(
     closed: bool,
     smoothness: float,
     any_order: bool,
-    draw: int = 0,
+    seed: int = 0,
 ) -> Iterator[tuple[Nodes, IntArray]]:
     """Yield simple relaxed courses through points, by ascending energy.
 
@@ -81,7 +87,7 @@ def find_courses(
         Divisor of the tension.
     any_order : bool
         Whether a course may visit the control points in another order to avoid crossing itself.
-    draw : int
+    seed : int
         Seed of random factors of the lengths in the graph, which give other courses; 0 for no
         factors.
     """
@@ -91,10 +97,10 @@ def find_courses(
     ends = np.arange(count)
     legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
-    if draw:
+    if seed:
         # The numbering depends only on the surface (`geometry.numbering`), so the factors do too.
-        chance = np.random.default_rng(draw).standard_normal(len(surface.mesh.vertices))
-        factor = np.exp(DRAWN * chance) * (1.0 if factor is None else factor)
+        chance = np.random.default_rng(seed).standard_normal(len(surface.mesh.vertices))
+        factor = np.exp(LENGTH_NOISE * chance) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
@@ -102,11 +108,11 @@ def find_courses(
     if not routes or not all(len(leg.cells) for leg in routes):
         return
     with subrange(0.2, 0.3):
-        on_routes = laid_routes(courses, routes, smoothness)
+        on_routes = nodes_on_routes(courses, routes, smoothness)
     traces = traces_between_nodes(surface, on_routes)
     crosses = crossing_routes(courses, routes, on_routes, traces)
-    combinations = combined(courses, routes, crosses, closed)
-    choice = different(routes, combinations, CANDIDATES)
+    combinations = cheapest_combinations(courses, routes, crosses, closed)
+    choice = distinct_combinations(routes, combinations, CANDIDATES)
     if not len(choice):
         return
     nodes, at_points = course_nodes(courses, routes, on_routes, traces, choice, closed)
@@ -151,7 +157,7 @@ def _best(
     """Distinct courses by ascending energy: the simple ones, and those that cross themselves."""
     energy = _energies(surface, nodes, smoothness)
     positions = nodes.positions.reshape(nodes.curves, -1, 3)
-    limit = APART * surface.mesh.diagonal
+    limit = SAME_COURSE * surface.mesh.diagonal
     # Only courses with about the same bounding boxes can be near each other.
     boxes = np.concatenate([positions.min(axis=1), positions.max(axis=1)], axis=1)
     may_be_near = (np.abs(boxes[:, None] - boxes) <= limit).all(axis=2)
@@ -175,7 +181,7 @@ def _best(
 
 def _near(points: FloatArray, tree: cKDTree, limit: float) -> bool:
     """Whether every point is within a limit of the points in a tree."""
-    few = tree.query(points[::SPARSE])[0].max() <= limit
+    few = tree.query(points[::FIRST_STRIDE])[0].max() <= limit
     return bool(few and tree.query(points)[0].max() <= limit)
 
 

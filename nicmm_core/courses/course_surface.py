@@ -107,7 +107,7 @@ class CourseSurface:
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return replace(own, vertex_normals=normals)
 
-    def courses(self, request: Request, draw: int = 0) -> Iterator[Course]:
+    def courses(self, request: Request, seed: int = 0) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
 
         Where strands are close together, traces between more nodes may avoid a crossing.
@@ -115,7 +115,7 @@ class CourseSurface:
         Parameters
         ----------
         request : Request
-        draw : int
+        seed : int
             Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
             no factors.
 
@@ -155,7 +155,7 @@ class CourseSurface:
             there.closed,
             there.smoothness,
             any_order=there.order == "shortest" and not there.via_points,
-            draw=draw,
+            seed=seed,
         )
         for nodes, visit in found:
             on_copy = self._refined.in_parents(nodes.places)

@@ -51,7 +51,7 @@ SAME_SHEET = 1.6
 Beyond this ratio the two cells lie on different sheets of the surface.
 """
 
-SHARPEST = 2.0 * np.pi / 3.0
+SHARPEST_TURN = 2.0 * np.pi / 3.0
 """Greatest turn at a cell, in radians.
 
 A third of all continuations turn by more; two smaller turns cost less there.
@@ -110,7 +110,7 @@ class HopGraph:
         hops = self.hops
         first = np.searchsorted(hops.start, np.arange(len(self.vertex) + 1))
         before, after = continuations(hops.end, first)
-        kept = np.flatnonzero(turning(hops, before, hops, after) <= SHARPEST)
+        kept = np.flatnonzero(turning(hops, before, hops, after) <= SHARPEST_TURN)
         before, after = before[kept], after[kept]
         indptr = np.searchsorted(before, np.arange(len(hops.start) + 1))
         return indptr, after, bending(hops, before, hops, after)
@@ -145,7 +145,7 @@ def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
     hops = _hops(start, end, along[start, end], (positions, normals), (positions, normals))
     in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
     same_sheet = along[start, end] <= SAME_SHEET * in_space
-    hops, key = taken(hops, same_sheet), key[same_sheet]
+    hops, key = select_hops(hops, same_sheet), key[same_sheet]
     reverse = np.searchsorted(key, hops.end * size + hops.start)
     return HopGraph(surface, vertex, spacing, hops, reverse)
 
@@ -189,11 +189,6 @@ class CourseGraph:
     tension: float
     cost: FloatArray
     previous: IntArray
-
-    @property
-    def n_cells(self) -> int:
-        """Number of cells that are not control points."""
-        return len(self.graph.vertex)
 
     @cached_property
     def first(self) -> IntArray:
@@ -356,7 +351,7 @@ def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatA
     return turning(one, before, other, after) ** 2 / np.maximum(step, tolerances.TINY)
 
 
-def taken(hops: Hops, which: IntArray | BoolArray) -> Hops:
+def select_hops(hops: Hops, which: IntArray | BoolArray) -> Hops:
     """Some of the hops, by indices or a mask."""
     return Hops(
         hops.start[which], hops.end[which], hops.length[which], hops.leaving[which],
@@ -414,7 +409,7 @@ def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> Float
     size = len(mesh.vertices)
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
     # A sparse graph has no arc where the length is zero.
-    away = np.maximum(away, tolerances.AT_ONE_PLACE * mesh.diagonal)
+    away = np.maximum(away, tolerances.SAME_POSITION * mesh.diagonal)
     edges = surface.edge_graph
     values = np.concatenate([edges.data, away.ravel()])
     columns = np.concatenate([edges.indices, corners.ravel()])

@@ -20,7 +20,7 @@ from ..relaxation.curve_nodes import Nodes, nodes_at
 from ..relaxation.node_traces import NodeTraces, places_along, traced_segments, with_midpoints
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
-from .leg_routes import Routes, junction_cost, rounded
+from .leg_routes import Routes, junction_cost, without_rounding_errors
 
 NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
 """Number of nodes of a route, and its least value.
@@ -40,11 +40,11 @@ CROSSING = 0.1
 Crossings are not forbidden, since `uncrossing` may remove them.
 """
 
-BEAM = 3_000
+BEAM_WIDTH = 3_000
 """Number of incomplete combinations kept after each leg."""
 
 
-WORST = 1.5
+MAX_RELATIVE_COST = 1.5
 """Cost of a combination, relative to the cheapest, above which it is not relaxed."""
 
 
@@ -64,7 +64,7 @@ class Combinations:
     cost: FloatArray
 
 
-def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
+def nodes_on_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
     """Place nodes on all routes; each route is an open curve with the same number of nodes.
 
     Routes are relaxed with few nodes. Then the number of nodes is doubled, so that hardly any trace
@@ -90,7 +90,7 @@ def laid_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> 
     direction = tangents(offset, graph.normals[start])
     length = np.where(nearer, along, 1.0 - along) * np.linalg.norm(offset, axis=1)
     ends = _is_end(count, paths)
-    length[ends | (length <= tolerances.AT_ONE_PLACE * surface.mesh.diagonal)] = 0.0
+    length[ends | (length <= tolerances.SAME_POSITION * surface.mesh.diagonal)] = 0.0
     inside = SurfacePoints(places.faces, strictly_inside(places.barycentric))
     moved = trace_from(surface.mesh, inside, direction, length, surface.folded)[0]
     # Control points stay exactly where they are.
@@ -158,7 +158,7 @@ def crossing_routes(
     return crosses
 
 
-def combined(
+def cheapest_combinations(
     graph: CourseGraph, routes: list[Routes], crosses: BoolArray, closed: bool
 ) -> Combinations:
     """Find the cheapest combinations of routes by beam search, leg by leg."""
@@ -183,7 +183,7 @@ def combined(
             )
         for earlier in range(number):
             total += price * crosses[:, here].take(offset[earlier] + choice[:, earlier], axis=0)
-        best = _least(rounded(total).ravel(), BEAM)
+        best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
         row, route = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], route[:, None]], axis=1)
@@ -199,10 +199,10 @@ def _least(values: FloatArray, most: int) -> IntArray:
     return among[np.argsort(values[among], kind="stable")[:most]]
 
 
-def different(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
+def distinct_combinations(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
     """The cheapest combinations, no two of which run beside each other on all legs, (d, l)."""
     choice = combinations.choice
-    left = combinations.cost <= WORST * combinations.cost.min(initial=np.inf)
+    left = combinations.cost <= MAX_RELATIVE_COST * combinations.cost.min(initial=np.inf)
     chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())

@@ -30,13 +30,13 @@ DIFFERENT = 8
 ALL_DIRECTIONS, ALL_ROUTES = 320, 120
 """Caps on the totals of direction pairs and routes over all legs; every leg gets a few anyway."""
 
-WORST = 8.0
+MAX_RELATIVE_ROUTE_COST = 8.0
 """Greatest cost of a further route, relative to the cheapest route of its leg."""
 
 VIA_CELLS = 120
 """Greatest number of cells through which further routes are tried."""
 
-BESIDE = 1.5
+SAME_ROUTE = 1.5
 """Distance, in median hop lengths, within which two routes count as the same."""
 
 NORMAL_WEIGHT = 0.8
@@ -103,14 +103,14 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
     n_different = min(DIFFERENT, n_routes // 3)
     by_direction, by_cell = [], []
     for start, end in legs.tolist():
-        total = rounded(graph.by_state(start, end))
+        total = without_rounding_errors(graph.by_state(start, end))
         first, last = graph.first[start], graph.reverse[graph.first[end][graph.reverse]]
         ascending = np.argsort(total, kind="stable")
         ascending = ascending[: np.count_nonzero(np.isfinite(total))]
         both_ends = first[ascending] * len(total) + last[ascending]
         directions = _least_of_each(both_ends, ascending, total)[:n_directions]
         cells = _least_of_each(graph.hops.end[ascending], ascending, total)
-        cells = cells[total[cells] <= WORST * total[cells[:1]]]
+        cells = cells[total[cells] <= MAX_RELATIVE_ROUTE_COST * total[cells[:1]]]
         cells = cells[:: max(1, -(-len(cells) // VIA_CELLS))]
         by_direction.append(
             _ByState(directions, total[directions], first[directions], last[directions])
@@ -123,7 +123,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
     for (start, end), aligned, other, least in zip(
         legs.tolist(), by_direction, by_cell, totals, strict=True
     ):
-        best = np.argsort(rounded(least), kind="stable")[: 3 * n_aligned]
+        best = np.argsort(without_rounding_errors(least), kind="stable")[: 3 * n_aligned]
         states = np.concatenate([aligned.state[best], other.state])
         cost = np.concatenate([aligned.cost[best], other.cost])
         paths = _paths(graph, start, end, states)
@@ -134,7 +134,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
         simple = passed.sum(axis=1) == 1 + np.diff(paths.begins)
         # A direct hop between the control points is both the first and the last state.
         ends = np.stack([graph.hops.end[first], graph.hops.start[last]], axis=1)
-        chosen = _different(simple, ends, alike, len(best), n_aligned, n_different)
+        chosen = _distinct_paths(simple, ends, alike, len(best), n_aligned, n_different)
         passes = [
             np.append(
                 graph.hops.start[first[path]],
@@ -159,7 +159,7 @@ def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> 
     return np.arccos(cosine.clip(-1.0, 1.0)) ** 2 / np.maximum(step, tolerances.TINY)
 
 
-def rounded(cost: FloatArray) -> FloatArray:
+def without_rounding_errors(cost: FloatArray) -> FloatArray:
     """Costs without rounding errors, so that equal costs compare as equal.
 
     The best legs through two states may be the same leg; both costs then differ only by rounding.
@@ -234,7 +234,7 @@ def _cells_beside(graph: CourseGraph) -> sparse.csr_array:
     """Which cells lie beside each other, (n + k, n + k)."""
     scale = max(float(np.median(graph.hops.length)), tolerances.TINY)
     places = np.concatenate([graph.positions / scale, NORMAL_WEIGHT * graph.normals], axis=1)
-    pairs = cKDTree(places).query_pairs(BESIDE, output_type="ndarray")
+    pairs = cKDTree(places).query_pairs(SAME_ROUTE, output_type="ndarray")
     size = len(places)
     rows = np.concatenate([pairs[:, 0], pairs[:, 1], np.arange(size)])
     columns = np.concatenate([pairs[:, 1], pairs[:, 0], np.arange(size)])
@@ -248,7 +248,7 @@ def _alike(beside: sparse.csr_array, passed: NDArray[np.float32]) -> BoolArray:
     return inside & inside.T
 
 
-def _different(
+def _distinct_paths(
     simple: BoolArray,
     ends: IntArray,
     alike: BoolArray,
@@ -262,12 +262,12 @@ def _different(
     points, `ends` (p, 2), differs.
     """
     same = alike & (ends[:, None] == ends).all(axis=2)
-    aligned = _apart(same, np.flatnonzero(simple[:n_first]), [], n_aligned)
+    aligned = _add_distinct(same, np.flatnonzero(simple[:n_first]), [], n_aligned)
     others = n_first + np.flatnonzero(simple[n_first:])
-    return _apart(alike, others, aligned, len(aligned) + n_different)
+    return _add_distinct(alike, others, aligned, len(aligned) + n_different)
 
 
-def _apart(alike: BoolArray, order: IntArray, chosen: list[int], most: int) -> list[int]:
+def _add_distinct(alike: BoolArray, order: IntArray, chosen: list[int], most: int) -> list[int]:
     """The chosen paths, extended in order by paths unlike all chosen so far, up to `most` paths."""
     chosen = chosen.copy()
     left = ~alike[chosen].any(axis=0)

@@ -155,7 +155,7 @@ def _readable(curve: SurfaceCurve) -> SurfaceCurve:
         if whole.ndim != 1 or not (np.abs(whole) < 2.0**53).all() or (whole % 1.0).any():
             raise CurveError(f"curve.{name} is not an array of whole numbers, one for each point")
     if (index < -1).any() or (index >= n).any():
-        raise CurveError(f"curve.control_index has values outside of -1 … {n - 1}")
+        raise CurveError(f"curve.control_index has values outside -1 … {n - 1}")
     return SurfaceCurve(
         bool(curve.closed),
         values["faces"].astype(np.int64),
@@ -235,9 +235,9 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
     following = (np.arange(n) + 1) % n
     support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
     found = faces.copy()
-    unknown = ~_holds(mesh.faces[found], support[following])
+    unknown = ~_contains(mesh.faces[found], support[following])
     found[unknown] = faces[following][unknown]
-    unknown &= ~_holds(mesh.faces[found], support)
+    unknown &= ~_contains(mesh.faces[found], support)
     if not closed:
         unknown[-1] = False
     for point in np.flatnonzero(unknown).tolist():
@@ -245,7 +245,7 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
         common = mesh.faces_with(both[both >= 0])
         if not len(common):
             raise CurveError(
-                f"curve is not on this mesh: no face holds its points {point} and "
+                f"curve is not on this mesh: no face contains its points {point} and "
                 f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
                 "there share no vertices, merge vertices by distance and design it again"
             )
@@ -253,7 +253,7 @@ def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: Float
     return found
 
 
-def _holds(corners: IntArray, support: IntArray) -> BoolArray:
+def _contains(corners: IntArray, support: IntArray) -> BoolArray:
     """Whether each face has all vertices of its row of ``support``, which is padded with -1."""
     found = (support[:, :, None] == corners[:, None, :]).any(axis=2)
     return (found | (support < 0)).all(axis=1)

@@ -18,7 +18,7 @@ from .array_types import BoolArray, FloatArray, IntArray
 SETTLED = 1e-6
 """Decreases of a distance by less than this, in edge lengths, are not propagated."""
 
-OFTEN = 100
+MOST_DECREASES = 100
 """Number of decreases of a distance after which only smaller distances may lower it.
 
 At most 50 occurred on the SHREC16 meshes with virtual splits. In a ring of needles, each distance
@@ -65,7 +65,7 @@ def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray)
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
+def propagate(surface: DistanceSurface, distance: FloatArray, limit: float) -> None:
     """Propagate distances over a surface, in place.
 
     Parameters
@@ -88,7 +88,7 @@ def spread(surface: DistanceSurface, distance: FloatArray, limit: float) -> None
         reached, first, second = (np.roll(faces, k, axis=1).ravel() for k in range(3))
         moving = ~settled[reached]
         reached, first, second = reached[moving], first[moving], second[moving]
-        waits = times_lowered[reached] >= OFTEN
+        waits = times_lowered[reached] >= MOST_DECREASES
         arrival = _wave_arrival(surface.vertices, distance, reached, first, second, waits)
         touched = np.unique(reached)
         before = distance[touched]

@@ -14,7 +14,7 @@ from scipy.sparse import csgraph
 from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 
-LARGE = 2_000_000
+MOST_KEYS_PER_SORT = 2_000_000
 """Maximum number of keys sorted in one call.
 
 Sorting them takes a fifth of a second, during which a design cannot be cancelled.
@@ -28,10 +28,11 @@ def stable_order(keys: IntArray | FloatArray) -> IntArray:
     """Indices that sort the keys, (n,); equal keys stay in their order.
 
     The same as ``np.argsort(keys, kind="stable")`` for keys without NaN. If there are more than
-    `LARGE` keys, they are divided into ranges of values, which are sorted one after another.
+    `MOST_KEYS_PER_SORT` keys, they are divided into ranges of values, which are sorted one after
+    another.
     """
     checkpoint()
-    n_parts = -(-len(keys) // LARGE)
+    n_parts = -(-len(keys) // MOST_KEYS_PER_SORT)
     if n_parts <= 1:
         return np.argsort(keys, kind="stable")
     sample = keys[:: max(1, len(keys) // (SAMPLED * n_parts))]

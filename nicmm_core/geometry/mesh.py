@@ -22,7 +22,7 @@ stay representable."""
 BLOCK = 32_768
 """Number of faces or edges in a block, see `blocks`."""
 
-FACES_OF_A_TREE = 100_000
+MOST_FACES_PER_TREE = 100_000
 """Maximum number of faces in a bounding-box tree.
 
 Building a tree of this size takes a tenth of a second, during which a design cannot be cancelled.
@@ -162,9 +162,9 @@ class Mesh:
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:
         """Bounding-box trees over parts of the faces, each with the range of its faces."""
         trees = []
-        for first in range(0, len(self.faces), FACES_OF_A_TREE):
+        for first in range(0, len(self.faces), MOST_FACES_PER_TREE):
             checkpoint()
-            faces = slice(first, first + FACES_OF_A_TREE)
+            faces = slice(first, first + MOST_FACES_PER_TREE)
             tree = igl.AABB()
             tree.init(self.vertices, self.faces[faces])
             trees.append((faces, tree))

@@ -68,7 +68,7 @@ class Renumbered:
         """Map positions on the copy, (n, 3), to the original."""
         return positions @ self.axes.T + self.centre
 
-    def points(self, points: SurfacePoints) -> SurfacePoints:
+    def points_to_copy(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the original to the copy, each in the first face that contains it."""
         place = np.empty(len(self.face), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
@@ -90,7 +90,7 @@ class Renumbered:
         np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
         return SurfacePoints(self.face[points.faces], barycentric)
 
-    def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
+    def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a curve on the copy to the original."""
         there = self.original_points(SurfacePoints(curve.faces, curve.barycentric))
         return curve_on_mesh(

@@ -176,7 +176,7 @@ def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> Surf
     if barycentric.shape != (len(faces), 3):
         raise ControlPointError(
             f"{name}.barycentric has shape {barycentric.shape}; pass ({len(faces)}, 3), "
-            "one row a face"
+            "one row per point"
         )
     _check_range(f"{name}.faces", faces, len(mesh.faces), "faces")
     with np.errstate(over="ignore", invalid="ignore"):  # such values are refused below

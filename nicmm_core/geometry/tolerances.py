@@ -23,7 +23,7 @@ INSIDE = 1e-6
 FLAT = 1e-6
 """Curvature up to which a surface counts as a plane, times the bounding-box diagonal."""
 
-WITHOUT_AREA = 1e-4
+DEGENERATE_SINE = 1e-4
 """Sine of the angle between the longest and the shortest edge up to which a face is degenerate.
 
 Cotangents are computed from edge lengths, which cannot resolve sines below 1e-8. Moreover, a
@@ -34,11 +34,11 @@ SAME_CURVE = 1e-6
 """Greatest distance between a point of a curve and the position given by its face and barycentric
 coordinates, in bounding-box diagonals; beyond it, the curve belongs to another mesh."""
 
-AT_ONE_PLACE = 1e-12
+SAME_POSITION = 1e-12
 """Distance, in bounding-box diagonals, up to which two points coincide, such as the two ends of an
 edge."""
 
-MOVED = 1e-3
+PERTURBATION = 1e-3
 """Greatest move of a vertex of a degenerate face along each axis, relative to its shortest edge."""
 
 ROUNDED = 1e-12

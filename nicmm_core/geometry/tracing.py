@@ -90,7 +90,7 @@ def trace_between(
     """
     origin, goal = start.positions(mesh).T, end.positions(mesh).T
     margin = 0.0 if folded is None else FOLDS * mesh.mean_edge_length
-    reached = _holds(mesh, end, start.faces[None])[0]
+    reached = _contains(mesh, end, start.faces[None])[0]
     index = np.flatnonzero(~reached)
     origin, forward = origin.take(index, axis=1), (goal - origin).take(index, axis=1)
     ahead = forward if ahead is None else ahead.T.take(index, axis=1)
@@ -107,7 +107,7 @@ def trace_between(
         signed = step if folded is None else np.where(folded[strip.sides // 3], -step, step)
         travelled, covered = travelled + step.cumsum(0), covered + signed.cumsum(0)
         lost = strip.blocked | strip.closed | (travelled > longest[index] + margin)
-        last, going = _first(lost | _holds(mesh, end[index], strip.entered))
+        last, going = _first(lost | _contains(mesh, end[index], strip.entered))
         arrived = np.flatnonzero(~going & ~lost[last, np.arange(len(index))])
         reached[index[arrived]] = covered[last[arrived], arrived] <= longest[index[arrived]]
         row, column = np.nonzero(np.arange(len(step))[:, None] <= last)
@@ -408,7 +408,7 @@ def _on_sides(mesh: Mesh, faces: IntArray, sides: IntArray, shares: FloatArray) 
     return ((corners == first) * (1.0 - shares) + (corners == second) * shares).T
 
 
-def _holds(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
+def _contains(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> BoolArray:
     """Whether each point lies in the faces of its column, (s, m).
 
     A point on an edge or at a vertex lies in all faces that contain it.

@@ -27,22 +27,22 @@ def floats(tokens: Sequence[bytes]) -> FloatArray:
         raise FormatError(str(error)) from error
 
 
-def whole(token: bytes) -> int:
+def integer(token: bytes) -> int:
     """Convert a token to an integer of absolute value below `LARGEST`, or raise FormatError."""
     try:
         value = int(token)
     except ValueError as error:
-        raise FormatError(f"{shown(token)} is not a whole number") from error
+        raise FormatError(f"{quoted(token)} is not a whole number") from error
     if not -LARGEST < value < LARGEST:
-        raise FormatError(f"{shown(token)} is too large for a count or an index")
+        raise FormatError(f"{quoted(token)} is too large for a count or an index")
     return value
 
 
-def wholes(tokens: Sequence[bytes]) -> IntArray:
-    """Convert tokens to integers, see `whole`."""
-    return np.array([whole(token) for token in tokens], dtype=np.int64)
+def integers(tokens: Sequence[bytes]) -> IntArray:
+    """Convert tokens to integers, see `integer`."""
+    return np.array([integer(token) for token in tokens], dtype=np.int64)
 
 
-def shown(token: bytes) -> str:
+def quoted(token: bytes) -> str:
     """A token, shortened and escaped for an error message."""
     return ascii(token[:24].decode("latin-1"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .numbers import floats, shown, whole
+from .numbers import floats, integer, quoted
 from .polygons import FormatError, Polygons
 
 
@@ -29,15 +29,17 @@ def read_obj(data: bytes) -> Polygons:
             continue
         if words[0] == b"v":
             if len(words) < 4:
-                raise FormatError(f"line {number} has a vertex of {len(words) - 1} coordinates")
+                raise FormatError(
+                    f"line {number} has a vertex with only {len(words) - 1} coordinates"
+                )
             positions += words[1:4]
             count += 1
         elif words[0] == b"f":
             for word in words[1:]:
-                index = whole(word.partition(b"/")[0])
+                index = integer(word.partition(b"/")[0])
                 if index == 0:
                     raise FormatError(
-                        f"line {number} refers to vertex {shown(word)}; they count from 1"
+                        f"line {number} refers to vertex {quoted(word)}; indices start at 1"
                     )
                 # Negative indices count back from the last vertex so far.
                 corners.append(index - 1 if index > 0 else _counted_back(count, index, number))
@@ -52,5 +54,7 @@ def read_obj(data: bytes) -> Polygons:
 def _counted_back(count: int, index: int, number: int) -> int:
     """The vertex to which a negative index in line ``number`` refers, after ``count`` vertices."""
     if count + index < 0:
-        raise FormatError(f"line {number} counts back {-index} vertices, of {count} so far")
+        raise FormatError(
+            f"line {number} refers back {-index} vertices, but only {count} precede it"
+        )
     return count + index

@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from .numbers import floats, shown, whole, wholes
+from .numbers import floats, integer, integers, quoted
 from .polygons import FormatError, Polygons
 
 _HEADER = re.compile(rb"(ST)?C?N?OFF")
@@ -32,11 +32,11 @@ def read_off(data: bytes) -> Polygons:
         head, rest = (rest[0], rest[1:]) if rest else ([], [])
     if len(head) < 2:
         raise FormatError("it lacks the numbers of vertices and faces")
-    n_vertices, n_faces = whole(head[0]), whole(head[1])
+    n_vertices, n_faces = integer(head[0]), integer(head[1])
     if not 0 <= n_vertices + n_faces <= len(rest) or min(n_vertices, n_faces) < 0:
         raise FormatError(
-            f"its header gives {n_vertices} vertices and {n_faces} faces, but it has {len(rest)} "
-            "lines for them; it may be truncated"
+            f"its header declares {n_vertices} vertices and {n_faces} faces, but it has "
+            f"{len(rest)} lines for them; it may be truncated"
         )
     positions: list[bytes] = []
     for place, words in enumerate(rest[:n_vertices]):
@@ -46,11 +46,12 @@ def read_off(data: bytes) -> Polygons:
     corners: list[bytes] = []
     sizes = np.zeros(n_faces, dtype=np.int64)
     for place, words in enumerate(rest[n_vertices : n_vertices + n_faces]):
-        size = whole(words[0])
+        size = integer(words[0])
         if not 0 <= size < len(words):
             raise FormatError(
-                f"face {place} should have {shown(words[0])} corners and has {len(words) - 1}"
+                f"face {place} declares {quoted(words[0])} corners, but its line has "
+                f"{len(words) - 1}"
             )
         corners += words[1 : size + 1]
         sizes[place] = size
-    return Polygons(floats(positions).reshape(-1, 3), wholes(corners), sizes)
+    return Polygons(floats(positions).reshape(-1, 3), integers(corners), sizes)

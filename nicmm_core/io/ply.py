@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
-from .numbers import floats, shown, whole
+from .numbers import floats, integer, quoted
 from .polygons import FormatError, Polygons
 
 TYPES = {
@@ -90,7 +90,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
                 case ["format", name, *_]:
                     byte_order = _FORMATS[name]
                 case ["element", name, count]:
-                    elements.append(_Element(name, whole(count.encode("latin-1"))))
+                    elements.append(_Element(name, integer(count.encode("latin-1"))))
                 case ["property", "list", count_type, kind, name]:
                     column = _Property(name, TYPES[kind], TYPES[count_type])
                     elements[-1].properties.append(column)
@@ -101,7 +101,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
                 case _:
                     raise KeyError(line)
         except (KeyError, IndexError) as error:
-            raise FormatError(f"its header has an invalid line {shown(line)}") from error
+            raise FormatError(f"its header has an invalid line {quoted(line)}") from error
     if byte_order is None:
         raise FormatError("its header does not give the format")
     for element in elements:

@@ -57,8 +57,8 @@ class Polygons:
             first = int(outside.argmax())
             face = int(np.searchsorted(np.cumsum(self.sizes), first, side="right"))
             raise FormatError(
-                f"face {face} refers to vertex {self.corners[first]} and the file has "
-                f"{len(self.vertices)}, counted from 0"
+                f"face {face} refers to vertex {self.corners[first]} (counted from 0), but the "
+                f"file has only {len(self.vertices)} vertices"
             )
         corners, sizes = self._without_repetition()
         start = np.cumsum(sizes) - sizes

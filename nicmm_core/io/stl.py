@@ -39,7 +39,8 @@ def read_stl(data: bytes) -> Polygons:
         vertices = _text_corners(data)
     elif len(data) < HEADER_BYTES or count > room:
         raise FormatError(
-            f"its header gives {count} triangles and it has room for {room}; it may be truncated"
+            f"its header declares {count} triangles, but the file has room for only {room}; it may "
+            "be truncated"
         )
     else:
         triangles = np.frombuffer(data, TRIANGLE, count=count, offset=HEADER_BYTES)
@@ -54,7 +55,7 @@ def _text_corners(data: bytes) -> FloatArray:
     facets = len(_FACET.findall(data))
     if len(tokens) != 9 * facets:
         raise FormatError(
-            f"it has {facets} complete facets and {len(tokens) // 3} corners, which are not three "
-            "for each facet; it may be truncated"
+            f"it has {facets} complete facets and {len(tokens) // 3} corners, which is not three "
+            "per facet; it may be truncated"
         )
     return floats(tokens).reshape(-1, 3)

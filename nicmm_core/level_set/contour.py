@@ -19,7 +19,7 @@ from ..progress import checkpoint
 from .sign_bundle import SignBundle, local_signs
 from .vertex_links import VertexLinks
 
-PASSING_MARGIN = 0.03
+SNAP_MARGIN = 0.03
 """Fraction of an edge's length, from a vertex, within which the contour may snap to the vertex.
 
 Every edge at the vertex that the contour crosses has to be crossed within this fraction.
@@ -67,8 +67,8 @@ def extract_curves(
         Curves sorted by number of control points, then by length, both descending. A curve that
         ends at the boundary of the mesh, or at an end of the bundle, is open.
     """
-    passed = _passed_vertices(working, field, control_vertices, bundle)
-    through = np.concatenate([control_vertices, passed])
+    snapped = _snap_vertices(working, field, control_vertices, bundle)
+    through = np.concatenate([control_vertices, snapped])
     segment_face, ends = _crossings(working.faces, signs_with_zeros(field, through), bundle)
     # A node is the pair of ends of an edge on which φ changes sign, smaller vertex first, or a zero
     # vertex twice.
@@ -86,7 +86,7 @@ def extract_curves(
     return curves
 
 
-def _passed_vertices(
+def _snap_vertices(
     working: WorkingMesh,
     field: FloatArray,
     control_vertices: IntArray,
@@ -104,16 +104,16 @@ def _passed_vertices(
     np.maximum.at(farthest, start, fraction)
     np.maximum.at(farthest, end, 1.0 - fraction)
     crossed = np.unique(np.concatenate([start, end]))
-    near = crossed[farthest[crossed] < PASSING_MARGIN]
+    near = crossed[farthest[crossed] < SNAP_MARGIN]
     links = VertexLinks(working, bundle)
     taken = set(control_vertices.tolist())
-    passed = []
+    snapped = []
     for vertex in near[np.argsort(farthest[near], kind="stable")].tolist():
         checkpoint()
         if taken.isdisjoint(links.neighbours(vertex)) and links.is_simple(vertex, sign):
             taken.add(vertex)
-            passed.append(vertex)
-    return np.array(passed, dtype=np.int64)
+            snapped.append(vertex)
+    return np.array(snapped, dtype=np.int64)
 
 
 def segment_ends(

@@ -16,7 +16,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.normals import vertex_normals
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import component_unit, feature_map
-from ..path.band_refinement import PIECES
+from ..path.band_refinement import RESOLUTION
 from ..path.initial_loop import InitialLoop, build_initial_loop
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
@@ -104,7 +104,7 @@ def build_problem(
     smoothness: float = 1.0,
     closed: bool = True,
     via_points: ViaPoints | None = None,
-    pieces: int = PIECES,
+    resolution: int = RESOLUTION,
 ) -> Problem:
     """Build the problem: insert the control points, find the initial path, compute the features.
 
@@ -124,7 +124,7 @@ def build_problem(
         Whether the curve returns from the last point to the first.
     via_points : mapping, optional
         Mapping from the index of a control point to via points on the leg that starts there.
-    pieces : int
+    resolution : int
         Refinement of the mesh along the path, see `path.band_refinement`.
 
     Returns
@@ -145,7 +145,9 @@ def build_problem(
         width = component_unit(mesh, int(points.faces[0]))
         phi_fea = feature_map(mesh, obstacles, alignment, width)
     with subrange(0.0, PATH_SHARE):
-        working, loop = build_initial_loop(mesh, points, order, phi_fea, closed, via_points, pieces)
+        working, loop = build_initial_loop(
+            mesh, points, order, phi_fea, closed, via_points, resolution
+        )
     checkpoint(PATH_SHARE, lambda: working.vertices[loop.vertices])
     unit = float(np.sqrt(working.face_areas.sum()))
     vertices = in_principal_frame(working.vertices, working.faces, working.face_areas) / unit
@@ -192,7 +194,7 @@ def build_problem(
     )
 
 
-def requested_problem(mesh: Mesh, request: Request, pieces: int = PIECES) -> Problem:
+def requested_problem(mesh: Mesh, request: Request, resolution: int = RESOLUTION) -> Problem:
     """Build the problem of a request on a mesh, see `build_problem`."""
     return build_problem(
         mesh,
@@ -203,7 +205,7 @@ def requested_problem(mesh: Mesh, request: Request, pieces: int = PIECES) -> Pro
         request.smoothness,
         request.closed,
         request.via_points or None,
-        pieces,
+        resolution,
     )
 
 

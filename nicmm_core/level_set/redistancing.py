@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.distances import DistanceSurface, distance_to_segments, spread
+from ..geometry.distances import DistanceSurface, distance_to_segments, propagate
 from .contour import segment_ends, signs_with_zeros
 from .sign_bundle import SignBundle
 from .signed_distance import LEAST_DISTANCE
@@ -51,7 +51,7 @@ def redistanced(
     distance[zero_vertices] = 0.0
     if not np.isfinite(distance).any():
         return field.copy()
-    spread(surface, distance, limit)
+    propagate(surface, distance, limit)
     distance = np.maximum(distance, LEAST_DISTANCE * surface.edge_length)
     reached = np.isfinite(distance)
     distance[~reached] = distance[reached].max()

@@ -56,11 +56,11 @@ def build_sign_bundle(working: WorkingMesh, loop: InitialLoop) -> SignBundle:
     corner_sign = np.ones(faces.shape, dtype=np.int64)
     inner = range(len(loop.vertices)) if loop.closed else range(1, len(loop.vertices) - 1)
     before: dict[int, int] = {}
-    for place in inner:
-        vertex = int(loop.vertices[place])
+    for index in inner:
+        vertex = int(loop.vertices[index])
         checkpoint()
         around = at_corners[[vertex]].indices // 3
-        side = _sides(faces, around, vertex, loop.neighbours(place))
+        side = _sides(faces, around, vertex, loop.neighbours(index))
         # The faces shared with the previous vertex of the path keep the side they have there.
         turns = (s * before[f] for f, s in zip(around.tolist(), side, strict=True) if f in before)
         side = next(turns, 1) * side

@@ -21,7 +21,7 @@ from .sparse_solver import Solve, factorised
 MOST_ENTRIES = 150
 """Number of products of entries of L, per vertex, up to which A is assembled; usually about 50."""
 
-AT_ONCE = 8
+BLOCK_COLUMNS = 8
 """Number of right-hand sides solved together; with more, a cancellation would take longer."""
 
 
@@ -82,11 +82,12 @@ def build_smoother(
     loads = np.zeros((len(elements.vertex_areas), len(control_vertices)))
     loads[control_vertices, np.arange(len(control_vertices))] = 1.0
     fields = np.empty_like(loads)
-    for first in range(0, len(control_vertices), AT_ONCE):
+    for first in range(0, len(control_vertices), BLOCK_COLUMNS):
         checkpoint()
-        columns = slice(first, first + AT_ONCE)
+        columns = slice(first, first + BLOCK_COLUMNS)
         fields[:, columns] = solve_response(loads[:, columns])
-    response = np.linalg.solve(fields[control_vertices].T, fields.T).T
+    # On extremely thin surfaces, control points may have the same response to the last digit.
+    response = np.linalg.lstsq(fields[control_vertices].T, fields.T, rcond=None)[0].T
     return Smoother(solve, elements.vertex_areas, control_vertices, response)
 
 

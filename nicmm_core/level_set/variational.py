@@ -121,7 +121,7 @@ def solve(
         if watch is not None and not watch(iteration / config.iterations, best_field):
             status = Status.CANCELLED
             break
-        if _is_still(least, config):
+        if _has_converged(least, config):
             status = Status.CONVERGED
             break
         moved, damping = gauss_newton_step(problem, band, links, field, weights, damping, config)
@@ -133,7 +133,7 @@ def solve(
     return Solution(field, energy_of(problem, field), losses, status, keeps_topology=True)
 
 
-def _is_still(least: list[float], config: VariationalConfig) -> bool:
+def _has_converged(least: list[float], config: VariationalConfig) -> bool:
     """Whether the least loss so far, in every iteration, has converged."""
     if len(least) <= config.patience:
         return False

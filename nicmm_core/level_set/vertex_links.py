@@ -48,7 +48,7 @@ class VertexLinks:
         A control vertex in the link has the sign 0, because the curve crosses the link there.
         """
         if vertex in self._ends:
-            return self._sign_changes_round_end(vertex, sign)
+            return self._sign_changes_around_end(vertex, sign)
         link = self._ordered(vertex)
         if link is None:
             return -1
@@ -70,7 +70,7 @@ class VertexLinks:
             relative.update((v, own * s) for v, s in zip(corners, signs, strict=True))
         return relative
 
-    def _sign_changes_round_end(self, vertex: int, sign: IntArray) -> int:
+    def _sign_changes_around_end(self, vertex: int, sign: IntArray) -> int:
         """Number of faces at an end of an open curve whose other two corners differ in sign."""
         around = self._faces_at(vertex)
         assert self._corner_sign is not None  # only a bundle has ends

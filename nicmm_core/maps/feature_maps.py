@@ -48,7 +48,7 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
         Any mesh; it may be open, unoriented or non-manifold.
     """
     # Not `igl.principal_curvature`, which fails on small meshes and needs an orientation.
-    centre, neighbour = _rings(mesh)
+    centre, neighbour = _two_rings(mesh)
     normals = unsigned_normals(mesh)
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
     first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), tolerances.TINY)
@@ -175,12 +175,12 @@ def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:
     """
     pairs = _checked_pairs(edges, len(mesh.vertices))
     size = len(mesh.vertices)
-    foreign = ~np.isin(edge_keys(pairs[:, 0], pairs[:, 1], size), side_keys(mesh.faces, size))
-    if foreign.any():
-        first = int(foreign.argmax())
+    not_edges = ~np.isin(edge_keys(pairs[:, 0], pairs[:, 1], size), side_keys(mesh.faces, size))
+    if not_edges.any():
+        first = int(not_edges.argmax())
         raise ArgumentError(
             f"edges[{first}] = {pairs[first].tolist()} is not an edge of a face ("
-            f"{foreign.sum()} are not); pass pairs of vertices that a side of a face joins"
+            f"{not_edges.sum()} are not); pass pairs of end vertices of mesh edges"
         )
     weights = np.zeros(size)
     weights[pairs] = 1.0
@@ -230,7 +230,7 @@ def value_map(
     return np.clip((0.5 * checked - 0.5 * start) / (0.5 * end - 0.5 * start), 0.0, 1.0)
 
 
-def _rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
+def _two_rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
     """Pairs of a vertex and a vertex of its two-ring, both (p,), sorted by the first vertex.
 
     A one-ring does not overdetermine a quadric; more than two rings would smooth out features.

@@ -22,7 +22,7 @@ from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.distances import build_distance_surface, spread
+from ..geometry.distances import build_distance_surface, propagate
 from ..geometry.mesh import Mesh, edge_lengths
 from ..progress import checkpoint
 
@@ -190,7 +190,7 @@ def _depths(mesh: Mesh, level: IntArray, limit: float) -> FloatArray:
         if not np.isfinite(distance).any():
             continue
         surface = build_distance_surface(mesh.vertices[vertices], corners, edge_length)
-        spread(surface, distance, limit)
+        propagate(surface, distance, limit)
         own = level[vertices] == step
         result[vertices[own]] = np.minimum(distance[own], limit)
     return result

@@ -90,7 +90,7 @@ def finetune(
     """
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     surface = surface_tensors(problem, device)
-    given = network_input(problem, device)
+    inputs = network_input(problem, device)
     network = copy.deepcopy(network).to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
 
@@ -101,7 +101,7 @@ def finetune(
     status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
         optimiser.zero_grad()
-        phi = network(given)  # (n,)
+        phi = network(inputs)  # (n,)
         terms = loss_terms(surface, phi)
         loss = total_loss(terms, weights)
         value = loss.item()
@@ -116,7 +116,7 @@ def finetune(
         if watch is not None and not watch(iteration / config.iterations, best_field):
             status = Status.CANCELLED
             break
-        if _may_stop(energies, config):
+        if _has_converged(energies, config):
             status = Status.CONVERGED
             break
         loss.backward()
@@ -136,7 +136,7 @@ def narrow_band_energy(
     return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
 
 
-def _may_stop(energies: list[float], config: FinetuningConfig) -> bool:
+def _has_converged(energies: list[float], config: FinetuningConfig) -> bool:
     """The paper's early stop: the energy is below the threshold or hardly fluctuates."""
     if energies[-1] < config.threshold:
         return True

@@ -151,7 +151,7 @@ class Operations(NamedTuple):
     ones_like: Callable[[Array], Array]
 
 
-def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operations) -> Array:
+def level_set(weights: NetworkWeights, inputs: NetworkInput, operations: Operations) -> Array:
     """Compute φ = φ₀ + the network's correction, which is zero at the control points.
 
     φ₀ is "the foundation for network initialization" (section 3.1): the last layer starts at zero,
@@ -163,7 +163,7 @@ def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operatio
     Parameters
     ----------
     weights : NetworkWeights
-    given : NetworkInput
+    inputs : NetworkInput
         Input of the network, of the same array type and precision as the parameters.
     operations : Operations
         Operations for that array type.
@@ -174,25 +174,25 @@ def level_set(weights: NetworkWeights, given: NetworkInput, operations: Operatio
         φ at the vertices.
     """
     config, parameters = weights.config, weights.parameters
-    seen = channels_seen(config, given.features, operations)  # (channels,)
-    hidden = linear(parameters, "stem", given.features * seen, operations)  # (n, C)
+    mask = channel_mask(config, inputs.features, operations)  # (channels,)
+    hidden = linear(parameters, "stem", inputs.features * mask, operations)  # (n, C)
     hidden = operations.tanh(hidden)  # (n, C)
     for number in range(config.depth):
         checkpoint()
-        hidden = block(weights, f"blocks.{number}", hidden, given.area_share, operations)  # (n, C)
+        hidden = block(weights, f"blocks.{number}", hidden, inputs.area_share, operations)  # (n, C)
     correction = linear(parameters, "head", hidden, operations)[:, 0]  # (n,)
-    at_controls = correction[given.control_vertices]  # (k,)
-    phi = correction - given.response @ at_controls  # (n,)
-    return given.initial_distance + phi if config.distance else phi
+    at_controls = correction[inputs.control_vertices]  # (k,)
+    phi = correction - inputs.response @ at_controls  # (n,)
+    return inputs.initial_distance + phi if config.distance else phi
 
 
-def channels_seen(config: NetworkConfig, features: Array, operations: Operations) -> Array:
+def channel_mask(config: NetworkConfig, features: Array, operations: Operations) -> Array:
     """Factors of the input channels: 0 for channels switched off, 1 for all others."""
-    seen = operations.ones_like(features[0])  # (channels,)
-    seen[NORMAL_CHANNELS] *= config.normals
-    seen[INDICATOR_CHANNEL] *= config.control_indicator
-    seen[DISTANCE_CHANNEL] *= config.distance
-    return seen
+    mask = operations.ones_like(features[0])  # (channels,)
+    mask[NORMAL_CHANNELS] *= config.normals
+    mask[INDICATOR_CHANNEL] *= config.control_indicator
+    mask[DISTANCE_CHANNEL] *= config.distance
+    return mask
 
 
 def block(
@@ -202,12 +202,14 @@ def block(
     config, parameters = weights.config, weights.parameters
     inner = operations.tanh(linear(parameters, f"{name}.linear", hidden, operations))  # (n, C)
     if config.attention:
-        inner = attended(parameters, f"{name}.attention", inner, area_share, operations)  # (n, C)
+        inner = channel_attention(
+            parameters, f"{name}.attention", inner, area_share, operations
+        )  # (n, C)
     unit = gated_unit if config.gating else linear
     return hidden + unit(parameters, f"{name}.gated", inner, operations)  # (n, C)
 
 
-def attended(
+def channel_attention(
     parameters: Parameters, name: str, inner: Array, area_share: Array, operations: Operations
 ) -> Array:
     """Efficient Channel Attention: scale each channel by a weight from its neighbours' means.

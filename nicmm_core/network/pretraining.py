@@ -134,12 +134,12 @@ def pretrain(
     if min(shares) < 0.0 or sum(shares) > 1.0:
         raise ArgumentError(
             f"open_share and given_share are {shares[0]} and {shares[1]}; they are shares of all "
-            "sets, so neither may be negative nor both together more than 1"
+            "sets, so neither may be negative, and their sum must not exceed 1"
         )
     if not 0.0 <= config.map_share <= 1.0:
         raise ArgumentError(f"map_share is {config.map_share}; it is a share of all sets, 0 … 1")
     if not Path(output).resolve().parent.is_dir():
-        raise ArgumentError(f"output is {output}, whose folder does not exist; make it first")
+        raise ArgumentError(f"output is {output}, whose folder does not exist; create it first")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     torch.manual_seed(config.seed)
     channels = BASE_CHANNELS + (config.map_share > 0.0)
@@ -169,9 +169,9 @@ def pretrain(
             chosen = order[first : first + config.batch]
             optimiser.zero_grad()
             for index in chosen:
-                surface, given, own_weights = prepared[index]
-                phi = network(turned(given, generator))
-                loss = total_loss(loss_terms(surface, phi), own_weights)
+                surface, inputs, set_weights = prepared[index]
+                phi = network(randomly_reoriented(inputs, generator))
+                loss = total_loss(loss_terms(surface, phi), set_weights)
                 (loss / len(chosen)).backward()
                 total += loss.item()
                 done += 1
@@ -195,18 +195,18 @@ def pretrain(
     return losses
 
 
-def turned(given: NetworkInput, generator: np.random.Generator) -> NetworkInput:
+def randomly_reoriented(inputs: NetworkInput, generator: np.random.Generator) -> NetworkInput:
     """Permute and reverse the axes of a network input at random, and choose the sign of φ₀.
 
     The energy of Eq. 2 is invariant under both changes.
     """
     axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
     side = float(generator.choice([-1.0, 1.0]))
-    features = given.features.clone()
+    features = inputs.features.clone()
     for channels in (POSITION_CHANNELS, NORMAL_CHANNELS):
-        features[:, channels] = given.features[:, channels][:, axes] * features.new_tensor(signs)
+        features[:, channels] = inputs.features[:, channels][:, axes] * features.new_tensor(signs)
     features[:, DISTANCE_CHANNEL] *= side
-    return given._replace(features=features, initial_distance=side * given.initial_distance)
+    return inputs._replace(features=features, initial_distance=side * inputs.initial_distance)
 
 
 def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
@@ -222,22 +222,22 @@ def _resume(
         return []
     try:
         state = torch.load(checkpoint, weights_only=True)
-        theirs = state["configuration"]
+        saved_configuration = state["configuration"]
     except (OSError, RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError) as error:
         raise ArgumentError(
-            f"{checkpoint} cannot be read as a checkpoint ({error}); remove it to start anew"
+            f"{checkpoint} cannot be read as a checkpoint ({error}); delete it to start over"
         ) from error
-    if theirs != configuration:
+    if saved_configuration != configuration:
         raise ArgumentError(
-            f"{checkpoint} belongs to a run with other meshes or settings; remove it or repeat "
-            "that run"
+            f"{checkpoint} belongs to a run with other meshes or settings; delete it to start "
+            "over, or repeat that run"
         )
     network.load_state_dict(state["network"])
     optimiser.load_state_dict(state["optimiser"])
     return list(state["losses"])
 
 
-def _kind(sample: float, config: PretrainingConfig) -> tuple[bool, str]:
+def _curve_kind(sample: float, config: PretrainingConfig) -> tuple[bool, str]:
     """Whether the curve of a set is closed, and the order of its points, from a random number."""
     if sample < config.open_share:
         return False, "shortest"
@@ -279,7 +279,7 @@ def _random_problems(
                 break
             count = generator.integers(config.fewest_points, config.most_points + 1)
             chosen = generator.choice(vertices, size=count, replace=False)
-            closed, order = _kind(generator.random(), config)
+            closed, order = _curve_kind(generator.random(), config)
             points = locate_control_points(mesh, chosen, closed)
             obstacles, alignment = _maps(mesh, chosen, config, generator)
             try:

@@ -12,7 +12,7 @@ from ..level_set.losses import energy_of
 from ..level_set.problem import Problem, requested_problem
 from ..level_set.solution import Solution
 from ..level_set.zero_set import ZeroSet, shortest_by_map, zero_set
-from ..path.band_refinement import PIECES_TO_START
+from ..path.band_refinement import START_RESOLUTION
 from ..progress import subrange
 from ..request import Request
 from ..status import Status
@@ -61,7 +61,7 @@ def infer(mesh: Mesh, request: Request) -> Inference:
         If no simple path passes the points in this order.
     """
     with subrange(0.0, 0.8):
-        problem = requested_problem(mesh, request, PIECES_TO_START)
+        problem = requested_problem(mesh, request, START_RESOLUTION)
     with subrange(0.8, 1.0):
         solution = infer_level_set(shipped_weights(problem.features.shape[1]), problem)
         zeros = zero_set(mesh, problem, solution.field)

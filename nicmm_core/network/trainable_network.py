@@ -57,9 +57,9 @@ class CurveNetwork(nn.Module):
         """Configuration and parameters by name; these are the trained tensors, not copies."""
         return NetworkWeights(self.config, dict(zip(self.names, self.arrays, strict=True)))
 
-    def forward(self, given: NetworkInput) -> Tensor:
+    def forward(self, inputs: NetworkInput) -> Tensor:
         """Level-set values φ, shape (n,)."""
-        return level_set(self.weights, given, TORCH)
+        return level_set(self.weights, inputs, TORCH)
 
 
 def build_network(weights: NetworkWeights) -> CurveNetwork:

@@ -10,16 +10,16 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
 
-BESIDE = 0.12
+LANE_OFFSET = 0.12
 """Maximum distance from each end of a lane to the path between two control points, in √area."""
 
-PART = (0.2, 0.8)
+LANE_PART = (0.2, 0.8)
 """Start and end of a lane along that path, as fractions of the path's number of vertices."""
 
-RADII = (0.02, 0.07)
+OBSTACLE_RADII = (0.02, 0.07)
 """Range of the radii of obstacles, in √area."""
 
-WEIGHTS = (0.4, 1.0)
+STROKE_WEIGHTS = (0.4, 1.0)
 """Range of the weights of strokes."""
 
 MOST_STROKES = 3
@@ -56,16 +56,17 @@ def random_maps(
     for _ in range(generator.integers(1, MOST_STROKES + 1)):
         ends = generator.choice(points, 2, replace=False)
         path = _shortest_path(graph, int(ends[0]), int(ends[1]))
-        weight = generator.uniform(*WEIGHTS)
+        weight = generator.uniform(*STROKE_WEIGHTS)
         if generator.random() < 0.5:
             middle = generator.choice(path)
-            radius = generator.uniform(*RADII) * unit
+            radius = generator.uniform(*OBSTACLE_RADII) * unit
             near = _around(graph, int(middle), radius)
             obstacles[near] = np.maximum(obstacles[near], weight)
         else:
-            stops = [path[int(share * (len(path) - 1))] for share in PART]
+            stops = [path[int(share * (len(path) - 1))] for share in LANE_PART]
             beside = [
-                int(generator.choice(_around(graph, int(stop), BESIDE * unit))) for stop in stops
+                int(generator.choice(_around(graph, int(stop), LANE_OFFSET * unit)))
+                for stop in stops
             ]
             lane = _shortest_path(graph, *beside)
             alignment[lane] = np.maximum(alignment[lane], weight)

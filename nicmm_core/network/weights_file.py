@@ -26,7 +26,7 @@ SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
 SHIPPED_WITH_MAPS = SHIPPED.with_name("nicmm-maps.npz")
 """Shipped weights of the network with φ_fea as its ninth channel."""
 
-LARGEST = 2**28
+MOST_BYTES = 2**28
 """Maximum number of bytes of all arrays in a file; a small archive could unpack to any size."""
 
 
@@ -75,7 +75,7 @@ def load_weights(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
             raise ValueError(f"{', '.join(arrays)} belongs to another network")
     except _UNREADABLE as error:
         raise ArgumentError(
-            f"{path} cannot be read as network weights ({error}); make the file with "
+            f"{path} cannot be read as network weights ({error}); create the file with "
             "'python -m nicmm_core pretrain'"
         ) from error
     return NetworkWeights(config, parameters)
@@ -87,8 +87,8 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
         warnings.simplefilter("error")  # NumPy only warns about ambiguous headers
         with np.load(file, allow_pickle=False) as archive:
             size = sum(member.file_size for member in archive.zip.infolist())
-            if size > LARGEST:
-                raise ValueError(f"it would unpack to {size} bytes, more than {LARGEST}")
+            if size > MOST_BYTES:
+                raise ValueError(f"it would unpack to {size} bytes, more than {MOST_BYTES}")
             return dict(archive)
 
 

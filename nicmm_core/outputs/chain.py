@@ -57,7 +57,7 @@ def build_chain(
     barycentric: FloatArray,
     segment_faces: IntArray,
     margin: FloatArray,
-    wanted: BoolArray,
+    must_keep: BoolArray,
 ) -> Chain:
     """Snap the points of a curve to nearby vertices and edges, and merge neighbouring points.
 
@@ -70,7 +70,7 @@ def build_chain(
     margin : (n,) float array
         Barycentric coordinates up to this become zero, and neighbours whose coordinates differ by
         less are merged.
-    wanted : (n,) bool array
+    must_keep : (n,) bool array
         Points, such as control points, whose coordinates a merged place takes.
     """
     barycentric = without_small_weights(barycentric, margin)
@@ -91,7 +91,7 @@ def build_chain(
     count = (ends - begins - 1) % n + 1
     point = np.array(
         [
-            next((p for p in _run(b, c, n) if wanted[p]), b)
+            next((p for p in _run(b, c, n) if must_keep[p]), b)
             for b, c in zip(begins.tolist(), count.tolist(), strict=True)
         ],
         dtype=np.int64,
@@ -134,7 +134,7 @@ def superfluous_points(
     barycentric: FloatArray,
     faces: IntArray,
     closed: bool,
-    wanted: BoolArray,
+    must_keep: BoolArray,
     deviation: float,
 ) -> BoolArray:
     """Points inside faces that can be omitted without moving the curve by more than a deviation.
@@ -145,7 +145,7 @@ def superfluous_points(
     barycentric : (n, 3) float array
     faces : (n,) int array
     closed : bool
-    wanted : (n,) bool array
+    must_keep : (n,) bool array
         Points to keep.
     deviation : float
         Largest distance by which the curve may move, in mesh units.
@@ -156,7 +156,7 @@ def superfluous_points(
         True for points that can be omitted.
     """
     n = len(faces)
-    free = (barycentric > 0.0).all(axis=1) & ~wanted
+    free = (barycentric > 0.0).all(axis=1) & ~must_keep
     if not closed:
         free[[0, -1]] = False
     superfluous = np.zeros(n, dtype=bool)

@@ -186,15 +186,15 @@ def cut_mesh(
         raise ArgumentError(f"deviation is {deviation!r}; pass a length of at least 0")
     curve, segment_faces = checked_curve(mesh, curve)
     faces, barycentric = curve.faces, curve.barycentric
-    wanted = np.zeros(len(faces), dtype=bool)
-    wanted[curve.control_index[curve.control_index >= 0]] = True
+    must_keep = np.zeros(len(faces), dtype=bool)
+    must_keep[curve.control_index[curve.control_index >= 0]] = True
     exact = np.zeros(len(faces), dtype=bool)
     positions = SurfacePoints(faces, barycentric).positions(mesh)
     while True:
         margin = np.where(exact, ROUNDING, max(snap, ROUNDING))
         kept = np.flatnonzero(
             ~superfluous_points(
-                positions, barycentric, faces, curve.closed, wanted | exact, deviation
+                positions, barycentric, faces, curve.closed, must_keep | exact, deviation
             )
         )
         chain = build_chain(
@@ -204,7 +204,7 @@ def cut_mesh(
             barycentric[kept],
             segment_faces[kept],
             margin[kept],
-            wanted[kept],
+            must_keep[kept],
         )
         try:
             cut = _cut(mesh, chain)

@@ -14,7 +14,7 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from .cut import CutMesh
 
-BENT = 0.9
+LEAST_COSINE = 0.9
 """Least cosine between the normals of a merged polygon and of each of its triangles."""
 
 
@@ -127,4 +127,4 @@ def _is_flat(vertices: FloatArray, faces: IntArray) -> bool:
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(normal, axis=1)
     together = normal.sum(axis=0)
-    return bool((normal @ together > BENT * length * np.linalg.norm(together)).all())
+    return bool((normal @ together > LEAST_COSINE * length * np.linalg.norm(together)).all())

@@ -16,10 +16,10 @@ from ..geometry.array_types import BoolArray, FloatArray
 from ..progress import checkpoint
 from .virtual_splits import SplitMesh
 
-PIECES = 64
+RESOLUTION = 64
 """Ratio of the loop's length to the longest edge near it, where the level set is the result."""
 
-PIECES_TO_START = 32
+START_RESOLUTION = 32
 """The same ratio where the level set is only the start of a relaxation."""
 
 BAND_SHARE = 0.05
@@ -37,7 +37,11 @@ The longest edges are bisected first, so stopping at this number leaves an evenl
 
 
 def refine_along(
-    split: SplitMesh, component: int, loop: list[int], closed: bool = True, pieces: int = PIECES
+    split: SplitMesh,
+    component: int,
+    loop: list[int],
+    closed: bool = True,
+    resolution: int = RESOLUTION,
 ) -> tuple[list[int], float]:
     """Bisect long edges near a path of edges.
 
@@ -51,7 +55,7 @@ def refine_along(
         Vertices of the path; the first one is not repeated at the end.
     closed : bool
         Whether an edge joins the last vertex to the first.
-    pieces : int
+    resolution : int
         Ratio of the path's length to the longest edge allowed near it.
 
     Returns
@@ -67,7 +71,7 @@ def refine_along(
         points = np.concatenate([points, points[:1]])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(lengths.sum())
-    longest, half_width = length / pieces, BAND_SHARE * length
+    longest, half_width = length / resolution, BAND_SHARE * length
     tree = cKDTree(_samples(points, longest))
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:

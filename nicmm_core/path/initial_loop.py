@@ -20,7 +20,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh, edge_keys, side_keys
 from ..geometry.surface_points import SurfacePoints, control_point_names
-from .band_refinement import PIECES, refine_along
+from .band_refinement import RESOLUTION, refine_along
 from .legs import CrossingError
 from .simple_path import find_path
 from .via_points import ViaPoints, Waypoints, with_via_points
@@ -64,10 +64,10 @@ class InitialLoop:
         pairs = np.stack([self.vertices, np.roll(self.vertices, -1)], axis=1)
         return pairs if self.closed else pairs[:-1]
 
-    def neighbours(self, place: int) -> list[int]:
+    def neighbours(self, index: int) -> list[int]:
         """The vertices before and after the vertex at an index of the path, in either order."""
         edges = self.edges
-        return edges[(edges == self.vertices[place])[:, ::-1]].tolist()
+        return edges[(edges == self.vertices[index])[:, ::-1]].tolist()
 
 
 def build_initial_loop(
@@ -77,7 +77,7 @@ def build_initial_loop(
     phi_fea: FloatArray | None = None,
     closed: bool = True,
     via_points: ViaPoints | None = None,
-    pieces: int = PIECES,
+    resolution: int = RESOLUTION,
 ) -> tuple[WorkingMesh, InitialLoop]:
     """Insert the control points as vertices and join them by edge paths that never touch.
 
@@ -96,7 +96,7 @@ def build_initial_loop(
         Whether the path returns from the last point to the first.
     via_points : mapping, optional
         Mapping from the index of a control point to via points on the leg that starts there.
-    pieces : int
+    resolution : int
         Refinement of the mesh along the path, see `refine_along`.
 
     Returns
@@ -141,7 +141,7 @@ def build_initial_loop(
         raise UnreachableError(f"{what}; {advice}", *named) from failure
     component = int(mesh.face_component[points.faces[0]])
     split = path.split
-    loop, zigzag = refine_along(split, component, path.vertices, closed, pieces)
+    loop, zigzag = refine_along(split, component, path.vertices, closed, resolution)
     _separate_strands(split, loop, closed)
     working, renumbered = split.assemble(component)
     vertices, controls = renumbered[loop], renumbered[path.waypoints[waypoints.is_control]]
@@ -174,9 +174,9 @@ class _Tours:
     def along_boundaries(self) -> IntArray:
         """A short order that is possible even if points lie on boundaries, (k,)."""
         working, vertices, distance = self._on_mesh
-        place = np.full(len(working.vertices), -1)
-        place[vertices] = np.arange(len(vertices))
-        loops = [place[loop] for loop in boundary_loops(working.faces)]
+        index = np.full(len(working.vertices), -1)
+        index[vertices] = np.arange(len(vertices))
+        loops = [index[loop] for loop in boundary_loops(working.faces)]
         return order_along_boundaries(distance, [loop[loop >= 0] for loop in loops], self.closed)
 
     @cached_property
@@ -252,11 +252,10 @@ def _advice(
             find_path(mesh, points[order], phi_fea, tours.closed)
         except UnreachableError:
             continue
-        without = "without via points " if via else ""
-        return f"{without}visit the points in the order {order.tolist()}, which works"
+        leave_out = "leave the via points out and " if via else ""
+        return f"{leave_out}visit the points in the order {order.tolist()}, which works"
     return (
-        "no order was found that works, the shortest included; use fewer points, or move points "
-        "off the boundary"
+        "no order works, not even the shortest; use fewer points, or move points off the boundary"
     )
 
 
@@ -285,10 +284,10 @@ def path_curve(mesh: Mesh, working: WorkingMesh, loop: InitialLoop) -> SurfaceCu
     face = working.parent_face[order[first] // 3]
     corners = mesh.faces[face]
     barycentric = np.asarray(working.interpolation[path[:, None], corners].todense())
-    place = np.full(size, -1)
-    place[path] = np.arange(len(path))
+    index = np.full(size, -1)
+    index[path] = np.arange(len(path))
     return curve_on_mesh(
-        mesh, loop.closed, face, barycentric.reshape(-1, 3), place[loop.control_vertices]
+        mesh, loop.closed, face, barycentric.reshape(-1, 3), index[loop.control_vertices]
     )
 
 

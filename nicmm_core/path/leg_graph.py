@@ -88,16 +88,16 @@ class Patch:
         matrix = entries.tocsr()
         return matrix.data, matrix.indices, matrix.indptr
 
-    def places(self, vertices: IntArray) -> IntArray:
+    def node_indices(self, vertices: IntArray) -> IntArray:
         """Nodes of vertices of the split mesh; vertices outside this patch are omitted."""
-        place = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
-        return place[self.vertices[place] == vertices]
+        index = np.searchsorted(self.vertices, vertices).clip(max=len(self.vertices) - 1)
+        return index[self.vertices[index] == vertices]
 
-    def node(self, place: int) -> Node:
+    def node(self, index: int) -> Node:
         """The vertex at a node, or the edge whose midpoint the node is."""
-        if place < len(self.vertices):
-            return int(self.vertices[place])
-        start, end = self.vertices[self.edges[place - len(self.vertices)]]
+        if index < len(self.vertices):
+            return int(self.vertices[index])
+        start, end = self.vertices[self.edges[index - len(self.vertices)]]
         return int(start), int(end)
 
 

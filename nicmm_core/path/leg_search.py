@@ -169,8 +169,8 @@ class LegSearch:
         whole = patch.graph(patch.lengths)
 
         def reached(vertex: int) -> set[int]:
-            (place,) = patch.places(np.array([vertex]))
-            around = whole[[int(place)]].indices
+            (index,) = patch.node_indices(np.array([vertex]))
+            around = whole[[int(index)]].indices
             return set(label[around[free[around]]].tolist())
 
         return all(reached(first) & reached(second) for first, second in pairs)
@@ -184,13 +184,13 @@ class LegSearch:
         if factor is not None:
             lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
-        avoided = patch.places(np.append(obstacles.vertices, source))
-        ends = patch.places(np.append(obstacles.ends, source))
+        avoided = patch.node_indices(np.append(obstacles.vertices, source))
+        ends = patch.node_indices(np.append(obstacles.ends, source))
         beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
         lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
 
         checkpoint()
-        (here,), (there,) = (patch.places(np.array([vertex])) for vertex in (source, target))
+        (here,), (there,) = (patch.node_indices(np.array([vertex])) for vertex in (source, target))
         free = self._free(patch, obstacles, np.array([here, there]))
         lengths[~free[patch.arcs].all(axis=1)] = np.inf
         _, previous = csgraph.dijkstra(
@@ -198,10 +198,10 @@ class LegSearch:
         )
         if previous[there] < 0:
             return None
-        places = self._without_crossing(patch, path_between(previous, int(here), int(there)))
-        steps = np.stack([places[:-1], places[1:]], axis=1)
+        path = self._without_crossing(patch, path_between(previous, int(here), int(there)))
+        steps = np.stack([path[:-1], path[1:]], axis=1)
         length = float(patch.step_lengths(steps).sum())
-        return Leg([patch.node(place) for place in places], length)
+        return Leg([patch.node(index) for index in path], length)
 
     def _whole(self) -> Patch:
         """Graph of the whole component, cached until the mesh is split again."""
@@ -264,7 +264,7 @@ class LegSearch:
         # A boundary vertex at which several fans meet may be the only connection between them.
         free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
-        free[patch.places(obstacles.vertices)] = False
+        free[patch.node_indices(obstacles.vertices)] = False
         if len(obstacles.edges):
             # A leg through the midpoint of an edge of another leg would cross that leg.
             size = self._split.n_vertices
@@ -295,29 +295,29 @@ class LegSearch:
         assert self._phi_fea is not None
         n_input = len(self._mesh.vertices)
         result = self._phi_fea[np.minimum(vertices, n_input - 1)]
-        for place in np.flatnonzero(vertices >= n_input).tolist():
-            weights = self._split.weights(int(vertices[place]))
-            result[place] = sum(w * self._phi_fea[vertex] for vertex, w in weights.items())
+        for index in np.flatnonzero(vertices >= n_input).tolist():
+            weights = self._split.weights(int(vertices[index]))
+            result[index] = sum(w * self._phi_fea[vertex] for vertex, w in weights.items())
         return result
 
-    def _without_crossing(self, patch: Patch, places: list[int]) -> list[int]:
+    def _without_crossing(self, patch: Patch, path: list[int]) -> list[int]:
         """Shorten a path that both runs along an edge and passes the midpoint of that edge.
 
         Such a path may be the cheapest where the penalty beside other legs varies strongly.
         """
-        at = {place: number for number, place in enumerate(places)}
-        for place in places:
-            if place < len(patch.vertices):
+        at = {node_index: number for number, node_index in enumerate(path)}
+        for node_index in path:
+            if node_index < len(patch.vertices):
                 continue
             low, high = sorted(
                 at.get(int(end), -2 - side)
-                for side, end in enumerate(patch.edges[place - len(patch.vertices)])
+                for side, end in enumerate(patch.edges[node_index - len(patch.vertices)])
             )
             if low >= 0 and high == low + 1:
-                here = at[place]
+                here = at[node_index]
                 first, last = (here, high) if here < low else (low, here)
-                return self._without_crossing(patch, places[: first + 1] + places[last:])
-        return places
+                return self._without_crossing(patch, path[: first + 1] + path[last:])
+        return path
 
 
 def _closeness(

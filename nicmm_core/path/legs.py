@@ -30,7 +30,7 @@ class CrossingError(UnreachableError):
     """
 
     def __init__(self, leg: int) -> None:
-        super().__init__(f"control_points: leg {leg} of the path would cross the others")
+        super().__init__(f"control_points: leg {leg} of the path would cross other legs")
         self.leg = leg
 
 
@@ -81,12 +81,12 @@ class Legs:
         closed = self.count == len(self._waypoints)
         return path if closed else [*path, self._waypoints[-1]]
 
-    def unhindered_lengths(self, straight: float) -> FloatArray:
+    def lengths_alone(self, ratio: float) -> FloatArray:
         """Length of each leg if no other leg had to be avoided, shape (count,).
 
         Parameters
         ----------
-        straight : float
+        ratio : float
             Length of a found leg, relative to the straight-line distance between its ends, up to
             which the found length itself is taken. Longer legs are searched for again, alone.
 
@@ -101,7 +101,7 @@ class Legs:
         for leg in range(self.count):
             start, end = (self._split.position(vertex) for vertex in self.ends(leg))
             lengths[leg] = self._length.get(leg, np.inf)
-            if lengths[leg] > straight * np.linalg.norm(end - start):
+            if lengths[leg] > ratio * np.linalg.norm(end - start):
                 self._open_corners(leg)
                 alone = self._search.shortest(*self.ends(leg), free)
                 if alone is None:
@@ -138,7 +138,7 @@ class Legs:
             found = self._find(leg)
             if found is None:
                 raise CrossingError(leg)
-            self._keep(leg, found)
+            self._record(leg, found)
             if self.length > most_length:
                 return False
         while separating:
@@ -154,7 +154,7 @@ class Legs:
             found = self._find(leg)
             if found is None:
                 raise CrossingError(leg)
-            self._keep(leg, found)
+            self._record(leg, found)
             if self._all_possible([other for other in separating if other != leg]):
                 return leg
             # The leg is discarded, but its splits of the mesh remain.
@@ -182,13 +182,13 @@ class Legs:
         self._open_corners(leg)
         return self._search.shortest(*self.ends(leg), self._obstacles(*self.ends(leg)))
 
-    def _keep(self, leg: int, found: Leg) -> None:
+    def _record(self, leg: int, found: Leg) -> None:
         """Split the mesh along a leg and record it."""
         self._paths[leg] = split_along(self._split, found.nodes)
         self._length[leg] = found.length
         if self._split.n_vertices - self._splits_before > MOST_PATH_SPLITS:
             raise UnreachableError(
-                "control_points: in this order the curve winds round itself too often (its path "
+                "control_points: in this order the curve winds around itself too often (its path "
                 f"needs more than {MOST_PATH_SPLITS} virtual splits)"
             )
 
@@ -209,10 +209,10 @@ class Legs:
         return BlockedElements(
             vertices=np.setdiff1d(vertices, free),
             edges=np.concatenate([*edges, nothing]),
-            ends=self._loose(),
+            ends=self._open_ends(),
         )
 
-    def _loose(self) -> IntArray:
+    def _open_ends(self) -> IntArray:
         """Waypoints at which exactly one of the legs found so far ends."""
         reached = [vertex for leg in self._paths for vertex in self.ends(leg)]
         vertices, count = np.unique(np.array(reached, dtype=np.int64), return_counts=True)
@@ -232,7 +232,9 @@ class Legs:
         """
         for vertex in filter(self._is_on_rim, self.ends(leg)):
             around = self._split.faces_around(vertex)
-            closed = {other for path in self._paths.values() for other in _beside(path, vertex)}
+            closed = {
+                other for path in self._paths.values() for other in _path_neighbours(path, vertex)
+            }
             for face in sorted(around):
                 others = [corner for corner in self._split.corners(face) if corner != vertex]
                 if all(
@@ -257,12 +259,12 @@ def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
     for start, end in zip(path[:-1], path[1:], strict=True):
         if not split.join(start, end):
             raise UnreachableError(
-                "control_points: the paths between them come too close to one another for this "
-                "mesh; use a finer mesh or fewer points"
+                "control_points: the paths between the control points come too close to each other "
+                "for this mesh; use a finer mesh or fewer points"
             )
     return path
 
 
-def _beside(path: list[int], vertex: int) -> list[int]:
+def _path_neighbours(path: list[int], vertex: int) -> list[int]:
     """Neighbours of a vertex on a path if the vertex is an end of the path, otherwise empty."""
     return [path[1]] * (path[0] == vertex) + [path[-2]] * (path[-1] == vertex)

@@ -22,10 +22,10 @@ from .virtual_splits import SplitMesh
 STRAND_CLEARANCE = 0.1
 """Distance within which a leg avoids earlier legs, in square roots of the component's area."""
 
-ROOMY = 25
+FULL_CLEARANCE_POINTS = 25
 """Number of points above which `STRAND_CLEARANCE` is reduced, with the spacing of the points."""
 
-LONG = 1.3
+ACCEPTABLE_LENGTH_RATIO = 1.3
 """Length of a path, relative to the sum of its legs found alone, above which attempts go on."""
 
 MOST_TRIES = 6
@@ -97,7 +97,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
     """
     component = mesh.face_component == mesh.face_component[points.faces[0]]
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
-    clearance *= min(1.0, (ROOMY / len(points)) ** 0.5)
+    clearance *= min(1.0, (FULL_CLEARANCE_POINTS / len(points)) ** 0.5)
     generator = np.random.default_rng(0)
     best: Path | None = None
     failure: UnreachableError | None = None
@@ -120,8 +120,8 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
         if done:
             best = Path(split, legs.vertices, waypoints, legs.length)
         if attempt == 0:
-            unhindered = legs.unhindered_lengths(LONG)
-        if best is not None and best.length <= LONG * unhindered.sum():
+            lengths_alone = legs.lengths_alone(ACCEPTABLE_LENGTH_RATIO)
+        if best is not None and best.length <= ACCEPTABLE_LENGTH_RATIO * lengths_alone.sum():
             break
         crossing = best is None and isinstance(failure, CrossingError)
         splits += split.n_vertices - len(mesh.vertices)
@@ -129,7 +129,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
             break
         scale = SHUFFLE_WHILE_CROSSING if crossing else SHUFFLE
         shuffle = generator.normal(scale=scale, size=legs.count) if attempt > 0 else 0.0
-        sequence = np.argsort(unhindered * np.exp(shuffle), kind="stable")
+        sequence = np.argsort(lengths_alone * np.exp(shuffle), kind="stable")
     if best is not None:
         return best
     assert failure is not None

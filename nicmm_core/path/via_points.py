@@ -54,7 +54,7 @@ class Waypoints:
 
 
 def located_via_points(
-    mesh: Mesh, points: SurfacePoints, via_points: ViaPoints, order: str, closed: bool
+    mesh: Mesh, points: SurfacePoints, via_points: ViaPoints | None, order: str, closed: bool
 ) -> LocatedViaPoints:
     """Check via points and convert them to faces and barycentric coordinates.
 
@@ -63,7 +63,7 @@ def located_via_points(
     mesh : Mesh
     points : SurfacePoints
         Control points.
-    via_points : mapping
+    via_points : mapping, optional
         Mapping from the index of a control point to points, in any form accepted for control
         points.
     order : str
@@ -84,6 +84,8 @@ def located_via_points(
     ControlPointError
         If a via point is out of range or not on the surface.
     """
+    if via_points is None:
+        return {}
     if not isinstance(via_points, Mapping):
         raise ArgumentError(
             f"via_points is a {type(via_points).__name__}; pass a mapping from the index of a "
@@ -98,8 +100,8 @@ def located_via_points(
     for key in via_points:
         if isinstance(key, bool) or not isinstance(key, int | np.integer) or not 0 <= key <= last:
             raise ArgumentError(
-                f"via_points[{key!r}] belongs to no leg; keys are indices of the control points "
-                f"that a leg starts from, 0 … {last}"
+                f"via_points[{key!r}] is not the index of a leg; each key must be the index of a "
+                f"control point at which a leg starts, 0 … {last}"
             )
     return {
         int(key): locate_points(mesh, value, f"via_points[{key}]")
@@ -134,7 +136,7 @@ def with_via_points(
         via = located.get(index, points[:0])
         parts += [points[index : index + 1], via]
         is_control += [True] + [False] * len(via)
-        names += [control, *(PointName(f"via_points[{index}]", place) for place in range(len(via)))]
+        names += [control, *(PointName(f"via_points[{index}]", i) for i in range(len(via)))]
     together = joined(parts)
     check_distinct(mesh, together, names)
     check_one_component(mesh, together, names)
@@ -177,10 +179,12 @@ def parse_via_points(texts: list[str]) -> dict[int, list[int]]:
             index, along = int(key), [int(vertex) for vertex in vertices.split(",")]
         except ValueError as error:
             raise ArgumentError(
-                f"--via is {text!r}; give the number of a control point, from 0, and vertices, "
-                "such as 1:57,80"
+                f"--via is {text!r}; give the index of a control point (from 0) and vertex "
+                "indices, such as 1:57,80"
             ) from error
         if index in via_points:
-            raise ArgumentError(f"--via names leg {index} twice; give all its vertices at once")
+            raise ArgumentError(
+                f"--via names leg {index} twice; give all its vertices in one --via"
+            )
         via_points[index] = along
     return via_points

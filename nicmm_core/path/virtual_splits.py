@@ -132,8 +132,8 @@ class SplitMesh:
         """Positions of several vertices, shape (q, 3)."""
         n_input = len(self._mesh.vertices)
         result = self._mesh.vertices[np.minimum(vertices, n_input - 1)]
-        for place in np.flatnonzero(vertices >= n_input).tolist():
-            result[place] = self._new_positions[vertices[place] - n_input]
+        for index in np.flatnonzero(vertices >= n_input).tolist():
+            result[index] = self._new_positions[vertices[index] - n_input]
         return result
 
     @property

@@ -90,22 +90,22 @@ def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: 
     tour = chains[0]
     for chain in chains[1:]:
         checkpoint()
-        tour = _with_chain(distance, tour, chain)
+        tour = _insert_chain(distance, tour, chain)
     if not closed:
         legs = distance[tour, np.roll(tour, -1)]
         tour = np.roll(tour, -int(legs.argmax()) - 1)
     return tour
 
 
-def _with_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArray:
+def _insert_chain(distance: FloatArray, tour: IntArray, chain: IntArray) -> IntArray:
     """Insert a cyclic chain of points into a closed tour, as a whole and where it costs least."""
     last = np.roll(chain, 1)  # the last point of the chain if it starts at chain[i] is last[i]
     following = np.roll(tour, -1)
     cost = distance[np.ix_(tour, chain)] + distance[np.ix_(following, last)]
     cost -= distance[tour, following][:, None]
     cost -= distance[last, chain]
-    place, start = np.unravel_index(cost.argmin(), cost.shape)
-    return np.concatenate([tour[: place + 1], np.roll(chain, -int(start)), tour[place + 1 :]])
+    index, start = np.unravel_index(cost.argmin(), cost.shape)
+    return np.concatenate([tour[: index + 1], np.roll(chain, -int(start)), tour[index + 1 :]])
 
 
 def _shortest(distance: FloatArray) -> IntArray:
@@ -179,6 +179,6 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
             section, others = onward[:count], onward[count:]
             if turned[i, j] < straight[i, j]:
                 section = section[::-1]
-            place = int(offset[i, j]) - count + 1
-            moved = np.concatenate([others[:place], section, others[place:]])
+            index = int(offset[i, j]) - count + 1
+            moved = np.concatenate([others[:index], section, others[index:]])
     return best, moved

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
-from ..geometry.distances import build_distance_surface, distance_to_segments, spread
+from ..geometry.distances import build_distance_surface, distance_to_segments, propagate
 from ..geometry.mesh import Mesh, unique_edges
 from ..geometry.sides import two_sides
 
@@ -31,7 +31,7 @@ def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
         start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
         to_segment = distance_to_segments(mesh.vertices[vertex], start, end)
         np.minimum.at(distance, vertex, to_segment)
-    spread(surface, distance, np.inf)
+    propagate(surface, distance, np.inf)
     reached = np.isfinite(distance)
     side = _side(mesh, curve) if curve.closed else None
     field = distance if side is None else side * distance

@@ -309,7 +309,7 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
     return _solved_with_pairs(bands, system.pairs, entries, right)
 
 
-def predicted_fall(system: ElasticSystem, move: FloatArray) -> float:
+def predicted_decrease(system: ElasticSystem, move: FloatArray) -> float:
     """Decrease of the linearised energy by given moves along the conormals, (n,)."""
     return -float(move @ (2.0 * system.slope + _product(system, move)))
 

@@ -19,7 +19,7 @@ from .elastic_energy import (
     damped_step,
     elastic_energy,
     elastic_system,
-    predicted_fall,
+    predicted_decrease,
 )
 from .noded_curve import moved_along_conormals
 from .strand_contact import Contacts, NearStrands
@@ -36,7 +36,7 @@ WORTHWHILE = 0.05
 FACES_OF_A_MOVE = 16.0
 """Number of faces that take as much time to cross as the rest of a move."""
 
-TWICE = 4.0 / 3.0
+DOUBLE_STEP_DECREASE = 4.0 / 3.0
 """Decrease of the energy above which a double step is tried.
 
 It is relative to half the derivative of the energy along the step.
@@ -126,12 +126,12 @@ class Linearised:
     energy: float
     system: ElasticSystem
 
-    def may_fall(self, free: BoolArray, config: StepConfig) -> float:
+    def predicted_decrease(self, free: BoolArray, config: StepConfig) -> float:
         """Predicted decrease of the energy by the least damped step of the free nodes, (n,)."""
         if not free.any():
             return 0.0
         damping = config.least_damping(len(free))
-        return predicted_fall(self.system, damped_step(self.system, free, damping))
+        return predicted_decrease(self.system, damped_step(self.system, free, damping))
 
 
 @dataclass(frozen=True)
@@ -204,13 +204,13 @@ def _first_step(
         # The Gauss–Newton matrix is too stiff where the curve bends strongly. If the energy falls
         # by more than this, the parabola through both energies, with the slope of the energy at the
         # start, is lower at twice the step.
-        fallen = start.energy - reached
-        if fallen > 0.0 and fallen > -TWICE * float(start.system.slope @ move):
+        decrease = start.energy - reached
+        if decrease > 0.0 and decrease > -DOUBLE_STEP_DECREASE * float(start.system.slope @ move):
             farther, also_stayed = _moved(stepping, nodes, 2.0 * move)
             reached_there = stepping.energy(farther)
             if reached_there < reached:
                 return Moved(farther, reached_there, also_stayed, damping, 2.0 * farthest)
-        if fallen > 0.0:
+        if decrease > 0.0:
             return Moved(moved, reached, stayed, damping, farthest)
         damping *= DAMPING_FACTOR
     return None
@@ -229,7 +229,7 @@ def _further_step(
     contacts = stepping.contacts(nodes)
     system = elastic_system(stepping.surface, nodes, stepping.weights, contacts)
     move = damped_step(system, free, damping)
-    if not np.isfinite(move).all() or predicted_fall(system, move) <= least:
+    if not np.isfinite(move).all() or predicted_decrease(system, move) <= least:
         return None
     move, farthest = _trusted(nodes, move, stepping.config)
     for share in (1.0, 0.5):

@@ -24,7 +24,7 @@ from .curve_nodes import CurveSurface, Nodes, nodes_at
 DETOUR = 3.0
 """Greatest length of a trace between two nodes, relative to their distance; longer ones fail."""
 
-AROUND = 6.0
+LONGEST_BYPASS = 6.0
 """Greatest length of a path along edges in place of a failed trace.
 
 It is relative to the greatest distance between two nodes without a trace.
@@ -244,7 +244,7 @@ def _along_edges(
             surface.edge_graph,
             directed=False,
             indices=start,
-            limit=AROUND * float(nodes.step_lengths[node].max()),
+            limit=LONGEST_BYPASS * float(nodes.step_lengths[node].max()),
             return_predecessors=True,
         )
         for number in np.flatnonzero(np.isfinite(length[np.arange(len(node)), end])).tolist():

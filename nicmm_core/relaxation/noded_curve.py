@@ -125,7 +125,7 @@ def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
 
-def rounded(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
+def smoothed(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
     """Move fine nodes onto a smooth curve through the coarse nodes of the same polyline.
 
     Between coarse nodes the polyline is straight. So with four times as many nodes it bends only at

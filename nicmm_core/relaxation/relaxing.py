@@ -45,7 +45,7 @@ from .noded_curve import (
     noded_curve,
     respaced,
     retraced,
-    rounded,
+    smoothed,
     traced_through,
     without_short_segments,
 )
@@ -108,7 +108,7 @@ RELEASES = 2
 HELD_TRIES = 1
 """Number of times that an iteration is repeated, holding the nodes that could not be retraced."""
 
-SURELY = 0.1
+NEGLIGIBLE_PREDICTION = 0.1
 """Predicted decrease, relative to the least decrease, below which no step is tried.
 
 It is far below 1, because damping makes predictions too small.
@@ -120,7 +120,7 @@ MOST_STALLED = 4
 On folds and needles, respacing the nodes may raise the energy by more than the steps lower it.
 """
 
-STRAIGHT = 2e-3
+LEAST_BENDING = 2e-3
 """Lower bound, as a share of the energy, on the bending energy used in the convergence test."""
 
 SMALL_MOVE = 0.1
@@ -194,14 +194,16 @@ def relax(
     else:
         first = noded_curve(surface, start, config.levels[0])
     iterations, collided = 0, False
-    for simple in (False, True) if config.defer_tracing else (True,):
-        attempt = _Attempt(surface, smoothness, config, watch, simple, first, iterations)
+    for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
+        attempt = _Attempt(
+            surface, smoothness, config, watch, traces_every_iteration, first, iterations
+        )
         curve = attempt.run()
         iterations = attempt.iterations
         good = curve is not None and is_simple(surface, curve)
         if good or attempt.status is Status.CANCELLED:
             break
-        collided = not simple
+        collided = not traces_every_iteration
     status = attempt.status
     if curve is not None and good:
         result = without_short_segments(surface.mesh, curve)
@@ -237,9 +239,9 @@ class _State:
         return free
 
     @property
-    def may_fall(self) -> float:
+    def predicted_decrease(self) -> float:
         """Predicted decrease of the energy by the least damped step."""
-        return self.here.may_fall(self.free, self.stepping.config)
+        return self.here.predicted_decrease(self.free, self.stepping.config)
 
 
 @dataclass(frozen=True)
@@ -254,7 +256,7 @@ class _Iteration:
     farthest: float  # greatest length of a move, in mean distances between nodes
 
 
-class _LostError(Exception):
+class _TraceError(Exception):
     """The curve cannot be traced through its nodes."""
 
 
@@ -267,12 +269,12 @@ class _Attempt:
         smoothness: float,
         config: RelaxationConfig,
         watch: Watch | None,
-        simple: bool,
+        traces_every_iteration: bool,
         start: NodedCurve,
         iterations: int,
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
-        self.simple = simple  # whether the curve is traced after every iteration
+        self.traces_every_iteration = traces_every_iteration
         self.iterations = iterations  # including those of earlier attempts
         self.last_iteration = min(iterations + config.iterations, config.most_iterations)
         self.work = Work(config.work)
@@ -292,7 +294,7 @@ class _Attempt:
                 curve = self._level(curve, level, least, tension_factor)
                 if self.status is not Status.CONVERGED:
                     break
-        except _LostError:
+        except _TraceError:
             return None
         except CancelledError:
             self.status = Status.CANCELLED
@@ -313,9 +315,9 @@ class _Attempt:
         while True:
             state = self._state(curve, nodes, held, tension_factor)
             before = state.here.energy
-            scale = max(bending_energy(nodes), STRAIGHT * before)
+            scale = max(bending_energy(nodes), LEAST_BENDING * before)
             done = None
-            if state.may_fall > SURELY * least * scale:
+            if state.predicted_decrease > NEGLIGIBLE_PREDICTION * least * scale:
                 if self.iterations == self.last_iteration or self.work.exhausted():
                     self.status = Status.ITERATION_LIMIT
                     break
@@ -331,7 +333,7 @@ class _Attempt:
                 if self.watch is not None and not self.watch(share, nodes.positions):
                     self.status = Status.CANCELLED
                     break
-                scale = max(bending_energy(nodes), STRAIGHT * before)
+                scale = max(bending_energy(nodes), LEAST_BENDING * before)
                 stalled = 0 if done.energy < least_energy else stalled + 1
                 least_energy = min(least_energy, done.energy)
                 if stalled == MOST_STALLED:
@@ -354,8 +356,10 @@ class _Attempt:
     def _state(
         self, curve: NodedCurve, nodes: Nodes, held: BoolArray, tension_factor: float
     ) -> _State:
-        weights = balance(self.surface, nodes, self.smoothness, self.simple, tension_factor)
-        strands = NearStrands(nodes) if self.simple else None
+        weights = balance(
+            self.surface, nodes, self.smoothness, self.traces_every_iteration, tension_factor
+        )
+        strands = NearStrands(nodes) if self.traces_every_iteration else None
         stepping = Stepping(self.surface, weights, self.config.stepping, self.work, strands)
         return _State(curve, linearised(stepping, nodes), held, stepping)
 
@@ -368,7 +372,7 @@ class _Attempt:
             if moved is None:
                 return None
             curve, nodes, energy, stayed = state.curve, moved.nodes, moved.energy, moved.stayed
-            if self.simple:
+            if self.traces_every_iteration:
                 curve, kept = retraced(self.surface, state.curve, nodes)
                 if kept.any() and tries < HELD_TRIES:
                     free &= ~kept
@@ -386,7 +390,7 @@ class _Attempt:
         """The curve traced through its nodes if they have moved since the last trace."""
         changed = curve if nodes is curve.nodes else traced_through(self.surface, curve, nodes)
         if changed is None:
-            raise _LostError
+            raise _TraceError
         return changed
 
     def _respaced(self, curve: NodedCurve, level: int) -> NodedCurve:
@@ -395,14 +399,14 @@ class _Attempt:
         if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.spacing_ratio:
             return curve
         changed = respaced(self.surface, curve, level)
-        if self.simple and not is_simple(self.surface, changed):
+        if self.traces_every_iteration and not is_simple(self.surface, changed):
             return curve
-        return changed if alike else self._rounded(curve, changed)
+        return changed if alike else self._smoothed(curve, changed)
 
-    def _rounded(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
+    def _smoothed(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
         """Move fine nodes onto a smooth curve through the coarse ones, if that bends less."""
         if len(fine.nodes.positions) < len(coarse.nodes.positions):
             return fine
-        changed = rounded(self.surface, coarse, fine)
+        changed = smoothed(self.surface, coarse, fine)
         less = bending_energy(changed.nodes) < bending_energy(fine.nodes)
         return changed if less else fine

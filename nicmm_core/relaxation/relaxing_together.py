@@ -113,8 +113,8 @@ def relax_together(
         damping = np.where(
             lower, np.maximum(damping / DAMPING_FACTOR, least), damping * DAMPING_FACTOR
         )
-        fall = np.where(lower, before - after, 0.0)
-        still = (fall <= config.least_decrease * before) & (
+        decrease = np.where(lower, before - after, 0.0)
+        still = (decrease <= config.least_decrease * before) & (
             share * farthest <= 0.5 * config.longest_move
         )
         quiet = np.where(still, quiet + 1, 0)

@@ -15,7 +15,7 @@ from .curve_nodes import Nodes
 CLEARANCE = 2.0
 """Distance between strands, in mean distances between nodes, below which they repel."""
 
-ALONG = 4.0
+DIFFERENT_STRANDS = 4.0
 """Distance along the curve, in clearances, above which two nodes belong to different strands."""
 
 SAME_SIDE = 0.3
@@ -72,7 +72,7 @@ def close_pairs(nodes: Nodes, reach: float = 1.0) -> IntArray:
     along = np.abs(arc[pairs[:, 0]] - arc[pairs[:, 1]])
     if nodes.closed:
         along = np.minimum(along, nodes.spread(total)[pairs[:, 0]] - along)
-    return pairs[along > ALONG * clearance[pairs[:, 0]]]
+    return pairs[along > DIFFERENT_STRANDS * clearance[pairs[:, 0]]]
 
 
 class NearStrands:
@@ -86,16 +86,16 @@ class NearStrands:
     """
 
     def __init__(self, nodes: Nodes) -> None:
-        self._seek(nodes)
+        self._update(nodes)
 
     def contacts(self, nodes: Nodes) -> Contacts:
         """Contacts between the same nodes at new positions."""
         moved = float(lengths(nodes.positions.T - self._positions.T).max())
         if 2.0 * moved + _clearances(nodes)[0] > self._reach:
-            self._seek(nodes)
+            self._update(nodes)
         return contacts_of_pairs(nodes, self._pairs)
 
-    def _seek(self, nodes: Nodes) -> None:
+    def _update(self, nodes: Nodes) -> None:
         """Find the pairs that may come into contact by short moves of these nodes."""
         self._positions, self._reach = nodes.positions, NEARBY * _clearances(nodes)[0]
         self._pairs = close_pairs(nodes, NEARBY)

@@ -30,11 +30,11 @@ Since tracing is deferred, an iteration consists of only one step.
 LONGEST_MOVE = 0.1
 """Greatest distance that a control point may have moved, relative to the curve's length."""
 
-TAKEN_ALONG = 4.0
+FOLLOW_RADIUS = 4.0
 """Arc length within which nodes move along with a control point, relative to its move."""
 
 
-def moved_along(
+def with_moved_controls(
     surface: CurveSurface, curve: NodedCurve, controls: SurfacePoints
 ) -> NodedCurve | None:
     """Move the control points of a curve to new places nearby, and nearby nodes with them.
@@ -81,7 +81,7 @@ def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray
     arc = np.concatenate([[0.0], np.cumsum(nodes.lengths)])[: len(nodes.positions)]
     shift = np.zeros((len(arc), 3))
     for here, vector in zip(arc[at_controls], move, strict=True):
-        reach = TAKEN_ALONG * np.linalg.norm(vector)
+        reach = FOLLOW_RADIUS * np.linalg.norm(vector)
         if reach > 0.0:
             away = np.abs(arc - here)
             if nodes.closed:

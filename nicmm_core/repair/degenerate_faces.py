@@ -43,7 +43,7 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> Boo
         shortest = np.sqrt(np.minimum.reduce(squared))
         longest = np.sqrt(np.maximum.reduce(squared))
         twice_area = 2.0 * triangle_areas(vertices, faces[block])
-        without = twice_area <= tolerances.WITHOUT_AREA * shortest * longest
+        without = twice_area <= tolerances.DEGENERATE_SINE * shortest * longest
         flat[block] = without | (shortest <= short)
     return flat
 
@@ -53,7 +53,7 @@ def _squared_lengths(vectors: FloatArray) -> FloatArray:
     return x * x + y * y + z * z
 
 
-def with_areas(
+def perturbed(
     vertices: FloatArray,
     faces: IntArray,
     short: float,
@@ -85,7 +85,7 @@ def with_areas(
     """
     start, still = vertices, flat
     checkpoint()
-    reach = tolerances.MOVED * _shortest_edges(vertices, faces, short)
+    reach = tolerances.PERTURBATION * _shortest_edges(vertices, faces, short)
     generator = np.random.default_rng(SEED)
     for _ in range(ATTEMPTS):
         moves = np.zeros(len(vertices), dtype=bool) if moving is None else moving.copy()

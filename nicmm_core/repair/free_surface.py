@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import PointName, UnreachableError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.distances import build_distance_surface, spread
+from ..geometry.distances import build_distance_surface, propagate
 from ..geometry.surface_points import SurfacePoints
 from .mapped_mesh import MappedMesh
 from .nonmanifold import welded_vertices
@@ -69,8 +69,8 @@ def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArr
     assert here is not None  # since weights are given
     distance = np.where(here >= HARD, 0.0, np.inf)
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
-    spread(surface, distance, farthest)
-    return mapped.field(distance)
+    propagate(surface, distance, farthest)
+    return mapped.field_to_original(distance)
 
 
 def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
@@ -85,7 +85,7 @@ def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
     """
     component: dict[PointName, set[int]] = {}
     for argument, points in named.items():
-        for index, point in enumerate(free.holding(points)):
+        for index, point in enumerate(free.representations(points)):
             name = PointName(argument, index)
             if not len(point):
                 raise UnreachableError(

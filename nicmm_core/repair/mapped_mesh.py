@@ -21,7 +21,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..progress import checkpoint
 from .strand_separation import separated
 
-Holding = list[SurfacePoints]
+Representations = list[SurfacePoints]
 """For each of several points, its representations in all faces of the mesh that contain it."""
 
 
@@ -61,7 +61,7 @@ class MappedMesh:
         """Whether the mesh is not the original itself."""
         return self.mesh is not self.original
 
-    def holding(self, points: SurfacePoints) -> Holding:
+    def representations(self, points: SurfacePoints) -> Representations:
         """Map points of the original to all faces of the mesh that contain them.
 
         Of the representations of a point, those in parts of its given face come first.
@@ -90,17 +90,19 @@ class MappedMesh:
             local /= local.sum(axis=1, keepdims=True)
         return SurfacePoints(part, local)
 
-    def common_component(self, holding: Holding) -> int | None:
+    def common_component(self, representations: Representations) -> int | None:
         """The component of largest area that contains all points, or None if there is none."""
         component = self.mesh.face_component
-        common = set.intersection(*(set(component[point.faces].tolist()) for point in holding))
+        common = set.intersection(
+            *(set(component[point.faces].tolist()) for point in representations)
+        )
         areas = np.bincount(component, weights=self.mesh.face_areas)
         return max(common, key=lambda label: float(areas[label]), default=None)
 
-    def points(self, holding: Holding, component: int) -> SurfacePoints:
+    def points(self, representations: Representations, component: int) -> SurfacePoints:
         """Choose the first representation of each point in one component."""
         there = self.mesh.face_component == component
-        return joined([point[np.flatnonzero(there[point.faces])[:1]] for point in holding])
+        return joined([point[np.flatnonzero(there[point.faces])[:1]] for point in representations])
 
     def weights(self, weights: FloatArray | None) -> FloatArray | None:
         """Map weights at vertices of the original, (V,), to the mesh.
@@ -119,7 +121,7 @@ class MappedMesh:
         np.maximum.at(result, self.mesh.faces, at_corners)
         return result
 
-    def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
+    def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a simple curve on the mesh to a simple curve on the original.
 
         Strands that pass different copies of a vertex, or of a point on an edge, are separated
@@ -141,7 +143,7 @@ class MappedMesh:
             self.original, curve.closed, self.face[polyline.faces], barycentric, index
         )
 
-    def carried(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+    def curve_from_original(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve on the original to the mesh; None if the mesh lacks a part of the curve."""
         if not self.differs:
             return curve
@@ -160,17 +162,17 @@ class MappedMesh:
         n = len(curve.faces)
         faces, barycentric = np.full(n, -1), np.zeros((n, 3))
         points = SurfacePoints(curve.faces, curve.barycentric)
-        holding = self.holding(points)
-        for place, here in enumerate(holding):
+        representations = self.representations(points)
+        for place, here in enumerate(representations):
             # The last point of an open curve lies on the segment before it.
             beside = place + 1 if place + 1 < n else (0 if curve.closed else place - 1)
-            both = np.isin(here.faces, holding[beside].faces)
+            both = np.isin(here.faces, representations[beside].faces)
             if both.any():
                 faces[place] = here.faces[both][0]
                 barycentric[place] = here.barycentric[both][0]
         return faces, barycentric
 
-    def field(self, values: FloatArray) -> FloatArray:
+    def field_to_original(self, values: FloatArray) -> FloatArray:
         """Map level-set values at the vertices of the mesh, (v,), to the original.
 
         Of several copies of a vertex, the one nearest to the curve counts. Vertices that the mesh

@@ -25,7 +25,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.grouping import distinct_rows, grouped
 from ..geometry.mesh import Mesh, corners_differ, joined_corners
 from ..progress import checkpoint
-from .degenerate_faces import degenerate_faces, with_areas
+from .degenerate_faces import degenerate_faces, perturbed
 from .edge_subdivision import SubdividedFaces, subdivided
 from .mapped_mesh import MappedMesh
 
@@ -345,7 +345,7 @@ def _with_areas(
         faces, face = faces[whole], face[whole]
         corners = None if corners is None else corners[whole]
     checkpoint()
-    short = tolerances.AT_ONE_PLACE * mesh.diagonal
+    short = tolerances.SAME_POSITION * mesh.diagonal
     flat = degenerate_faces(vertices, faces, short)
     if not flat.any() and np.array_equal(faces, mesh.faces):
         return MappedMesh(mesh, mesh, face, None, place, original_place)
@@ -359,5 +359,5 @@ def _with_areas(
     if flat.any() or doubled.any():
         # Far from the origin, rounding would remove small moves.
         origin = vertices[faces[0, 0]]
-        vertices = with_areas(vertices - origin, faces, short, flat, doubled)
+        vertices = perturbed(vertices - origin, faces, short, flat, doubled)
     return MappedMesh(mesh, Mesh(vertices, faces), face, corners, place, original_place, origin)

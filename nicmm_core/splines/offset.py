@@ -13,7 +13,9 @@ VANISHING = 1e-6
 """Length of an interpolated normal up to which the normals at the corners count as cancelling."""
 
 
-def lifted(mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float) -> FloatArray:
+def offset_points(
+    mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float
+) -> FloatArray:
     """Positions of points of a mesh, moved along its normals.
 
     The angle-weighted vertex normals are interpolated in the face and scaled to unit length. Where

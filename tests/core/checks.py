@@ -1,6 +1,6 @@
-"""What every curve must fulfil, as assertions, and helpers that several tests share.
+"""Assertions that every curve must satisfy, and helpers that several tests share.
 
-`tests.oracles.checker` is the one definition of what is right.
+The assertions rely on `tests.oracles.checker`, the only definition of a valid curve.
 """
 
 import igl
@@ -14,12 +14,12 @@ from tests.oracles.checker import judge_curve
 
 
 def assert_valid_curve(mesh, curve, control_positions=None, closed=True):
-    """A curve on the surface, simple, through the control points in order."""
+    """Assert that a curve lies on the surface, is simple and visits the control points in order."""
     assert not judge_curve(mesh, curve, control_positions, closed).faults
 
 
 def assert_valid_design(mesh, design, control_positions=None, closed=True):
-    """A usable result: one valid curve, a finite field and every term of the energy."""
+    """Assert that a design has one valid curve, a finite field and all terms of the energy."""
     assert design.status in (nicmm.Status.CONVERGED, nicmm.Status.ITERATION_LIMIT), design.status
     assert len(design.curves) == 1
     assert_valid_curve(mesh, design.curves[0], control_positions, closed)
@@ -32,26 +32,26 @@ def assert_valid_design(mesh, design, control_positions=None, closed=True):
 
 
 def assert_lies_on_surface(mesh, curve):
-    """Points are what their barycentrics say, and neighbours share a face."""
+    """Assert that points agree with their barycentrics and consecutive ones share a face."""
     assert not judge_curve(mesh, curve).off_surface
 
 
 def assert_does_not_touch_itself(mesh, curve):
-    """No point twice and no two strands that cross or touch."""
+    """Assert that no point is repeated and no two strands cross or touch."""
     verdict = judge_curve(mesh, curve)
     assert verdict.readable
     assert not verdict.not_simple
 
 
 def assert_visits(mesh, curve, control_positions):
-    """Control points are polyline points, met in the order of the positions given."""
+    """Assert that the polyline contains the control points, in the order of their positions."""
     verdict = judge_curve(mesh, curve, control_positions, curve.closed)
     assert verdict.readable
     assert not verdict.not_through_points
 
 
 def random_surface_points(mesh, count, seed):
-    """Points strictly inside random faces, no two in one face."""
+    """Points strictly inside random faces, at most one per face."""
     generator = np.random.default_rng(seed)
     faces = generator.choice(len(mesh.faces), size=count, replace=False)
     barycentric = generator.dirichlet([2.0, 2.0, 2.0], size=count)
@@ -59,7 +59,7 @@ def random_surface_points(mesh, count, seed):
 
 
 def euler_characteristic(faces):
-    """V - E + F of the vertices that faces use."""
+    """Euler characteristic V - E + F; only vertices of faces count."""
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return len(np.unique(faces)) - len(np.unique(sides, axis=0)) + len(faces)
 
@@ -71,7 +71,7 @@ def circle(angles, radius=1.0):
 
 
 def apart(first, second):
-    """Farthest that either closed polyline (n, 3) strays from the other."""
+    """Symmetric Hausdorff distance of two closed polylines (n, 3)."""
     return max(_farthest(first, second), _farthest(second, first))
 
 
@@ -84,13 +84,13 @@ def _farthest(points, polyline):
 
 
 def mean_edge_length(mesh):
-    """Mean length of the sides of all faces."""
+    """Mean length over the sides of all faces."""
     corners = mesh.vertices[mesh.faces]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
 
 def joined(*meshes):
-    """Several meshes as one with several components."""
+    """Several meshes as one mesh with several components."""
     offsets = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     return nicmm.Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -99,12 +99,12 @@ def joined(*meshes):
 
 
 def chosen(points, index):
-    """Some of the points."""
+    """Points at some indices."""
     return nicmm.SurfacePoints(points.faces[index], points.barycentric[index])
 
 
 def points_near(mesh, positions):
-    """The nearest points of a mesh, strictly inside faces."""
+    """Nearest points of a mesh, moved strictly inside faces."""
     positions = np.asarray(positions, dtype=float)
     _, faces, nearest = igl.point_mesh_squared_distance(positions, mesh.vertices, mesh.faces)
     corners = np.ascontiguousarray(mesh.vertices[mesh.faces[faces]].transpose(1, 0, 2))
@@ -113,14 +113,14 @@ def points_near(mesh, positions):
 
 
 def distances(mesh, start, end):
-    """Distances in space between pairs of points."""
+    """Distance in space between the points of each pair."""
     return np.linalg.norm(end.positions(mesh) - start.positions(mesh), axis=1)
 
 
 def curve_through(mesh, positions, controls, closed=True):
-    """A curve along the positions, straight from each to the next, for places near one another.
+    """Curve traced straight from each position to the next; consecutive ones must be close.
 
-    The controls are those of its points that stand for these positions.
+    ``controls`` are the indices of the positions that are control points.
     """
     points = points_near(mesh, positions)
     here = np.arange(len(points) if closed else len(points) - 1)
@@ -140,13 +140,13 @@ def curve_through(mesh, positions, controls, closed=True):
 
 
 def flipped(mesh, seed):
-    """The same surface with about half of its faces turned over."""
+    """The same surface with about half of its faces reversed."""
     turned = np.random.default_rng(seed).random(len(mesh.faces)) < 0.5
     return nicmm.Mesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
 def renumbered(mesh, seed):
-    """The same surface with other numbers of vertices and faces and other first corners."""
+    """The same surface with vertices and faces renumbered and the corners of faces rotated."""
     generator = np.random.default_rng(seed)
     vertex = generator.permutation(len(mesh.vertices))
     number = np.argsort(vertex)
@@ -156,12 +156,12 @@ def renumbered(mesh, seed):
 
 
 def scaled(mesh, factor):
-    """The same shape in another size."""
+    """The same mesh, scaled."""
     return nicmm.Mesh(factor * mesh.vertices, mesh.faces)
 
 
 def grid(count):
-    """The unit square in squares with sides of a power of a half, cut along their diagonals."""
+    """Unit square of ``count`` by ``count`` squares, each divided along its diagonal."""
     x, y = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")
     index = np.arange(x.size).reshape(x.shape)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
@@ -170,7 +170,7 @@ def grid(count):
 
 
 def simple_curves(surface, nodes):
-    """Which curves do not cross themselves, (c,), where traces succeed."""
+    """Whether each curve does not cross itself, (c,), wherever its traces succeed."""
     simple = np.ones(nodes.curves, dtype=bool)
     simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
     return simple

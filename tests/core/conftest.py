@@ -1,4 +1,4 @@
-"""Small generated surfaces that the tests of the core share."""
+"""Fixtures with small generated surfaces, shared by the tests of the core."""
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -9,7 +9,7 @@ from nicmm_core.courses import course_surface
 
 pytest.register_assert_rewrite("tests.core.checks")
 
-# The same examples in every run and nothing written to the folder; times vary with the machine.
+# The same examples in every run, no files, and no deadline, since times depend on the machine.
 settings.register_profile(
     "core",
     derandomize=True,
@@ -22,13 +22,13 @@ settings.load_profile("core")
 
 @pytest.fixture(scope="session")
 def ball():
-    """Unit sphere of 642 vertices."""
+    """Unit sphere with 642 vertices."""
     return shapes.sphere(3)
 
 
 @pytest.fixture(scope="session")
 def small_ball():
-    """Unit sphere of 162 vertices."""
+    """Unit sphere with 162 vertices."""
     return shapes.sphere(2)
 
 
@@ -46,17 +46,17 @@ def ring():
 
 @pytest.fixture(scope="session")
 def body():
-    """A body with limbs: irregular, thin in places, without any symmetry."""
+    """An irregular body with thin limbs and without symmetry."""
     return shapes.creature(1, faces=200, subdivisions=1)
 
 
 @pytest.fixture(scope="session", params=["ball", "flat_disc", "ring", "body"])
 def surface(request) -> nicmm.Mesh:
-    """Each of the surfaces above in turn."""
+    """Each of the surfaces above, in turn."""
     return request.getfixturevalue(request.param)
 
 
 @pytest.fixture
 def without_courses(monkeypatch):
-    """Curves start from the network's level set, as where no course is found."""
+    """Make curves start from the network's level set, as if no course were found."""
     monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))

@@ -1,4 +1,4 @@
-"""Work is bounded by counts, so that the same request always ends the same way."""
+"""Tests that work is bounded by counts, so that equal requests always give equal results."""
 
 import sys
 
@@ -17,7 +17,7 @@ WORK = relaxing.RelaxationConfig().work
 
 
 def fan(count):
-    """A cone whose faces are needles that meet in one vertex, in a ring of plain faces."""
+    """A cone of needles that meet at its tip, surrounded by a ring of well-shaped faces."""
     angle = 2 * np.pi * np.arange(count) / count
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     vertices = np.concatenate([[[0, 0, 0.3]], ring, 1.5 * ring])
@@ -36,11 +36,11 @@ def fan(count):
 
 
 MOST_CALLS = 60_000
-"""Calls in Python and C of one design on a mesh of 4,002 vertices."""
+"""Greatest number of calls in Python and C by one design on a mesh with 4,002 vertices."""
 
 
 def calls_of(task):
-    """Number of calls of functions in Python and C that a task makes."""
+    """Number of functions in Python and C that a task calls."""
     count = 0
 
     def seen(frame, event, argument):
@@ -56,9 +56,11 @@ def calls_of(task):
 
 
 def test_a_design_makes_few_calls():
-    """On a small mesh calls are the cost, and hardly anything is done one by one."""
+    """On a small mesh the cost is the number of calls, so loops over single elements are rare."""
     body = shapes.creature(0, faces=500, subdivisions=2)
-    nicmm.design_curve(body, [12, 800, 1641, 2500], order="shortest")  # what is loaded once
+    nicmm.design_curve(
+        body, [12, 800, 1641, 2500], order="shortest"
+    )  # loads what is loaded only once
     designer = nicmm.Designer(nicmm.Mesh(body.vertices, body.faces))
     for points in ([12, 800, 1641, 2500], [40, 1000, 1900, 3000]):
         calls = calls_of(lambda points=points: designer.design(points, order="shortest"))
@@ -66,7 +68,7 @@ def test_a_design_makes_few_calls():
 
 
 def test_a_fan_of_thousands_of_needles(monkeypatch):
-    """A node that moves beside its tip passes them all."""
+    """A node that moves past the tip traverses all needles."""
     passed = []
     trace_from = noded_curve.trace_from
 
@@ -82,12 +84,12 @@ def test_a_fan_of_thousands_of_needles(monkeypatch):
     points = nicmm.SurfacePoints(faces, np.tile([0.8, 0.1, 0.1], (4, 1)))
     design = nicmm.design_curve(mesh, points)
     assert not judge(mesh, design, points).faults
-    # One move may begin before the limit, which half of the faces, and a little more, may follow.
+    # The last move may start just below the limit and traverse slightly more than half the faces.
     assert sum(passed) <= levenberg_marquardt.FACES_OF_A_MOVE * WORK + 2 * count
 
 
 def test_forty_points_back_and_forth(monkeypatch):
-    """Each leg winds round those before it."""
+    """Each leg of the path has to wind round the previous ones."""
     splits = []
     add = virtual_splits.SplitMesh._add_vertex
     monkeypatch.setattr(
@@ -98,8 +100,8 @@ def test_forty_points_back_and_forth(monkeypatch):
     try:
         design = nicmm.design_curve(mesh, chosen)
     except nicmm.UnreachableError as error:
-        assert "winds round itself too often" in str(error)
-        # Three other orders may have been tried for the message.
+        assert "winds around itself too often" in str(error)
+        # The message may have tried three other orders.
         orders = 4
     else:
         assert not judge(mesh, design, chosen).faults
@@ -109,19 +111,19 @@ def test_forty_points_back_and_forth(monkeypatch):
 
 
 def test_long_relaxations_are_not_repeated(monkeypatch):
-    """Where the first course took long, courses are not sought again, however much it bends."""
+    """If the first course was expensive, courses are not searched again, however much it bends."""
     searched = []
     seek = surface_designer.SurfaceDesigner._course_starts
 
-    def counted(self, request, draw=0):
-        searched.append(draw)  # on first use
-        yield from seek(self, request, draw)
+    def counted(self, request, seed=0):
+        searched.append(seed)  # runs when the generator is first advanced
+        yield from seek(self, request, seed)
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
     monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert sorted(set(searched)) == [0, *range(1, 1 + surface_designer.DRAWS)]
+    assert sorted(set(searched)) == [0, *range(1, 1 + surface_designer.RANDOM_SEARCHES)]
     searched.clear()
     monkeypatch.setattr(surface_designer, "MOST_TRACED", 0)
     nicmm.design_curve(body, chosen)

@@ -1,4 +1,4 @@
-"""The checker itself: a checker that accepts anything would make every other test pass."""
+"""Tests of the checker, since a checker that accepts everything would let all tests pass."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.curve import curve_on_mesh
 from tests.core.checks import assert_valid_curve
 
-# Two triangles that share the edge 0-2.
+# Two triangles that share the edge (0, 2).
 SQUARE = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 CONTROLS = np.array([[0.5, 0.25, 0], [0.5, 0.5, 0], [0.25, 0.5, 0]])
 
 
 def square_curve(positions, faces, controls=()):
-    """A curve on the square from positions and the face that each is given in."""
+    """A curve on the square, from positions and the face in which each is given."""
     positions = np.asarray(positions, dtype=float)
     barycentric = []
     for (x, y), face in zip(positions, faces, strict=True):

@@ -1,4 +1,4 @@
-"""The command line: what it reads, writes, prints and returns."""
+"""Tests of the command line: what it reads, writes, prints and returns."""
 
 import json
 import os
@@ -130,7 +130,7 @@ def test_bad_commands_end_with_2_and_say_why(mesh_file, tmp_path, capsys, argume
     arguments = [str(mesh_file) if a == "MESH" else a for a in arguments]
     try:
         status = main(["design", *arguments, "-o", str(output)])
-    except SystemExit as ended:  # The parser ends the program by itself, with the same status.
+    except SystemExit as ended:  # the parser exits by itself, with the same status
         status = ended.code
     assert status == 2
     printed = capsys.readouterr()
@@ -140,7 +140,7 @@ def test_bad_commands_end_with_2_and_say_why(mesh_file, tmp_path, capsys, argume
 
 
 def test_bad_output_is_refused_before_the_work(tmp_path, capsys):
-    """The mesh is missing as well, but nothing gets as far as that."""
+    """The mesh file is missing too, but the output path is checked first."""
     arguments = ["design", "nowhere.obj", "--points", CHOSEN, "-o", str(tmp_path / "curve.xyz")]
     assert main(arguments) == 2
     assert "curve.xyz" in capsys.readouterr().err
@@ -160,7 +160,7 @@ def test_pretrain_writes_weights_with_the_switches_asked_for(mesh_file, tmp_path
     assert main(["pretrain", str(mesh_file), "-o", str(output), *options]) == 0
     config = load_weights(output).config
     assert (config.attention, config.gating) == (False, True)
-    # The bar goes to standard error.
+    # The progress bar goes to standard error.
     assert capsys.readouterr().out == ""
 
 
@@ -186,7 +186,7 @@ def test_pretrain_refuses_to_train_nothing(mesh_file, tmp_path, capsys, options)
     ],
 )
 def test_automatic_maps_are_those_of_the_functions(mesh_file, tmp_path, options, arguments):
-    """Faces of this ball meet at 15 degrees and more, but for a few."""
+    """Most faces of this sphere meet at angles of at least 15 degrees."""
     output = tmp_path / "curve.json"
     mesh = read_mesh(mesh_file)
     weights = nicmm.sharp_edge_map(mesh, np.radians(12.0))

@@ -1,4 +1,4 @@
-"""Meshes that nobody made for this: a good curve, or the error that is due, on a tenth of each."""
+"""Tests requests on a tenth of all third-party meshes: a good curve, or an error that is due."""
 
 from pathlib import Path
 
@@ -14,11 +14,11 @@ pytestmark = pytest.mark.slow
 SHARE = 10
 
 LARGEST_FILE = 400_000
-"""Bytes; larger ones take long."""
+"""Greatest file size in bytes; larger meshes take long."""
 
 
 def some_files():
-    """A tenth of each collection that is there, drawn at random, each with one request."""
+    """Random tenth of each available collection, with one request per file."""
     generator = np.random.default_rng(corpus.SEED)
     chosen = []
     for folder in corpus.FOLDERS:

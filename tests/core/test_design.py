@@ -1,4 +1,4 @@
-"""The front door: closed forms, invariance, guidance, status and errors of `design_curve`."""
+"""Tests of `design_curve`: closed forms, invariance, guidance, status and errors."""
 
 import os
 import subprocess
@@ -30,15 +30,15 @@ ROOT = Path(__file__).parents[2]
 CHOSEN = [3, 50, 200, 333]
 
 SAME = 0.005
-"""How far two curves that should be the same may be apart, in diagonals.
+"""Greatest distance, in diagonals, of two curves that count as the same: a tenth of an edge.
 
-Hundreds of steps in single precision make something of every rounding; this is a tenth of an edge.
+Rounding is amplified over the many steps of a computation.
 """
 
 
 @pytest.fixture(scope="module")
 def plain(body):
-    """A design on the body through four vertices, for comparison with others."""
+    """Reference design on the body, through four vertices."""
     return nicmm.design_curve(body, CHOSEN, order="shortest")
 
 
@@ -52,7 +52,7 @@ def visited(mesh, vertices, curve):
 
 class TestClosedForms:
     def test_points_of_a_great_circle_give_a_great_circle(self, ball):
-        """Through points inside faces; it stays within one edge length of the circle's plane."""
+        """The points are inside faces; the curve stays within an edge length of the plane."""
         turn = Rotation.from_rotvec([0.3, 0.5, 0.2])
         points = on_unit_sphere(ball, turn.apply(circle([0.0, 1.7, 3.0, 4.6])))
         design = nicmm.design_curve(ball, points)
@@ -73,12 +73,12 @@ class TestClosedForms:
         assert curve.length == pytest.approx(2 * np.pi * radius, rel=0.03)
 
     def test_the_network_makes_a_zigzag_fairer(self, ball):
-        """The curve bends less than the shortest edge paths that it starts from."""
+        """The curve bends less than shortest paths along edges do."""
         chosen = nearest_vertices(ball, circle([0.4, 2.0, 4.0], 0.8) + [0.0, 0.0, 0.6])
         (curve,) = nicmm.design_curve(ball, chosen).curves
         edge = mean_edge_length(ball)
         even, _ = resample(curve.points, round(curve.length / edge))
-        # Turning angles over an edge length: along edges of triangles they are often 60°.
+        # Turning angles per edge length; on a path along edges of triangles they are often 60°.
         step = np.roll(even, -1, axis=0) - even
         step /= np.linalg.norm(step, axis=1, keepdims=True)
         turning = np.arccos(np.clip((step * np.roll(step, -1, axis=0)).sum(axis=1), -1, 1))
@@ -87,7 +87,7 @@ class TestClosedForms:
 
 
 def on_unit_sphere(mesh, directions):
-    """Where rays from the origin meet a sphere's faces."""
+    """Points at which rays from the origin meet the faces of a sphere."""
     corners = mesh.vertices[mesh.faces].transpose(0, 2, 1)
     faces, barycentric = [], []
     for direction in directions:
@@ -100,7 +100,7 @@ def on_unit_sphere(mesh, directions):
 
 class TestResult:
     def test_points_in_faces_on_edges_and_at_vertices_are_interpolated(self, surface):
-        """One of each on every surface, some of them neighbours."""
+        """One point of each kind on every surface; some are in adjacent faces."""
         centre = surface.vertices[surface.faces].mean(axis=1)
         near = np.argsort(np.linalg.norm(centre - centre[40], axis=1))
         faces = near[[0, 12, 25, 26]]
@@ -135,7 +135,7 @@ class TestResult:
         assert 0.0 < inside < 0.55 * body.face_areas.sum()
 
     def test_other_components_and_lonely_vertices_change_nothing(self, small_ball, body, plain):
-        """Their field is that of the outside."""
+        """The field there is that of the outside."""
         both = joined(small_ball, body)
         mesh = nicmm.Mesh(np.concatenate([both.vertices, [[50.0, 0.0, 0.0]]]), both.faces)
         shift = len(small_ball.vertices)
@@ -150,7 +150,7 @@ class TestResult:
 
     @pytest.mark.slow
     def test_neighbouring_control_points_are_kept_apart(self, ball):
-        """Two inside one face and two of its corners."""
+        """Two points inside one face, and two of its corners."""
         points = nicmm.SurfacePoints(
             np.full(4, 100),
             np.array([[0.6, 0.2, 0.2], [1, 0, 0], [0, 0, 1], [0.2, 0.2, 0.6]], dtype=float),
@@ -168,12 +168,12 @@ class TestResult:
     @pytest.mark.slow
     @pytest.mark.parametrize(("smoothness", "count"), [(0.1, 4), (10.0, 4), (1.0, 20)])
     def test_field_does_not_go_flat(self, small_ball, smoothness, count):
-        """A field without slope costs no bending, and its zero set means nothing any more."""
+        """A field without slope has no bending energy, and its zero set is meaningless."""
         generator = np.random.default_rng(2)
         chosen = generator.choice(len(small_ball.vertices), size=count, replace=False)
         design = nicmm.design_curve(small_ball, chosen, order="shortest", smoothness=smoothness)
         assert_valid_design(small_ball, design)
-        # ½ (|∇φ|² - 1)² over an area of 1: a field with no slope at all has 0.5.
+        # The term is ½ (|∇φ|² - 1)² over an area of 1, so a field without slope has 0.5.
         assert design.energy["sdf"] < 0.35
 
     @pytest.mark.slow
@@ -185,7 +185,7 @@ class TestResult:
 
 class TestInvariance:
     def test_designer_gives_what_design_curve_gives(self, body, plain):
-        """Also after other designs on the same surface."""
+        """This also holds after other designs on the same Designer."""
         designer = nicmm.Designer(body)
         designer.design(
             [5, 90, 310],
@@ -256,32 +256,32 @@ def designer(ball):
 
 @pytest.fixture(scope="module")
 def parallel(ball):
-    """Three vertices about a parallel."""
+    """Three vertices near a parallel."""
     angles = np.arange(3) * 2 * np.pi / 3
     return nearest_vertices(ball, circle(angles, 0.7) + [0.0, 0.0, np.sqrt(1 - 0.7**2)])
 
 
 @pytest.fixture(scope="module")
 def neutral(ball, designer, parallel):
-    """The curve with a map on which nothing is painted."""
+    """Curve with a map on which nothing is painted."""
     return designer.design(parallel, obstacles=np.zeros(len(ball.vertices))).curves[0]
 
 
 @pytest.fixture(scope="module")
 def middle(ball, neutral, parallel):
-    """Where that curve is farthest from the control points."""
+    """Point of the neutral curve that is farthest from its control points."""
     offset = neutral.points[:, None] - ball.vertices[parallel]
     return neutral.points[np.linalg.norm(offset, axis=2).min(axis=1).argmax()]
 
 
 class TestGuidance:
-    """A region painted on the free curve, or beside it."""
+    """Tests with a region painted on the free curve or beside it."""
 
     def painted(self, mesh, centre):
         return (np.linalg.norm(mesh.vertices - centre, axis=1) < PAINTED_RADIUS).astype(float)
 
     def length_inside(self, mesh, curve, weights):
-        """Length of the curve, each part weighed by the map."""
+        """Length of the curve, weighted by the map."""
         value = (curve.barycentric * weights[mesh.faces[curve.faces]]).sum(axis=1)
         return np.linalg.norm(curve.steps, axis=1) @ (0.5 * (value + np.roll(value, -1)))
 
@@ -328,9 +328,9 @@ class TestProgress:
             assert points.ndim == 2 and points.shape[1] == 3
             assert np.isfinite(points).all()
         assert len(calls[-1][1]) > 3
-        # A few times a second at most, and once for the first curve.
+        # At most a few calls per second, and one for the first curve.
         assert len(calls) <= 2 + design.seconds / INTERVAL
-        # Only False stops it, and None is not False.
+        # Only False stops a design; `append` returns None.
         assert_identical(design, plain)
 
     def test_false_cancels_and_the_curve_so_far_is_valid(self, body, monkeypatch):
@@ -484,7 +484,7 @@ def moebius_strip():
 
 
 def broken_meshes():
-    """Arrays that are a mesh to the letter, and control points."""
+    """Arrays that are formally valid meshes, and control points."""
     ball = shapes.sphere(2)
     tetrahedron = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     sides = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -543,7 +543,7 @@ def test_neither_size_nor_place_is_a_defect(small_ball, shift, scale):
 
 
 def python(program):
-    """Run a program in a new interpreter that finds this package."""
+    """Run a program in a new interpreter that can import this package."""
     path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     return subprocess.run(
         [sys.executable, "-c", program],
@@ -592,7 +592,7 @@ def test_without_torch_only_the_method_of_the_paper_says_what_to_install():
 
 @pytest.mark.slow
 def test_a_changed_map_gives_the_curve_that_a_new_designer_finds(ball, parallel):
-    """The path may have to go elsewhere, so the last curve is no start; the same map goes on."""
+    """A Designer keeps no curve, so earlier designs with other maps have no effect."""
     designer = nicmm.Designer(ball)
     for height in (0.3, 0.5, None):
         lane = None
@@ -612,7 +612,7 @@ def test_a_changed_map_gives_the_curve_that_a_new_designer_finds(ball, parallel)
     ],
 )
 def test_a_lane_beside_a_straight_way_is_followed(flat_disc, method, finer, most):
-    """Over its middle, on the disc and on one twice as fine."""
+    """The curve follows the middle of the lane, on the disc and on one that is twice as fine."""
     mesh = nicmm.Mesh(*igl.upsample(flat_disc.vertices, flat_disc.faces, finer))
     x, y, _ = mesh.vertices.T
     lane = ((np.abs(y - 0.12) < 0.09) & (np.abs(x) < 0.45)).astype(float)

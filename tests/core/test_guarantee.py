@@ -1,7 +1,8 @@
-"""The promise of the package, on random surfaces and points: one simple curve through all of them.
+"""Tests the guarantee of one simple curve through all points, on random surfaces and points.
 
-Only the public interface is used. The promise has one exception, an `UnreachableError`, and none on
-a connected surface without boundary: whatever the order, a simple curve through the points exists.
+Only the public interface is used. The only exception to the guarantee is an `UnreachableError`. On
+a connected surface without boundary there is no exception, because a simple curve exists for every
+order of the points.
 """
 
 import re
@@ -19,7 +20,7 @@ from tests.oracles.checker import judge
 pytestmark = pytest.mark.slow
 
 MOST_NOISE = 0.25
-"""Standard deviation of the vertices' displacements, in mean edge lengths."""
+"""Standard deviation of vertex displacements, in mean edge lengths."""
 
 WITHOUT_BOUNDARY = {
     "sphere": lambda seed: shapes.sphere(1 + seed % 2),
@@ -38,7 +39,7 @@ SHAPES = WITHOUT_BOUNDARY | WITH_BOUNDARY
 
 @cache
 def surface(kind, seed, noisy):
-    """One of the shapes, its vertices moved at random if asked for."""
+    """One of the shapes, optionally with randomly displaced vertices."""
     mesh = SHAPES[kind](seed)
     if not noisy:
         return mesh
@@ -49,7 +50,7 @@ def surface(kind, seed, noisy):
 
 
 def with_holes(mesh, count, seed):
-    """A mesh without a few of its faces, no two of which touch."""
+    """A mesh without some of its faces, no two of which share a vertex."""
     removed, touched = [], set()
     for face in np.random.default_rng(seed).permutation(len(mesh.faces)):
         corners = set(mesh.faces[face].tolist())
@@ -66,7 +67,7 @@ def has_boundary(mesh):
 
 @st.composite
 def requests(draw, kinds):
-    """A surface and what is asked for on it; points at corners, on edges and inside faces."""
+    """A surface and a request on it, with points at corners, on edges and inside faces."""
     made = (draw(st.sampled_from(list(kinds))), draw(st.integers(0, 4)), draw(st.booleans()))
     mesh = surface(*made)
     closed = draw(st.booleans())

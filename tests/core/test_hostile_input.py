@@ -1,4 +1,4 @@
-"""What the fuzzer has found, one small test each; `python -m benchmarks fuzz` looks for more."""
+"""Regression tests of findings with hostile input; `benchmarks fuzz` searches for more."""
 
 import warnings
 
@@ -90,7 +90,7 @@ def test_a_seeded_part_of_the_fuzzing(part):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [1746, 5864, 7294, 8976])
 def test_what_a_whole_run_has_found(number):
-    """No nearest point; derivatives that overflowed; infinite coordinates; steps of no length."""
+    """No nearest point; overflowing derivatives; infinite coordinates; steps of length zero."""
     with warnings.catch_warnings(record=True) as printed:
         assert hostile_input.answer(number).faults == []
     assert not printed

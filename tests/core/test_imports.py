@@ -1,4 +1,4 @@
-"""Imports between the packages of the core go downwards only."""
+"""Tests that imports between the packages of the core have no cycles."""
 
 import ast
 import graphlib
@@ -10,12 +10,12 @@ ROOT = Path(nicmm_core.__file__).parent
 
 
 def room(path):
-    """The package of a module, or the module itself where it is in none."""
+    """Package of a module, or the name of a module that is in no package."""
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
 def imported_rooms(path):
-    """Packages, and modules outside of packages, that a module imports relatively."""
+    """Packages, and modules outside packages, that a module imports relatively."""
     for statement in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(statement, ast.ImportFrom) and statement.level:
             here = path.parents[statement.level - 1]
@@ -27,7 +27,7 @@ def imported_rooms(path):
 def test_no_package_imports_one_that_imports_it():
     rooms = {}
     for path in ROOT.rglob("*.py"):
-        if path != ROOT / "__init__.py":  # which names everything, and imports it on first use
+        if path != ROOT / "__init__.py":  # it imports every name on first use
             rooms.setdefault(room(path), set()).update(imported_rooms(path))
     assert {"geometry", "path", "level_set", "outputs"} < rooms.keys()
     assert "geometry" in rooms["path"]

@@ -1,4 +1,4 @@
-"""Non-manifold messes: a good curve, or an error that is due; `benchmarks messes` asks for more."""
+"""Tests requests on random non-manifold meshes; `benchmarks messes` makes more of them."""
 
 import warnings
 
@@ -9,7 +9,7 @@ from tests.oracles import messes
 pytestmark = pytest.mark.slow
 
 PARTS = 10
-"""Of the seeded messes, so that several processes may share them."""
+"""Number of parts of the seeded messes, so that several processes can share them."""
 
 EACH = 15
 
@@ -23,7 +23,7 @@ def test_a_seeded_part_of_the_messes(part):
 
 @pytest.mark.parametrize("number", [163, 172, 330, 5313, 8312])
 def test_what_a_whole_run_has_found(number):
-    """Two curves; obstacles that seemed to separate; strands on copies of one edge; twins alone."""
+    """Two curves; false separation by obstacles; strands on copies of an edge; only twin faces."""
     with warnings.catch_warnings(record=True) as printed:
         assert messes.answer(number).faults == []
     assert not printed

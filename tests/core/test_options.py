@@ -1,4 +1,4 @@
-"""The table of options: core, command line and signatures follow it."""
+"""Tests that the core, the command line and all signatures follow the table of options."""
 
 import inspect
 import subprocess
@@ -15,7 +15,7 @@ from nicmm_core.request import Request
 
 DEFAULTS = {option.name: option.default for option in options.OPTIONS}
 BESIDE = {"progress"}
-"""Arguments of `design_curve` that are no options of the curve."""
+"""Arguments of `design_curve` that are not options of the curve."""
 
 ADDED = (
     Option("torsion", Kind.NUMBER, 2.0, "Torsion", "How far it twists", limits=(0.0, 5.0)),
@@ -65,7 +65,7 @@ def added(monkeypatch):
 
 @pytest.mark.usefixtures("added")
 class TestAnOptionThatIsAdded:
-    """It is checked in the core and can be passed on the command line."""
+    """A new option is checked in the core and accepted on the command line."""
 
     def checked(self, mesh, **given):
         named = {option.name: option.default for option in options.OPTIONS}
@@ -87,7 +87,7 @@ class TestAnOptionThatIsAdded:
             ("turns", 2.5),
             ("turns", True),
             ("turns", 10),
-            ("margin", 0.1),  # without what it needs
+            ("margin", 0.1),  # without the option that it needs
         ]:
             with pytest.raises(nicmm.ArgumentError, match=name):
                 self.checked(small_ball, **{name: bad})
@@ -105,7 +105,7 @@ class TestAnOptionThatIsAdded:
 
 
 def test_the_table_loads_without_the_core():
-    """Blender reads it when the extension is enabled."""
+    """Blender reads the table when the extension is enabled."""
     code = "import nicmm_core.options, sys; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

@@ -1,4 +1,4 @@
-"""Whoever watches a design is asked in every stage, and may stop it in any of them."""
+"""Tests that every stage of a design calls the progress function, which can stop it anywhere."""
 
 import sys
 import threading
@@ -47,7 +47,7 @@ STAGES = {
 
 @pytest.fixture
 def at_every_checkpoint(monkeypatch):
-    """Progress functions are called as often as they can be."""
+    """Make progress functions be called at every checkpoint."""
     monkeypatch.setattr(progress, "INTERVAL", 0.0)
 
 
@@ -60,7 +60,7 @@ def request_of(name):
 
 
 def modules_above():
-    """Names of the modules that are running."""
+    """Names of the modules on the call stack."""
     names, frame = set(), sys._getframe(1)
     while frame is not None:
         names.add(frame.f_globals["__name__"].rpartition(".")[2])
@@ -108,7 +108,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
             return None
 
         design = designer.design(points, progress=stop, **arguments)
-        assert len(after) == 1  # asked no more after it has said so
+        assert len(after) == 1  # not called again after it has stopped the design
         assert design.status is nicmm.Status.CANCELLED
         for curve in design.curves:
             assert not judge_curve(mesh, curve, closed=whole.curves[0].closed).faults
@@ -124,7 +124,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
 
 @pytest.mark.slow
 def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
-    """Where a curve bends strongly, courses are sought again; here always."""
+    """If a curve bends strongly, courses are searched again; here this always happens."""
     monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
     body = shapes.creature(5, resolution=32, faces=1500)
     chosen = [20, 250, 600]
@@ -142,7 +142,7 @@ def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monke
 
 
 def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
-    """Far from the origin faces without area are mended about another one."""
+    """Far from the origin, faces without area are repaired on a copy about another origin."""
     mesh = nicmm.Mesh(MESHES["caps"].vertices + 1e5, MESHES["caps"].faces)
     seen = []
     nicmm.design_curve(
@@ -156,7 +156,7 @@ def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
 
 @pytest.mark.slow
 def test_points_of_every_stage_lie_near_the_mesh(at_every_checkpoint):
-    """Paths are found on copies of the mesh in other coordinates."""
+    """Stages run on copies of the mesh in other coordinates, so points must be mapped back."""
     for mesh, chosen in ((shapes.creature(2, faces=400), [3, 70, 150]), (LARGE, [7, 2000, 9000])):
         placed = nicmm.Mesh(mesh.vertices * 3.0 + [50.0, -20.0, 10.0], mesh.faces)
         seen = []
@@ -190,7 +190,7 @@ class TestWatched:
         with watched(lambda *_: None):
             for number in range(5):
                 checkpoint(points=lambda number=number: found.append(number) or np.zeros((1, 3)))
-        assert found == [0]  # the first curve is shown at once
+        assert found == [0]  # the first curve is shown immediately
 
     def test_what_was_stopped_stays_stopped(self, at_every_checkpoint):
         calls = []

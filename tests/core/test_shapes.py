@@ -1,4 +1,4 @@
-"""Generated shapes have the topology of their names."""
+"""Tests that generated shapes have the topology that their names promise."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_euler_characteristic_and_boundaries(name):
 
 
 def test_moebius_strip_has_one_side():
-    """Its faces cannot be turned so that every inner edge is used once in each direction."""
+    """Some inner edge has the same direction in both of its faces."""
     faces = shapes.moebius_strip(24, 4).faces
     directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     assert len(np.unique(directed, axis=0)) < len(directed)

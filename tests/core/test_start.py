@@ -1,4 +1,4 @@
-"""`Designer.design(start=…)`: an earlier curve goes on through control points that may differ."""
+"""Tests of `Designer.design(start=…)`, where the start is an earlier curve."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ MOST_CALLS = 40
 
 
 def on_ball(ball, raised=0.0, index=1):
-    """Points inside faces near the equator, one of them raised."""
+    """Points inside faces near the equator; one of them is raised."""
     heights = HEIGHTS.copy()
     heights[index] += raised
     positions = circle(ANGLES) + np.outer(heights, [0.0, 0.0, 1.0])
@@ -34,12 +34,12 @@ def on_ball(ball, raised=0.0, index=1):
 
 
 def beside(mesh, vertex, taken):
-    """A neighbour of a vertex that is not taken."""
+    """A neighbour of a vertex that is not among the taken vertices."""
     return next(v for v in igl.adjacency_list(mesh.faces)[vertex] if v not in taken)
 
 
 def converged(designer, points, start, iterations=3, **arguments):
-    """Go on until the curve has converged; return the last design and how many calls it took."""
+    """Repeat a design until it has converged; return the last one and the number of calls."""
     for calls in range(1, MOST_CALLS):
         start = designer.design(points, start=start, max_iterations=iterations, **arguments)
         if start.status is not nicmm.Status.ITERATION_LIMIT:
@@ -49,7 +49,7 @@ def converged(designer, points, start, iterations=3, **arguments):
 
 @pytest.fixture
 def from_nothing(monkeypatch):
-    """How often a curve has been designed from nothing."""
+    """List with one entry per design that was made from scratch, without a start."""
     found = []
     designed = surface_designer.SurfaceDesigner._designed
 
@@ -62,7 +62,7 @@ def from_nothing(monkeypatch):
 
 
 def far_apart(positions, candidates, count):
-    """Some of the candidates, each the farthest from those before; so legs are long."""
+    """Farthest-point selection among the candidates, which makes legs long."""
     chosen = [int(candidates[0])]
     while len(chosen) < count:
         away = np.linalg.norm(positions[candidates, None] - positions[chosen], axis=2)
@@ -73,7 +73,7 @@ def far_apart(positions, candidates, count):
 @pytest.mark.slow
 @pytest.mark.parametrize("order", ["given", "shortest"])
 def test_a_designer_remembers_no_answer(body, order):
-    """Whatever was asked before, and also by a start, without one the answer is design_curve's."""
+    """Without a start the answer is that of `design_curve`, whatever was requested before."""
     designer = nicmm.Designer(body)
     first = designer.design(CHOSEN, order=order)
     moved = [beside(body, CHOSEN[0], CHOSEN), *CHOSEN[1:]]
@@ -86,7 +86,7 @@ def test_a_designer_remembers_no_answer(body, order):
 
 
 def test_equal_starts_give_equal_curves(ball):
-    """In this Designer and in another one, on a mesh with the same arrays."""
+    """On the same Designer, and on another one for a mesh with the same arrays."""
     designer = nicmm.Designer(ball)
     other = nicmm.Designer(nicmm.Mesh(ball.vertices, ball.faces))
     start = designer.design(on_ball(ball))
@@ -191,7 +191,7 @@ def test_smoothness_and_maps_may_differ(ball, from_nothing):
 @pytest.mark.parametrize("as_curve", [False, True])
 @pytest.mark.parametrize("closed", [True, False])
 def test_control_points_go(ball, closed, as_curve):
-    """Also the ends of an open curve, which is shorter then."""
+    """Also an end point of an open curve may be removed, which shortens the curve."""
     designer, points = nicmm.Designer(ball), on_ball(ball)
     design = designer.design(points, closed=closed)
     start = design.curves[0] if as_curve else design
@@ -207,7 +207,7 @@ def test_control_points_go(ball, closed, as_curve):
 @pytest.mark.parametrize("order", ["given", "shortest"])
 @pytest.mark.parametrize("closed", [True, False])
 def test_control_points_come(ball, closed, order):
-    """On the curve, where it stays, and beside it."""
+    """A point may be added on the curve, which then stays in place, or beside it."""
     designer, points = nicmm.Designer(ball), on_ball(ball)
     start = designer.design(points, closed=closed)
     curve = start.curves[0]
@@ -244,7 +244,7 @@ def test_several_come_and_go_at_once(ball):
 
 
 def test_a_curve_of_an_earlier_session(ball):
-    """In a new Designer, as after a file was opened again; its points may move too."""
+    """The start may be from another Designer, as after reopening a file; points may move too."""
     points = on_ball(ball)
     curve = nicmm.design_curve(ball, points).curves[0]
     designer = nicmm.Designer(ball)
@@ -256,7 +256,7 @@ def test_a_curve_of_an_earlier_session(ball):
 
 
 def test_a_given_order_begins_at_its_first_point(ball):
-    """Whatever point the start begins at, and wherever the first one that is still there is."""
+    """Whatever point the start begins at, even if the first point has moved or is gone."""
     designer, points = nicmm.Designer(ball), on_ball(ball)[np.array([3, 4, 0, 1, 2])]
     for given in (points, points[np.arange(5)[::-1]]):
         shortest = designer.design(given, order="shortest")
@@ -288,7 +288,7 @@ def test_an_open_curve_ends_at_the_control_points_that_it_names(ball, kept):
 
 
 def test_points_of_a_shortest_curve_in_the_order_visited(body):
-    """As an editor keeps them: the start is a Design whose points were named in another order."""
+    """As in an editor: the points are in visiting order, but those of the start are not."""
     designer = nicmm.Designer(body)
     start = designer.design(CHOSEN, order="shortest")
     curve = start.curves[0]
@@ -315,22 +315,24 @@ def test_other_methods_can_be_gone_on_from(ball):
 
 
 def test_beside_obstacles(ball):
-    """Beside them it goes on; a curve that enters them is refused."""
+    """A start beside obstacles is accepted; one that enters an obstacle is refused."""
     points, designer = on_ball(ball), nicmm.Designer(ball)
     north = (ball.vertices[:, 2] > 0.5).astype(float)
     start = designer.design(points)
     now = designer.design(points, obstacles=north, start=start)
     assert_valid_curve(ball, now.curves[0], points.positions(ball))
-    between = circle([0.65])[0]  # the first two points
+    without = designer.design(points, start=now)
+    assert apart(without.curves[0].points, start.curves[0].points) < 1e-3
+    between = circle([0.65])[0]  # between the first two points
     island = (np.linalg.norm(ball.vertices - between, axis=1) < 0.3).astype(float)
-    with pytest.raises(nicmm.CurveError, match="obstacles of weight 1"):
+    with pytest.raises(nicmm.CurveError, match="an obstacle of weight 1"):
         designer.design(points, obstacles=island, start=start)
     assert designer.design(points, obstacles=island).curves[0].length > 1.01 * now.curves[0].length
 
 
 @pytest.mark.slow
 def test_moves_by_less_than_a_tenth_are_followed_on_limbs():
-    """Whatever the surface is like there, all but a few of them."""
+    """On any part of the surface, with few exceptions."""
     asked = refused = 0
     for seed in range(4):
         mesh = shapes.creature(seed, resolution=32, faces=1000)
@@ -355,7 +357,7 @@ def test_moves_by_less_than_a_tenth_are_followed_on_limbs():
 
 
 class TestRefusals:
-    """A start that cannot be used is a typed error that says why."""
+    """A start that cannot be used raises a typed error that says why."""
 
     def refused(self, mesh, points, match, error=nicmm.CurveError, **arguments):
         with pytest.raises(error, match=match):
@@ -405,7 +407,7 @@ class TestRefusals:
 
     @pytest.mark.parametrize("name", ["faces", "barycentric", "points", "control_index", "closed"])
     def test_fields_of_any_kind(self, small_ball, name):
-        """Whatever they hold, it is a curve that can be gone on from, or a typed error."""
+        """Whatever a field contains, the curve is a usable start or raises a typed error."""
         chosen = [3, 60, 100]
         start = nicmm.design_curve(small_ball, chosen).curves[0]
         whole = getattr(start, name)
@@ -441,9 +443,9 @@ class TestRefusals:
 
 @pytest.mark.slow
 def test_iterations_are_few_from_afar_and_fewer_from_a_start():
-    """Medians over random points of generated creatures, with every attempt counted.
+    """The counts are medians over random points on generated creatures and include every attempt.
 
-    From afar they depend on the initial curve too; that bound only keeps them from growing.
+    Without a start they also depend on the initial curve; that bound only detects regressions.
     """
     from_afar, dragged = [], []
     for seed in range(6):

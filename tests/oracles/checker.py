@@ -1,9 +1,9 @@
-"""The verdict on a design, from outside: one simple curve on the surface through all points.
+"""Checks independently whether a design is one simple curve on the surface through all points.
 
-Nothing here looks behind the public interface: a mesh is its vertices and faces, a curve its
-points, faces, barycentrics and control indices. A point is known by its nonzero weights at the
-mesh's vertices, so one on an edge is the same point from either face. Whether strands cross or
-touch is decided for the numbers as they stand, by exact arithmetic where rounding could matter.
+Only the public interface is used: a mesh is its vertices and faces, and a curve is its points,
+faces, barycentric coordinates and control indices. A point is identified by its nonzero weights at
+mesh vertices, so a point on an edge is the same point in both adjacent faces. Whether strands cross
+or touch is decided without tolerance, by exact arithmetic wherever rounding could matter.
 """
 
 from __future__ import annotations
@@ -18,50 +18,51 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-12
-"""Of sums of barycentric coordinates, and of control points in bounding-box diagonals."""
+"""Tolerance of sums of barycentrics, and of control points in bounding-box diagonals."""
 
 POSITION_ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Of a point computed from its barycentrics, relative to the greatest coordinate."""
+"""Tolerance of a point against its barycentrics, relative to the greatest coordinate."""
 
 BOX_ROOM = 1e-6
-"""Distance of boxes of weights beyond which chords have no point in common, rounded or not."""
+"""Distance of bounding boxes in weight space beyond which chords cannot meet despite rounding."""
 
 FEWEST_POINTS = {True: 3, False: 2}
-"""Of the polyline of a closed and of an open curve."""
+"""Least number of points of a curve, by whether it is closed."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a curve is, in numbers.
+    """Measured properties of a curve, and the faults that follow from them.
 
     Attributes
     ----------
     curves : int
-        Of the design; the other attributes are those of the first one.
+        Number of curves of the design; the other attributes describe the first one.
     readable : bool
-        Whether its arrays fit one another and the mesh, are finite and long enough; nothing else
-        is known where they do not.
+        Whether the arrays of the curve are consistent with one another and with the mesh, finite
+        and long enough. If not, the other attributes keep their defaults.
     closed_as_asked : bool
+        Whether the curve is closed or open as requested.
     points : int
-        Of the polyline.
+        Number of points of the polyline.
     position_error : float
-        Greatest distance of a coordinate from what the barycentrics give, relative to the
-        greatest coordinate.
+        Greatest difference between a coordinate of a point and the value that the barycentric
+        coordinates give, relative to the greatest coordinate.
     weight_error : float
-        Greatest amount by which a barycentric coordinate is negative or a sum is not 1.
+        Greatest amount by which a barycentric coordinate is negative or a sum differs from 1.
     chords_off_face : int
-        Pairs of consecutive points that lie on no common face.
+        Number of pairs of consecutive points that do not lie on a common face.
     points_twice : int
-        Points that were passed before.
+        Number of points that repeat an earlier point of the curve.
     crossings : int
-        Pairs of strands that cross inside a face.
+        Number of pairs of strands that cross inside a face.
     touchings : int
-        Points that lie on another strand, between its ends.
+        Number of points that lie on another strand, strictly between its ends.
     interpolation_error : float
-        Greatest distance of a control point to where the curve says it is, in bounding-box
-        diagonals; 0 where no control points are asked for, infinite where one is left out.
+        Greatest distance from a control point to the curve point with its control index, in
+        bounding-box diagonals; 0 if no control points are given, infinite if one is missing.
     in_order : bool
-        Whether the control points are met in the order asked for, each once.
+        Whether the curve visits the control points in the requested order, each of them once.
     """
 
     curves: int
@@ -79,12 +80,12 @@ class Verdict:
 
     @property
     def self_crossings(self) -> int:
-        """Places where the curve meets itself."""
+        """Number of places where the curve meets itself."""
         return self.points_twice + self.crossings + self.touchings
 
     @property
     def off_surface(self) -> list[str]:
-        """What is wrong with where the curve lies."""
+        """Faults of the position of the curve on the surface, in words."""
         if not self.readable:
             return [
                 "its arrays are too short, do not fit one another or the mesh, or are not finite"
@@ -106,7 +107,7 @@ class Verdict:
 
     @property
     def not_simple(self) -> list[str]:
-        """What keeps it from being a simple curve."""
+        """Reasons why the curve is not simple, in words."""
         return _words(
             (self.points_twice > 0, f"points are passed twice: {self.points_twice}"),
             (self.crossings > 0, f"strands cross: {self.crossings}"),
@@ -115,7 +116,7 @@ class Verdict:
 
     @property
     def not_through_points(self) -> list[str]:
-        """How it fails its control points."""
+        """Faults at the control points, in words."""
         if not self.readable:
             return []
         return _words(
@@ -128,7 +129,7 @@ class Verdict:
 
     @property
     def faults(self) -> list[str]:
-        """All that is wrong, in words; empty where the curve is what was asked for."""
+        """All faults, in words; empty if the curve is what was requested."""
         if self.curves == 0:
             return ["there is no curve"]
         return [
@@ -149,7 +150,7 @@ def judge(
     closed: bool = True,
     order: str = "given",
 ) -> Verdict:
-    """Judge a design by what was asked for, in `nicmm_core.design_curve`'s own words."""
+    """Judge a design by the request, which is given by arguments of `nicmm_core.design_curve`."""
     if not design.curves:
         return Verdict(curves=0)
     positions = control_positions(mesh, control_points)
@@ -159,7 +160,7 @@ def judge(
 def control_positions(
     mesh: nicmm.Mesh, control_points: ArrayLike | nicmm.SurfacePoints
 ) -> FloatArray:
-    """Where control points in any accepted form are, shape (k, 3)."""
+    """Positions of control points in any accepted form, shape (k, 3)."""
     if isinstance(control_points, nicmm.SurfacePoints):
         return control_points.positions(mesh)
     given = np.asarray(control_points)
@@ -179,19 +180,22 @@ def judge_curve(
     Parameters
     ----------
     mesh : Mesh
+        Surface.
     curve : SurfaceCurve
+        Curve to judge.
     positions : (k, 3) array_like of float, optional
-        Of the control points; without them nothing is said about these.
+        Positions of the control points; without them, control points are not checked.
     closed : bool
-        Whether a closed curve was asked for.
+        Whether a closed curve was requested.
     order : {"given", "shortest"}
-        Whether the points must be met as they are given, or each once in any order.
+        Whether the points must be visited in the given order, or each once in any order.
     curves : int
-        How many the design has.
+        Number of curves of the design.
 
     Returns
     -------
     Verdict
+        Properties and faults of the curve.
     """
     n = len(curve.points)
     if not _readable(mesh, curve) or n < FEWEST_POINTS[bool(curve.closed)]:
@@ -202,7 +206,8 @@ def judge_curve(
     vertices, weights = _places(faces, curve)
     simplices, on_face = _common_simplices(faces, vertices, chords)
     if not on_face.all():
-        # Open edges at the same place are one edge to a curve where nothing else joins its points.
+        # Where the mesh does not connect the points otherwise, a design treats open edges at the
+        # same place as one edge.
         faces = _with_open_edges_joined(mesh)
         vertices, weights = _places(faces, curve)
         simplices, on_face = _common_simplices(faces, vertices, chords)
@@ -237,7 +242,7 @@ def _words(*cases: tuple[bool, str]) -> list[str]:
 
 
 def _readable(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> bool:
-    """Whether the arrays can be looked at any further."""
+    """Whether the arrays are valid enough for all other checks."""
     n = len(curve.points)
     return bool(
         curve.points.shape == curve.barycentric.shape == (n, 3)
@@ -252,7 +257,7 @@ def _readable(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> bool:
 
 
 def _with_open_edges_joined(mesh: nicmm.Mesh) -> IntArray:
-    """The faces, (F, 3), where vertices of open edges with the same coordinates are one."""
+    """Faces (F, 3) in which vertices of open edges with the same coordinates are identified."""
     sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
     first: dict[tuple[float, ...], int] = {}
@@ -263,14 +268,15 @@ def _with_open_edges_joined(mesh: nicmm.Mesh) -> IntArray:
 
 
 def _places(faces: IntArray, curve: nicmm.SurfaceCurve) -> tuple[IntArray, FloatArray]:
-    """What each point is, regardless of the face named.
+    """Representation of each point that does not depend on the face in which it is given.
 
     Returns
     -------
     (n, 3) int array
-        Vertices where its weight is not zero, ascending, after -1 for each other corner.
+        Vertices at which the weight is not zero, in ascending order, preceded by -1 for each
+        other corner.
     (n, 3) float array
-        The weights there, 0 for the others.
+        Weights at these vertices, 0 at the other corners.
     """
     positive = curve.barycentric > 0.0
     vertices = np.where(positive, faces[curve.faces], -1)
@@ -282,21 +288,22 @@ def _places(faces: IntArray, curve: nicmm.SurfaceCurve) -> tuple[IntArray, Float
 def _common_simplices(
     faces: IntArray, vertices: IntArray, chords: IntArray
 ) -> tuple[IntArray, BoolArray]:
-    """The smallest face, edge or vertex that holds both ends of each chord.
+    """Smallest simplex (face, edge or vertex) that contains both ends of each chord.
 
     Returns
     -------
     (n, 3) int array
-        Its vertices, as `_places` writes them.
+        Vertices of the simplex, in the form of `_places`.
     (n,) bool array
-        Whether the mesh has it.
+        Whether the simplex exists in the mesh.
     """
     both = np.sort(vertices[chords].reshape(len(chords), 6), axis=1)
     both[:, 1:][both[:, 1:] == both[:, :-1]] = -1
     simplices = np.sort(both, axis=1)[:, 3:]
     small = (both >= 0).sum(axis=1) <= 3
 
-    # Only faces near the curve are sorted, and only its own vertices have numbers in the keys.
+    # For speed, only faces near the curve are sorted. Only the vertices of the curve are numbered,
+    # so that the keys fit into 64 bits.
     used = np.zeros(int(faces.max()) + 2, dtype=bool)
     used[vertices[vertices >= 0]] = True
     number = np.cumsum(used)
@@ -313,17 +320,17 @@ def _common_simplices(
 
 
 def _keys(triples: IntArray) -> IntArray:
-    """One number a row, of values below 2²⁰: more vertices than any curve here passes."""
+    """One key per row of three numbers below 2²⁰, more vertices than any tested curve passes."""
     return (triples[:, 0] << 40) + (triples[:, 1] << 20) + triples[:, 2]
 
 
 def _contacts(
     vertices: IntArray, weights: FloatArray, chords: IntArray, simplices: IntArray
 ) -> tuple[int, int]:
-    """Pairs of chords that cross, and points that lie inside a chord of another strand.
+    """Numbers of pairs of chords that cross, and of points inside a chord of another strand.
 
-    Two chords can only meet between their ends inside a face that holds both, or along an edge:
-    coming from another face, one has a point on the edge.
+    Two chords can meet between their ends only inside a face that contains both, or along an edge;
+    a chord that enters from another face has a point on the edge.
     """
     dimension = (simplices >= 0).sum(axis=1) - 1
     inside, along = dimension == 2, dimension == 1
@@ -335,7 +342,7 @@ def _contacts(
 def _contacts_in_faces(
     vertices: IntArray, weights: FloatArray, chords: IntArray, faces: IntArray
 ) -> tuple[int, int]:
-    """Contacts of chords through the inside of a face."""
+    """Crossings and touchings of chords through the interior of a face."""
     face = np.unique(faces, axis=0, return_inverse=True)[1].ravel()
     own = np.stack([_weights_in(vertices, weights, chords[:, e], faces) for e in (0, 1)])
     pairs = _near(_pairs_within(face), own.min(axis=0), own.max(axis=0))
@@ -348,7 +355,7 @@ def _contacts_in_faces(
         sides = []
         for which in (0, 1):
             point, place = chords[names[other], which], ends[other][which]
-            # Chords that follow one another share a point, which says nothing.
+            # Consecutive chords share a point, which is not a contact.
             shared = (point[:, None] == chords[chord]).any(axis=1)
             apart = np.flatnonzero(~shared)
             side = np.zeros(len(pairs), dtype=np.int64)
@@ -364,7 +371,7 @@ def _contacts_in_faces(
 def _contacts_on_edges(
     vertices: IntArray, weights: FloatArray, chords: IntArray, edges: IntArray
 ) -> int:
-    """Points inside chords that run along an edge."""
+    """Number of points inside chords that run along an edge."""
     if not len(edges):
         return 0
     n = len(vertices)
@@ -385,13 +392,13 @@ def _contacts_on_edges(
 def _weights_in(
     vertices: IntArray, weights: FloatArray, points: IntArray, simplices: IntArray
 ) -> FloatArray:
-    """Weights of points at the vertices of the simplex that each lies in, shape (m, 3)."""
+    """Weights of each point at the vertices of the simplex that contains it, shape (m, 3)."""
     same = vertices[points][:, None, :] == simplices[:, :, None]
     return (same * weights[points][:, None, :]).sum(axis=2)
 
 
 def _pairs_within(group: IntArray) -> IntArray:
-    """All pairs of elements of one group, shape (m, 2)."""
+    """All pairs of elements that belong to the same group, shape (m, 2)."""
     order = np.argsort(group, kind="stable")
     size = np.bincount(group)
     rank = np.arange(len(group)) - (np.cumsum(size) - size)[group[order]]
@@ -402,16 +409,16 @@ def _pairs_within(group: IntArray) -> IntArray:
 
 
 def _near(pairs: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
-    """Pairs of chords whose boxes of weights meet, with room for sums that are not quite 1."""
+    """Pairs of chords whose bounding boxes in weight space meet, with a margin for rounding."""
     one, other = pairs.T
     meet = (low[one] <= high[other] + BOX_ROOM) & (low[other] <= high[one] + BOX_ROOM)
     return pairs[meet.all(axis=1)]
 
 
 def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> IntArray:
-    """On which side of a line a point of the same face lies: 1, 0 or -1, exactly.
+    """Exact side, 1, 0 or -1, of a line on which a point of the same face lies.
 
-    Weights are homogeneous coordinates, so the sign is that of a determinant, shapes (m, 3).
+    Weights, of shape (m, 3), are homogeneous coordinates, so the side is the sign of a determinant.
     """
     products = np.stack(
         [
@@ -437,7 +444,7 @@ def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> IntArray:
 
 
 def _between(point: FloatArray, start: FloatArray, end: FloatArray) -> bool:
-    """Whether a point of a line lies strictly between two others, exactly; weights (3,)."""
+    """Whether a point on a line lies strictly between two others, exactly; weights (3,)."""
     places = []
     for weights in (point, start, end):
         exact = [Fraction(float(weight)) for weight in weights]
@@ -448,7 +455,7 @@ def _between(point: FloatArray, start: FloatArray, end: FloatArray) -> bool:
 def _visits(
     mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve, positions: FloatArray, order: str
 ) -> tuple[float, bool]:
-    """How far control points are missed, in diagonals, and whether they are met in order."""
+    """Greatest distance from a control point, in diagonals, and whether the order is right."""
     index = curve.control_index
     if index.shape != (len(positions),) or (index < 0).any():
         return np.inf, False
@@ -460,7 +467,7 @@ def _visits(
     missed = float(distance[np.arange(len(index)), asked].max() / diagonal)
     each_once = len(np.unique(asked)) == len(np.unique(index)) == len(index)
     if curve.closed:
-        # Walking round once, the index falls back only where the walk passes the polyline's start.
+        # In one round, the index decreases only where the round passes the start of the polyline.
         onward = int((np.roll(index, -1) <= index).sum()) == 1
     else:
         onward = bool((np.diff(index) > 0).all())

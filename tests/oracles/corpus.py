@@ -1,8 +1,9 @@
-"""Every mesh that is there: a valid curve, or an error where no curve can be.
+"""Requests curves on all available meshes and classifies the answers.
 
-Whether an error is due is decided by `feasibility`, from the arrays alone: points that no chain of
-faces with common edges joins, and points at one place. All else is "declined though possible", and
-a curve that `checker` faults, an untyped error, a crash or a hang is wrong.
+An answer is a good curve, or an error where no curve exists. Whether one exists is decided by
+`feasibility`, from the arrays alone: an error is due if no chain of faces with common edges joins
+the points, or if two points coincide. Any other error of the package is "declined though possible".
+A curve that `checker` faults, an untyped error, a crash or a hang is wrong.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ GOOD, DUE, DECLINED, WRONG = "good curve", "error where due", "declined though p
 
 @dataclass(frozen=True)
 class Item:
-    """One curve that is asked for: a file or a generated mesh, and which of its requests."""
+    """One request: a file or a generated mesh, and the index of the request in `REQUESTS`."""
 
     folder: str
     name: str
@@ -43,12 +44,12 @@ class Item:
 
 
 REQUESTS = ((True, True), (True, False), (False, True), (False, False))
-"""Whether all points are drawn from one connected part, and whether the curve is closed."""
+"""For each request: whether all points are on one connected part, and whether it is closed."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Which of the four it is, why, and how many faces the mesh has."""
+    """Class of an answer, the reason for it, and the number of faces of the mesh."""
 
     verdict: str
     words: str = ""
@@ -56,10 +57,10 @@ class Outcome:
 
 
 def outcome(item: Item) -> Outcome:
-    """Ask for the curve and judge what comes."""
+    """Request the curve and classify the answer."""
     try:
         mesh, designer = _prepared(item.name, item.path)
-    # Every file in the collections holds a mesh.
+    # Every file in the collections contains a mesh, so an error is never due here.
     except nicmm.NicmmError as error:
         return Outcome(DECLINED, f"{type(error).__name__}: {error}")
     except Exception as error:
@@ -80,7 +81,7 @@ def _answer(item: Item, mesh: nicmm.Mesh, designer: nicmm.Designer) -> Outcome:
     except nicmm.NicmmError as error:
         words = f"{type(error).__name__}: {error}"
         return Outcome(DUE if due else DECLINED, words)
-    # An error that is not the package's own is a finding, and must not end a long measurement.
+    # Any other exception is a finding as well, and must not end a long measurement.
     except Exception as error:
         return Outcome(WRONG, f"untyped {type(error).__name__}: {error}")
     faults = judge(mesh, design, points, closed, "shortest").faults
@@ -98,7 +99,7 @@ def _prepared(name: str, path: Path | None) -> tuple[nicmm.Mesh, nicmm.Designer]
 def _points(
     mesh: nicmm.Mesh, of_one_part: bool, closed: bool, generator: np.random.Generator
 ) -> IntArray | None:
-    """Random vertices; None where there are too few."""
+    """Random vertices; None if there are too few."""
     faces = mesh.faces
     if of_one_part:
         part = edge_connected_parts(mesh)

@@ -1,4 +1,4 @@
-"""One generated mesh for each defect that meshes from elsewhere have."""
+"""Generates one mesh for each kind of defect that is found in third-party meshes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SEED = 0
 
 
 def defective_meshes() -> Iterator[tuple[str, Mesh]]:
-    """Name and mesh; where nothing else is said there is a curve through any of its points."""
+    """Names and meshes; on most of them a curve exists through any of the vertices."""
     ball = shapes.sphere(3)
     vertices, faces = ball.vertices, ball.faces
     generator = np.random.default_rng(SEED)
@@ -52,7 +52,7 @@ def defective_meshes() -> Iterator[tuple[str, Mesh]]:
 
 
 def _collapsed(vertices: FloatArray, faces: IntArray, count: int) -> FloatArray:
-    """Edges of no length: one of their ends put on the other."""
+    """Vertices with some edges collapsed to length zero, by moving one end onto the other."""
     vertices = vertices.copy()
     for a, b, _ in faces[:: max(1, len(faces) // count)]:
         vertices[a] = vertices[b]
@@ -60,7 +60,7 @@ def _collapsed(vertices: FloatArray, faces: IntArray, count: int) -> FloatArray:
 
 
 def _collapsed_faces(vertices: FloatArray, faces: IntArray, count: int) -> FloatArray:
-    """Faces whose corners are all at one place."""
+    """Vertices with the three corners of some faces moved to the same place."""
     vertices = vertices.copy()
     for face in faces[:: max(1, len(faces) // count)]:
         vertices[face] = vertices[face].mean(axis=0)
@@ -70,7 +70,7 @@ def _collapsed_faces(vertices: FloatArray, faces: IntArray, count: int) -> Float
 def _with_caps(
     vertices: FloatArray, faces: IntArray, chosen: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Vertices in the middle of edges, joined to one side's opposite corner; a cap on the other."""
+    """Mesh with vertices at edge midpoints that split one side; a cap closes the other side."""
     new_vertices, new_faces = [vertices], [faces]
     for number, (a, b, c) in enumerate(chosen):
         middle = len(vertices) + number
@@ -84,7 +84,7 @@ def _with_caps(
 def _with_needles(
     vertices: FloatArray, faces: IntArray, chosen: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """A vertex in each of some faces so close to a corner that two needles lie beside it."""
+    """Mesh with a vertex inserted into some faces, so close to a corner that two needles arise."""
     middles = vertices[chosen].mean(axis=1)
     added = (1.0 - 1e-8) * vertices[chosen[:, 0]] + 1e-8 * middles
     number = len(vertices) + np.arange(len(chosen))
@@ -95,7 +95,7 @@ def _with_needles(
 
 
 def _with_fans(vertices: FloatArray, faces: IntArray, size: int) -> tuple[FloatArray, IntArray]:
-    """An edge subdivided into many on one side, and closed by a fan of faces without area."""
+    """Mesh with an edge subdivided on one side only; a fan of faces without area closes the gap."""
     a, b, c = faces[0]
     along = np.linspace(0.0, 1.0, size + 2)[1:-1, None]
     inner = len(vertices) + np.arange(size)
@@ -107,7 +107,7 @@ def _with_fans(vertices: FloatArray, faces: IntArray, size: int) -> tuple[FloatA
 
 
 def _seam(ball: Mesh) -> Mesh:
-    """Two halves whose vertices along the equator are there twice, as at the seam of a texture."""
+    """Two halves with duplicate vertices along the equator, as at a texture seam."""
     upper = ball.vertices[ball.faces].mean(axis=1)[:, 2] > 0.0
     faces = ball.faces.copy()
     faces[upper] += len(ball.vertices)
@@ -115,7 +115,7 @@ def _seam(ball: Mesh) -> Mesh:
 
 
 def _touching_boxes(size: int = 4) -> Mesh:
-    """Two closed boxes side by side, with vertices at the same places where they touch."""
+    """Two closed boxes side by side, with coinciding vertices where they touch."""
     box = _box(size)
     return _together(box, Mesh(box.vertices + [1.0, 0.0, 0.0], box.faces))
 
@@ -140,7 +140,7 @@ def _box(size: int) -> Mesh:
 
 
 def _sheets(count: int, size: int = 8) -> Mesh:
-    """Half planes that meet along the z axis."""
+    """Half-planes that meet along the z axis."""
     step = np.linspace(0.0, 1.0, size + 1)
     axis = np.stack([0 * step, 0 * step, step], axis=1)
     vertices, faces, first = [axis], [], size + 1
@@ -157,7 +157,7 @@ def _sheets(count: int, size: int = 8) -> Mesh:
 
 
 def _with_fins(vertices: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Faces that stand on edges."""
+    """Mesh with extra faces that stand on its edges."""
     edges = faces[:: len(faces) // count, :2]
     tips = 1.2 * vertices[edges].mean(axis=1)
     fins = np.column_stack([edges, len(vertices) + np.arange(len(tips))])
@@ -165,7 +165,7 @@ def _with_fins(vertices: FloatArray, faces: IntArray, count: int) -> tuple[Float
 
 
 def _hour_glass(ball: Mesh) -> Mesh:
-    """Two surfaces that meet in one vertex, and nowhere else."""
+    """Two surfaces that meet only at one vertex."""
     bottom = int(ball.vertices[:, 2].argmin())
     other = ball.faces + len(ball.vertices)
     other = np.where(other == bottom + len(ball.vertices), bottom, other)
@@ -174,7 +174,7 @@ def _hour_glass(ball: Mesh) -> Mesh:
 
 
 def _touching(ball: Mesh) -> Mesh:
-    """One surface that touches itself in a few vertices."""
+    """A surface that touches itself at a few vertices."""
     faces = ball.faces.copy()
     upper = np.flatnonzero(ball.vertices[:, 2] > 0.5)[:3]
     lower = np.flatnonzero(ball.vertices[:, 2] < -0.5)[:3]
@@ -184,7 +184,7 @@ def _touching(ball: Mesh) -> Mesh:
 
 
 def _slivers(vertices: FloatArray, faces: IntArray, height: float) -> tuple[FloatArray, IntArray]:
-    """Caps that have an area, but hardly any."""
+    """Mesh with caps of a very small but nonzero area."""
     n_vertices = len(vertices)
     vertices, faces = _with_caps(vertices, faces, faces[::9])
     vertices = vertices.copy()

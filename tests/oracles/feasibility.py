@@ -1,8 +1,8 @@
-"""Whether a curve can exist, decided from the arrays alone and not by the core.
+"""Decides whether a curve through given points exists, from the arrays alone, without the core.
 
 On a surface whose faces are connected across edges there is a simple closed curve through any
-points: the boundary of a thin strip about a tree of faces that touches each of them. Parts that
-have only single vertices in common count as not connected.
+points: the boundary of a thin strip along a tree of faces that touches each point. Parts that share
+only single vertices are not connected.
 """
 
 from __future__ import annotations
@@ -15,26 +15,33 @@ import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import BoolArray, FloatArray, IntArray
 
 SAME_PLACE = 1e-9
-"""Distance, in bounding-box diagonals, up to which two points are one."""
+"""Distance, in bounding-box diagonals, up to which two points coincide."""
 
 ANY_ORDER = 3
-"""Points at a boundary or a non-manifold vertex up to which every order is possible.
+"""Greatest number of points at boundaries or non-manifold places that allow every order.
 
-A thin strip about a tree passes three of them in the one cyclic order that there is. All other
-points are interior, and a finger of the strip reaches them from any stretch of its boundary.
+Three such points have only one cyclic order, in which the boundary of a thin strip along a tree
+passes them. All other points are interior, and from any part of its boundary the strip can extend a
+finger to reach them.
 """
 
 
 def edge_connected_parts(mesh: nicmm.Mesh, usable: BoolArray | None = None) -> IntArray:
-    """Which part each face belongs to, shape (F,).
+    """Connected part that each face belongs to.
 
-    Faces are joined that have a common edge, or open edges between the same two places.
+    Two faces are connected if they have a common edge, or open edges between the same two places.
 
     Parameters
     ----------
     mesh : Mesh
+        Mesh, possibly with defects.
     usable : (F,) bool array, optional
-        Faces that a curve may enter, by default all; each other face is a part of its own.
+        Faces that a curve may enter, by default all; every other face is a separate part.
+
+    Returns
+    -------
+    (F,) int array
+        Index of the part of each face.
     """
     faces = mesh.faces
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -55,7 +62,7 @@ def edge_connected_parts(mesh: nicmm.Mesh, usable: BoolArray | None = None) -> I
 
 
 def usable_faces(mesh: nicmm.Mesh, obstacles: FloatArray | None) -> BoolArray:
-    """Faces that an obstacle does not forbid, shape (F,): not all three corners have weight 1."""
+    """Faces that no obstacle blocks, shape (F,): those without weight 1 at all three corners."""
     if obstacles is None:
         return np.ones(len(mesh.faces), dtype=bool)
     return ~(np.asarray(obstacles)[mesh.faces] >= 1.0).all(axis=1)
@@ -64,7 +71,7 @@ def usable_faces(mesh: nicmm.Mesh, obstacles: FloatArray | None) -> BoolArray:
 def why_impossible(
     mesh: nicmm.Mesh, points: nicmm.SurfacePoints, obstacles: FloatArray | None = None
 ) -> str:
-    """Why no simple curve goes through these points in any order; empty where one does."""
+    """Reason why no simple curve visits these points in any order; empty if one exists."""
     positions = points.positions(mesh)
     apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     if (apart[np.triu_indices(len(points), 1)] <= SAME_PLACE * mesh.diagonal).any():
@@ -83,9 +90,9 @@ def why_impossible(
 def every_order_possible(
     mesh: nicmm.Mesh, points: nicmm.SurfacePoints, obstacles: FloatArray | None = None
 ) -> bool:
-    """Whether a curve may visit the points in any order, where one visits them in some order.
+    """Whether every order of the points is possible, provided that some order is.
 
-    False says nothing: at more points of a boundary it depends on the surface.
+    The criterion is sufficient only: with more points at boundaries it depends on the surface.
     """
     usable = usable_faces(mesh, obstacles)
     supports = _supports(mesh, points)
@@ -93,7 +100,7 @@ def every_order_possible(
 
 
 def _supports(mesh: nicmm.Mesh, points: nicmm.SurfacePoints) -> list[IntArray]:
-    """The vertices that each point is a mixture of."""
+    """Vertices at which each point has a positive weight."""
     return [
         mesh.faces[face][weights > 0.0]
         for face, weights in zip(points.faces, points.barycentric, strict=True)
@@ -101,14 +108,14 @@ def _supports(mesh: nicmm.Mesh, points: nicmm.SurfacePoints) -> list[IntArray]:
 
 
 def _faces_with(mesh: nicmm.Mesh, corners: IntArray) -> BoolArray:
-    """Faces that have all of some vertices, shape (F,)."""
+    """Faces that contain all of the given vertices, shape (F,)."""
     return np.isin(mesh.faces, corners).sum(axis=1) == len(corners)
 
 
 def _is_interior(mesh: nicmm.Mesh, corners: IntArray, usable: BoolArray) -> bool:
-    """Whether the usable faces round a point are one disc with the point inside."""
+    """Whether the usable faces around a point form one disc with the point in its interior."""
     faces = mesh.faces[_faces_with(mesh, corners) & usable]
-    faces = np.unique(np.sort(faces, axis=1), axis=0)  # twins are one face
+    faces = np.unique(np.sort(faces, axis=1), axis=0)  # duplicate faces count once
     if len(corners) == 3:
         return len(faces) == 1
     if len(corners) == 2:

@@ -1,6 +1,7 @@
-"""Cases that nobody should ask for, drawn from a number; each says what was wrong with the answer.
+"""Generates cases of hostile input and judges how the package answers them.
 
-The answer may be a curve, which `checker` then judges, or an error of the package.
+A case is identified by a number. A valid answer is a curve without faults according to `checker`,
+or an error of the package.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from .untyped import place_of
 SEED = 0
 
 MANY = 16
-"""Control points in an order of no sense."""
+"""Number of control points in a request with many points in a random order."""
 
 NUMBERS = (
     0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, -1e-300, 1e-12, 1e300, -1e300, np.nan, np.inf, -np.inf,
@@ -54,12 +55,12 @@ METHODS = ("nicmm", "nicmm", "nicmm", "nicmm", "nicmm", "nicmm", "variational", 
 
 
 class CallersError(Exception):
-    """What a progress function of a case raises; it may pass."""
+    """Exception of a progress function, which the package must pass on to the caller."""
 
 
 @dataclass
 class Answer:
-    """What a case was and what came of it."""
+    """Kind of a case, and outcome and faults of the answer."""
 
     kind: str
     outcome: str = "refused"
@@ -67,7 +68,7 @@ class Answer:
 
 
 def answer(number: int) -> Answer:
-    """The case of a number and what came of it."""
+    """Answer to the case with a number."""
     generator = np.random.default_rng([SEED, number])
     kind, ask = _chosen(generator, _KINDS)
     result = Answer(kind)
@@ -78,7 +79,7 @@ def answer(number: int) -> Answer:
         except nicmm.NicmmError as error:
             if not 20 <= len(str(error)) <= 1000:
                 result.faults.append(f"a message of {len(str(error))} characters")
-        # Anything else is what is looked for.
+        # Any other exception is a finding.
         except Exception as error:
             result.outcome = "untyped"
             result.faults.append(f"{type(error).__name__} at {place_of(error)}: {error}"[:300])
@@ -86,7 +87,7 @@ def answer(number: int) -> Answer:
 
 
 def _arrays(generator: np.random.Generator, result: Answer) -> None:
-    """Vertices and faces that are hardly a mesh, and a curve on it if they are one."""
+    """Spoiled vertices and faces, and a curve on them if they are accepted as a mesh."""
     mesh = _sound_mesh(generator)
     vertices: Any = mesh.vertices.copy()
     faces: Any = mesh.faces.copy()
@@ -113,7 +114,7 @@ def _arrays(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _geometry(generator: np.random.Generator, result: Answer) -> None:
-    """A mesh with every right to be one, and defects in its shape."""
+    """A valid mesh with geometric and topological defects."""
     mesh = _defective_mesh(generator)
     points = _vertices_of_one_component(generator, mesh)
     _designed(generator, result, mesh, points, _some_arguments(generator, mesh, len(points)))
@@ -126,7 +127,7 @@ def _control_points(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _arguments(generator: np.random.Generator, result: Answer) -> None:
-    """All other arguments."""
+    """Hostile values of all other arguments."""
     mesh = _any_mesh(generator)
     asked: Any = mesh
     points = _vertices_of_one_component(generator, mesh)
@@ -152,7 +153,7 @@ def _arguments(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _start(generator: np.random.Generator, result: Answer) -> None:
-    """Designs that go on from one another, and from what is no curve on the mesh."""
+    """Designs that start from earlier ones, and from objects that are no curve on the mesh."""
     mesh = _any_mesh(generator)
     designer = nicmm.Designer(mesh)
     points: Any = _vertices_of_one_component(generator, mesh)
@@ -183,7 +184,7 @@ def _start(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _hostile_start(generator: np.random.Generator, start: nicmm.Design) -> Any:
-    """A design, its curve, or either with a field that is spoiled."""
+    """A design, its curve, or one of these with a spoiled field."""
     if generator.random() < 0.4 or not start.curves:
         return start
     curve = start.curves[0]
@@ -206,7 +207,7 @@ def _hostile_start(generator: np.random.Generator, start: nicmm.Design) -> Any:
 
 
 def _sequence(generator: np.random.Generator, result: Answer) -> None:
-    """Several requests to one designer, some of which fail."""
+    """Several requests to one Designer, some of which fail."""
     mesh = _any_mesh(generator)
     designer = nicmm.Designer(mesh)
     points: Any = _vertices_of_one_component(generator, mesh)
@@ -225,7 +226,7 @@ def _sequence(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _mesh_file(generator: np.random.Generator, result: Answer) -> None:
-    """A mesh file with errors in it."""
+    """A corrupt mesh file."""
     mesh = _sound_mesh(generator)
     ending = _chosen(generator, MESH_FORMATS)
     with tempfile.TemporaryDirectory() as folder:
@@ -247,7 +248,7 @@ def _mesh_file(generator: np.random.Generator, result: Answer) -> None:
 
 
 def _weights_file(generator: np.random.Generator, result: Answer) -> None:
-    """A weights file with errors in it, its members' own checksums right or wrong."""
+    """A corrupt weights file, with right or wrong checksums of its members."""
     data = SHIPPED.read_bytes()
     if generator.random() < 0.7:
         members = dict(_weights_members())
@@ -300,7 +301,7 @@ _KINDS: tuple[tuple[str, Callable[[np.random.Generator, Answer], None]], ...] = 
     ("sequence", _sequence),
     *[("start", _start)] * 2,
 )
-"""Drawn from; what takes long comes seldom."""
+"""Kinds of cases to choose from at random; slow kinds are rare."""
 
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 
@@ -312,7 +313,7 @@ def _designed(
     points: Any,
     arguments: dict[str, Any],
 ) -> None:
-    """Ask for a curve and judge it."""
+    """Request a curve and judge it."""
     _ask(nicmm.Designer(mesh), result, points, arguments)
 
 
@@ -334,7 +335,7 @@ def _ask(
         result.faults.append(f"energy or seconds are not finite: {design.energy}")
     if design.field.shape != (len(mesh.vertices),) or not np.isfinite(design.field).all():
         result.faults.append("the field has another shape or is not finite")
-    # Only the default method promises one curve.
+    # Only the default method guarantees one curve.
     if design.status is nicmm.Status.NOT_ONE_CURVE and arguments.get("method", "nicmm") != "nicmm":
         return design
     closed = bool(arguments.get("closed", True))
@@ -404,7 +405,7 @@ def _duplicate_faces(
 def _fins(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces between any vertices: edges of three and more faces."""
+    """Extra faces between random vertices, which give edges with three and more faces."""
     count = generator.integers(1, 5)
     fins = [generator.choice(np.unique(faces), 3, replace=False) for _ in range(count)]
     return vertices, np.concatenate([faces, fins])
@@ -413,7 +414,7 @@ def _fins(
 def _without_area(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Corners moved onto one another or onto the opposite edge."""
+    """Corners moved onto another corner or onto the opposite edge."""
     vertices = vertices.copy()
     for face in faces[generator.integers(len(faces), size=generator.integers(1, 5))]:
         a, b, c = generator.permutation(face)
@@ -425,7 +426,7 @@ def _without_area(
 def _soup(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Some faces with vertices of their own."""
+    """Some faces with separate copies of their vertices."""
     faces = faces.copy()
     for face in generator.integers(len(faces), size=generator.integers(1, len(faces) + 1)):
         vertices = np.concatenate([vertices, vertices[faces[face]]])
@@ -443,7 +444,7 @@ def _noise(
 def _flattened(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Squeezed along one or two axes, down to nothing."""
+    """Mesh scaled down along one or two axes, sometimes to zero."""
     factors = 10.0 ** generator.uniform(-18, 0, size=3)
     factors[generator.integers(3)] = 1.0
     return vertices * np.where(generator.random(3) < 0.1, 0.0, factors), faces
@@ -466,7 +467,7 @@ def _far_away(
 def _components(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """A second copy, apart, on the same place, or touching at one vertex."""
+    """A second copy of the mesh, at a distance or in the same place, possibly sharing a vertex."""
     shift = _chosen(generator, (0.0, 3.0, 1e-9))
     second = faces + len(vertices)
     if generator.random() < 0.5:
@@ -492,7 +493,7 @@ def _random_faces(
 def _snapped(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Positions on a coarse grid: coinciding, collinear and coplanar vertices."""
+    """Positions snapped to a coarse grid: coinciding, collinear and coplanar vertices."""
     step = generator.uniform(0.1, 1.0) * max(float(np.ptp(vertices)), 1e-300)
     return np.round(vertices / step) * step, faces
 
@@ -524,7 +525,7 @@ def _vertices_of_one_component(generator: np.random.Generator, mesh: nicmm.Mesh)
 def _some_arguments(
     generator: np.random.Generator, mesh: nicmm.Mesh, n_points: int
 ) -> dict[str, Any]:
-    """Arguments that are in order."""
+    """Valid arguments."""
     arguments: dict[str, Any] = {
         "closed": bool(generator.integers(2)),
         "order": _chosen(generator, ("given", "shortest")),
@@ -555,7 +556,7 @@ def _hostile_points(generator: np.random.Generator, mesh: nicmm.Mesh) -> Any:
             return np.full(count, corners[0])
         case 3:
             return generator.choice(corners, 1)
-        case 4:  # many for so few faces; more take long, to no other end
+        case 4:  # many points for so few faces; more would only take longer
             return generator.choice(corners, min(len(corners), MANY), replace=False)
         case 5:
             return generator.integers(len(mesh.vertices), size=10_000)
@@ -568,7 +569,7 @@ def _hostile_points(generator: np.random.Generator, mesh: nicmm.Mesh) -> Any:
             return nicmm.SurfacePoints(faces, _spoiled(generator, barycentric, NUMBERS))
         case 9:
             return nicmm.SurfacePoints(_spoiled(generator, faces, INDICES), barycentric)
-        case 10:  # next to one another, next to edges and corners
+        case 10:  # close to one another, to edges and to corners
             size = 10.0 ** generator.uniform(-16, -1, size=(count, 2))
             near = np.stack([1.0 - size.sum(axis=1), *size.T], axis=1)
             same = np.full(count, faces[0])
@@ -588,7 +589,7 @@ def _hostile_map(generator: np.random.Generator, mesh: nicmm.Mesh) -> Any:
             return np.full(count, _chosen(generator, NUMBERS))
         case 2:
             return _spoiled(generator, generator.random(count), NUMBERS)
-        case 3:  # forbids everything
+        case 3:  # blocks the whole surface
             return np.ones(count)
         case 4:
             return _cast(generator, np.ones(count))
@@ -632,7 +633,7 @@ def _chosen(generator: np.random.Generator, values: Sequence[Any]) -> Any:
 
 
 def _spoiled(generator: np.random.Generator, values: Any, replacements: Sequence[Any]) -> Any:
-    """Some entries replaced by any of the values."""
+    """Array with some entries replaced by some of the values."""
     spoiled = np.array(values)
     if spoiled.size == 0 or spoiled.dtype.kind not in "if":
         return spoiled
@@ -645,7 +646,7 @@ def _spoiled(generator: np.random.Generator, values: Any, replacements: Sequence
 
 
 def _cast(generator: np.random.Generator, values: Any) -> Any:
-    """The same as another type or in another shape."""
+    """The same values with another type, shape or memory order."""
     array = np.asarray(values)
     if array.dtype.kind not in "if":
         return array
@@ -668,7 +669,7 @@ def _cast(generator: np.random.Generator, values: Any) -> Any:
 
 
 def _mutated(generator: np.random.Generator, data: bytes, within: int | None = None) -> bytes:
-    """Bytes turned, cut, repeated or replaced by words; near the beginning if asked for."""
+    """Data with bytes changed, removed, repeated or inserted, optionally near the beginning."""
     for _ in range(generator.integers(1, 4)):
         end = max(1, min(len(data), within or len(data)))
         if within is None and generator.random() < 0.5:

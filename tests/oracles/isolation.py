@@ -1,4 +1,4 @@
-"""Work in a process of its own, so that a crash or a hang is a result like any other."""
+"""Runs work in separate processes, so that a crash or a hang is a result like any other."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Isolated(Generic[Item, Result]):
-    """What came of one item.
+    """Outcome of one item.
 
     Attributes
     ----------
     item : Item
+        Argument of the work.
     result : Result or None
-        None where the process died or was stopped.
+        Return value of the work; None if the process died or was killed.
     failure : str
-        How it died; empty where there is a result.
+        How the process ended; empty if there is a result.
     output : str
-        What was written to the terminal meanwhile, by Python or below it.
+        Text written to the terminal meanwhile, by Python or by compiled code.
     seconds : float
-        Of CPU time.
+        CPU time in seconds.
     """
 
     item: Item
@@ -50,17 +51,23 @@ def isolated(
     patience: float,
     memory: int | None = None,
 ) -> Iterator[Isolated[Item, Result]]:
-    """Do work on each item in a process of its own; another takes over where it dies.
+    """Process items one by one in a separate process, which is replaced if it dies.
 
     Parameters
     ----------
     work : callable
-        Of a module, since the process imports it. What it raises ends the process.
+        Module-level function, since the process imports it. An exception ends the process.
     items : iterable
+        Arguments of the work.
     patience : float
-        Seconds by the wall clock after which an item is given up.
+        Wall-clock time in seconds after which an item is given up.
     memory : int, optional
-        Bytes of address space that the process may have.
+        Limit on the address space of the process, in bytes.
+
+    Yields
+    ------
+    Isolated
+        Outcome of each item, in order.
     """
     process, connection = None, None
     try:
@@ -90,7 +97,7 @@ def isolated(
 def isolated_beside(
     work: Callable[[Item], Result], items: Iterable[Item], patience: float, workers: int
 ) -> Iterator[Isolated[Item, Result]]:
-    """`isolated`, by several processes at once; results come in the order of the items."""
+    """Like `isolated`, with several processes; outcomes come in the order of the items."""
     with concurrent.futures.ThreadPoolExecutor(workers) as threads:
         waiting: list[queue.Queue[Item | None]] = [queue.Queue() for _ in range(workers)]
         done: list[queue.Queue[Isolated[Item, Result]]] = [queue.Queue() for _ in range(workers)]
@@ -111,10 +118,10 @@ def isolated_beside(
 
 
 def _started(work: Callable[[Item], Result], memory: int | None) -> tuple[BaseProcess, Connection]:
-    # CPU seconds are those of one core: threads that wait for each other would count as well.
+    # One thread per library: busy waiting of other threads would count as CPU time.
     for library in ("OMP", "OPENBLAS", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    # A forked process would inherit the locks of PyTorch's threads.
+    # A forked process would inherit locks that threads of PyTorch hold.
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_work, args=(there, work, memory), daemon=True)
@@ -129,7 +136,7 @@ def _work(connection: Connection, work: Callable[[Item], Result], memory: int | 
     with tempfile.TemporaryFile() as terminal:
         for descriptor in (1, 2):
             os.dup2(terminal.fileno(), descriptor)
-        with contextlib.suppress(EOFError):  # the other side has no more items
+        with contextlib.suppress(EOFError):  # the parent has no more items
             while True:
                 item = connection.recv()
                 started = time.process_time()
@@ -139,8 +146,8 @@ def _work(connection: Connection, work: Callable[[Item], Result], memory: int | 
 
 
 def _written(terminal: BinaryIO) -> str:
-    """What has been written, which is then forgotten."""
-    # Python's own buffers are written line by line to a terminal only.
+    """Text written since the last call."""
+    # Python flushes line by line only to a real terminal.
     import sys
 
     sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""Third-party meshes in collections beside the project."""
+"""Finds the third-party meshes, which are kept in collections outside the project."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from pathlib import Path
 from nicmm_core.io.files import MESH_FORMATS
 
 COLLECTIONS = Path(__file__).resolve().parents[3] / "shared" / "meshes"
-"""Third-party meshes are no part of the project; each has its own licence."""
+"""Folder of the third-party meshes, which are not part of the project; each has its licence."""
 
 INDEX = COLLECTIONS / "index.csv"
-"""The list of them."""
+"""List of the third-party meshes."""
 
 
 def mesh_files(folder: str) -> list[Path]:
-    """Mesh files of a collection, sorted; stops with a message if it has no such file."""
+    """Sorted mesh files of a collection; raises SystemExit with a message if there are none."""
     root = COLLECTIONS / folder
     files = sorted(path for path in root.rglob("*") if path.suffix.lower() in MESH_FORMATS)
     if not files:
@@ -23,5 +23,5 @@ def mesh_files(folder: str) -> list[Path]:
 
 
 def spread(files: list[Path], count: int) -> list[Path]:
-    """About as many of the files, evenly spread."""
+    """About ``count`` of the files, evenly spread over the list; never more."""
     return files[:: max(1, len(files) // count)][:count]

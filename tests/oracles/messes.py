@@ -1,7 +1,7 @@
-"""Non-manifold messes: surfaces whose vertices have been welded, and worse, and curves on them.
+"""Generates random non-manifold meshes ("messes") with a request on each, and judges the answers.
 
-A mess is a number. `answer` draws it and says what was wrong with what came: either a good curve,
-by `checker`, or an error that `feasibility` finds due.
+A mess is identified by a number. `answer` generates it and lists the faults of the answer, which
+must be a good curve according to `checker`, or an error that is due according to `feasibility`.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from .untyped import place_of
 SEED = 17
 
 MOST_WELDED = 40
-"""Pairs of vertices that are welded at most."""
+"""Greatest number of welded pairs of vertices per operation."""
 
 MOST_POINTS = 12
 
 NEAR = 3
-"""Edges between two vertices that are near each other, at most."""
+"""Greatest number of edges between two vertices that count as near each other."""
 
 GOOD, DUE, CAPPED = "good curve", "error where due", "work limit"
 ORDER = "another order named"
 WRONG = "wrong"
 
-CAP_WORDS = "winds round itself too often"
-"""In the message of a path that has reached the cap on its splits, the one cap that declines."""
+CAP_WORDS = "winds around itself too often"
+"""Part of the message for a path that reaches the cap on splits, the only cap that declines."""
 
 
 @dataclass
 class Answer:
-    """What a mess was and what came of it."""
+    """Kind of a mess, and outcome and faults of the answer."""
 
     kind: str
     outcome: str = ""
@@ -54,7 +54,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Mess:
-    """A mesh and what is asked for on it."""
+    """A mesh, and the request on it."""
 
     kind: str
     mesh: nicmm.Mesh
@@ -63,12 +63,12 @@ class Mess:
 
 
 def answer(number: int) -> Answer:
-    """The mess of a number and what came of it."""
+    """Answer to the mess with a number."""
     return judged(mess(number))
 
 
 def judged(asked: Mess) -> Answer:
-    """Ask for the curve and judge what comes."""
+    """Request the curve and judge the answer."""
     mesh, points, arguments = asked.mesh, asked.points, asked.arguments
     result = Answer(asked.kind)
     with warnings.catch_warnings():
@@ -79,7 +79,7 @@ def judged(asked: Mess) -> Answer:
             result.outcome, fault = _of_error(asked, error)
             result.faults += fault
             return result
-        # Anything else is what is looked for.
+        # Any other exception is a finding.
         except Exception as error:
             result.outcome = WRONG
             result.faults.append(f"{type(error).__name__} at {place_of(error)}: {error}"[:300])
@@ -94,7 +94,7 @@ def judged(asked: Mess) -> Answer:
 
 
 def _of_error(asked: Mess, error: nicmm.NicmmError) -> tuple[str, list[str]]:
-    """What an error is, and what is wrong about it."""
+    """Outcome that an error means, and its faults."""
     obstacles = asked.arguments.get("obstacles")
     if why_impossible(asked.mesh, asked.points, obstacles):
         return DUE, []
@@ -108,9 +108,9 @@ def _of_error(asked: Mess, error: nicmm.NicmmError) -> tuple[str, list[str]]:
 
 
 def _of_order(asked: Mess, message: str) -> tuple[str, list[str]]:
-    """Whether a refused order is answered with another one that leads to a good curve.
+    """Whether the message about a refused order names another order that gives a good curve.
 
-    One exists, and whether the refused one does is not decided here.
+    Such an order always exists. Whether the refused order is impossible is not decided here.
     """
     named = re.search(r"in the order \[([\d, ]+)\], which works", message)
     if named is None:
@@ -124,7 +124,7 @@ def _of_order(asked: Mess, message: str) -> tuple[str, list[str]]:
 
 
 def mess(number: int) -> Mess:
-    """The mess of a number."""
+    """Mess with a number."""
     generator = np.random.default_rng([SEED, number])
     name, base = _bases()[generator.integers(len(_bases()))]
     vertices, faces = base.vertices.copy(), base.faces.copy()
@@ -143,7 +143,7 @@ def mess(number: int) -> Mess:
 
 
 def most_faces() -> int:
-    """Of the surfaces that messes are made from."""
+    """Greatest number of faces of the surfaces that messes are made from."""
     return max(len(mesh.faces) for _, mesh in _bases())
 
 
@@ -174,7 +174,7 @@ Operation = Callable[[np.random.Generator, FloatArray, IntArray], tuple[FloatArr
 def _welded(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Random pairs of vertices made one."""
+    """Weld random pairs of vertices."""
     used = np.unique(faces)
     pairs = generator.choice(used, (_count(generator, 1, MOST_WELDED), 2))
     return vertices, _merged(len(vertices), faces, pairs)
@@ -183,7 +183,7 @@ def _welded(
 def _welded_nearby(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Vertices made one with others a few edges away: fins, fans and pinches."""
+    """Weld vertices to others a few edges away, which gives fins, fans and pinched vertices."""
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     size = len(vertices)
     graph = sparse.csr_array((np.ones(len(edges)), edges.T), shape=(size, size))
@@ -199,7 +199,7 @@ def _welded_nearby(
 def _extra_faces(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces between any vertices."""
+    """Add faces between random vertices."""
     used = np.unique(faces)
     if len(used) < 3:
         return vertices, faces
@@ -210,7 +210,7 @@ def _extra_faces(
 def _fins(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces on edges that are there, with a vertex that is there."""
+    """Add faces between existing edges and random vertices."""
     used = np.unique(faces)
     chosen = faces[generator.integers(len(faces), size=_count(generator, 1, 12))][:, :2]
     added = np.column_stack([chosen, generator.choice(used, len(chosen))])
@@ -220,7 +220,7 @@ def _fins(
 def _doubled(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces that are there twice, turned or not."""
+    """Duplicate faces, with the same or the opposite orientation."""
     again = faces[generator.integers(len(faces), size=_count(generator, 1, 12))]
     return vertices, np.concatenate([faces, again[:, generator.permutation(3)]])
 
@@ -228,7 +228,7 @@ def _doubled(
 def _turned(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces of the other orientation."""
+    """Reverse the orientation of faces."""
     turned = generator.random((len(faces), 1)) < generator.uniform(0.02, 0.5)
     return vertices, np.where(turned, faces[:, ::-1], faces)
 
@@ -236,14 +236,14 @@ def _turned(
 def _dropped(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Faces that are missing, so that vertices may belong to none."""
+    """Remove faces, so that some vertices may belong to no face."""
     return vertices, faces[generator.random(len(faces)) > generator.uniform(0.0, 0.25)]
 
 
 def _with_loose_parts(
     generator: np.random.Generator, vertices: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Vertices of no face, and a second surface."""
+    """Add vertices without faces, and a second surface."""
     loose = generator.standard_normal((_count(generator, 1, 5), 3))
     other = _bases()[generator.integers(len(_bases()))][1]
     first = len(vertices) + len(loose)
@@ -263,13 +263,13 @@ _OPERATIONS: tuple[Operation, ...] = (
     _turned,
     _dropped,
 )
-"""Drawn from, one after the other."""
+"""Operations to choose from at random; frequent ones are repeated."""
 
 
 def _request(
     generator: np.random.Generator, mesh: nicmm.Mesh
 ) -> tuple[nicmm.SurfacePoints, dict[str, Any]]:
-    """Points, mostly of one part of the surface, and how the curve is to pass them."""
+    """Points, mostly on one part of the surface, and the other arguments of the request."""
     closed = bool(generator.random() < 0.6)
     fewest = 3 if closed else 2
     count = _count(generator, fewest, MOST_POINTS)
@@ -296,7 +296,7 @@ def _request(
 
 
 def _obstacles(generator: np.random.Generator, mesh: nicmm.Mesh) -> FloatArray:
-    """One or two balls of weight 1, or of less."""
+    """One or two balls of weight 1 or of a lower weight."""
     weights = np.zeros(len(mesh.vertices))
     for _ in range(_count(generator, 1, 2)):
         centre = mesh.vertices[generator.choice(np.unique(mesh.faces))]
@@ -307,7 +307,7 @@ def _obstacles(generator: np.random.Generator, mesh: nicmm.Mesh) -> FloatArray:
 
 
 def _count(generator: np.random.Generator, least: int, most: int) -> int:
-    """A whole number, small ones as often as large ones by the logarithm."""
+    """Random integer whose logarithm is about uniformly distributed."""
     if most <= least:
         return least
     drawn = np.exp(generator.uniform(np.log(least), np.log(most + 1)))
@@ -315,7 +315,7 @@ def _count(generator: np.random.Generator, least: int, most: int) -> int:
 
 
 def _merged(size: int, faces: IntArray, pairs: IntArray) -> IntArray:
-    """Faces in which the second vertex of each pair is the first, without those that vanish."""
+    """Faces after each pair of vertices is welded, without those that become degenerate."""
     number = np.arange(size)
     for one, other in pairs.tolist():
         number[number == number[other]] = number[one]
@@ -323,5 +323,5 @@ def _merged(size: int, faces: IntArray, pairs: IntArray) -> IntArray:
 
 
 def _without_repetition(faces: IntArray) -> IntArray:
-    """Faces that name three different vertices."""
+    """Faces with three different vertices."""
     return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]

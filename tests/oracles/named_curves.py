@@ -1,6 +1,6 @@
-"""Closed curves that have a name: round tubes, handles and holes, and along a one-sided strip.
+"""Closed curves of known topology: around tubes, handles and holes, and along a Möbius strip.
 
-None of them bounds a region, except together with others or with a rim.
+None of them bounds a region alone, without other curves or a boundary.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nicmm_core.geometry.mesh import Mesh
 
 @dataclass(frozen=True)
 class NamedCurve:
-    """What is asked for: vertices to visit in an order that `nicmm_core.design_curve` knows."""
+    """Request for a curve: vertices to visit, and the argument `order` of `design_curve`."""
 
     name: str
     mesh: Mesh
@@ -26,7 +26,7 @@ class NamedCurve:
 
 
 def named_curves() -> Iterator[NamedCurve]:
-    """All of them, on generated shapes."""
+    """All named curves, on generated shapes."""
     ring = shapes.torus(around=72, across=36)
     for name, along, across, count in (
         ("meridian of a torus", 0, 1, 3),
@@ -47,9 +47,10 @@ def named_curves() -> Iterator[NamedCurve]:
 
 
 def torus_points(mesh: Mesh, along: int, across: int, count: int) -> IntArray:
-    """Vertices on the curve that winds ``along`` times round the axis and ``across`` the tube.
+    """Vertices on a curve that winds around the axis and around the tube of a torus.
 
-    The mesh is `shapes.torus` with its default radii.
+    It winds ``along`` times around the axis and ``across`` times around the tube. The mesh is
+    `shapes.torus` with its default radii.
     """
     t = np.arange(count) * 2 * np.pi / count
     u, v = along * t, across * t
@@ -60,9 +61,9 @@ def torus_points(mesh: Mesh, along: int, across: int, count: int) -> IntArray:
 
 
 def handle_points(mesh: Mesh, half: float) -> IntArray:
-    """Vertices of `shapes.double_torus` through a hole and back on the outside.
+    """Vertices of `shapes.double_torus` on a curve through a hole and back on the outside.
 
-    Its left handle is that with ``half`` -1, its right one that with 1.
+    ``half`` is -1 for the left handle and 1 for the right one.
     """
     plane = np.abs(mesh.vertices[:, 1]) < 0.08
     candidates = np.flatnonzero(plane & (half * mesh.vertices[:, 0] > 0.2))
@@ -76,7 +77,7 @@ def handle_points(mesh: Mesh, half: float) -> IntArray:
 
 
 def nearest_vertices(mesh: Mesh, positions: FloatArray) -> IntArray:
-    """Index of the vertex nearest to each position."""
+    """Index of the nearest vertex of each position."""
     offset = mesh.vertices[None] - np.asarray(positions)[:, None]
     return np.linalg.norm(offset, axis=2).argmin(axis=1)
 

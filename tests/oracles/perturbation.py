@@ -1,4 +1,4 @@
-"""Nearly degenerate faces put into a good mesh, as in section 4.6."""
+"""Perturbs a good mesh so that it has nearly degenerate faces, as in section 4.6 of the paper."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 
 LEAST_FRACTION, GREATEST_FRACTION = 0.5, 0.9
-"""[s_min, s_max]: displacements relative to the opposite edge, which the paper does not give.
+"""Displacement relative to the opposite edge, [s_min, s_max]; the paper does not give its values.
 
-The height of an even triangle is 0.87 of its edge, so these bring its corner near that edge.
+The height of an equilateral triangle is 0.87 of its edge, so these values move a corner close to
+the opposite edge.
 """
 
 LEAST_ANGLE = 1.0
-"""Degrees, the paper's example; a face that would have a smaller one stays as it is."""
+"""Least angle in degrees, as in the example of the paper; moves that violate it are discarded."""
 
 LEAST_PROXIMITY = 0.01
-"""Nearest that a vertex may come to another, in mean edge lengths."""
+"""Least distance between two vertices, in mean edge lengths."""
 
 
 def perturbed(
@@ -26,25 +27,27 @@ def perturbed(
 ) -> tuple[Mesh, int]:
     """Move one vertex of one face in every ``every`` towards or away from its opposite edge.
 
-    The vertex moves in the plane of the face, across the edge, by a random fraction of the edge's
-    length, and is projected back onto the face. The move is discarded if it brings the vertex too
-    near to another, or the face an angle that is too small.
+    The vertex moves in the plane of the face, perpendicularly to the edge, by a random fraction of
+    the length of the edge, and is projected back onto the face. The move is discarded if it brings
+    the vertex too close to another one or gives the face too small an angle.
 
     Parameters
     ----------
     mesh : Mesh
+        Good mesh.
     every : int
-        1 tries every face.
+        Number of faces per selected face; with 1, every face is selected.
     generator : numpy.random.Generator
+        Source of the random choices.
     kept : (k,) int array
-        Vertices that stay where they are: the control points.
+        Vertices that do not move, such as control points.
 
     Returns
     -------
     Mesh
-        With the same faces.
+        Perturbed mesh with the same faces.
     int
-        Number of vertices moved.
+        Number of moved vertices.
     """
     vertices = mesh.vertices.copy()
     proximity = LEAST_PROXIMITY * mesh.mean_edge_length
@@ -79,7 +82,7 @@ def angles(triangles: FloatArray) -> FloatArray:
 
 
 def _displaced(triangle: FloatArray, fraction: float) -> FloatArray:
-    """The first corner moved across the opposite edge, then to the nearest point of the face."""
+    """First corner, moved perpendicularly to the opposite edge and projected to the triangle."""
     edge = triangle[2] - triangle[1]
     across = triangle[0] - triangle[1]
     across -= edge * (across @ edge) / (edge @ edge)

@@ -1,4 +1,4 @@
-"""The verdict against curves that are wrong in one known way, and against plain geometry."""
+"""Tests the checker on curves with one known fault, and against elementary geometry."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -12,12 +12,12 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from tests.oracles.checker import judge, judge_curve
 
-# Two triangles that share the edge 0-2.
+# Two triangles that share the edge (0, 2).
 SQUARE = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 
 
 def on_square(places, closed=True, controls=(), lower=None):
-    """A curve on the square; points of its diagonal are named in the lower face where given."""
+    """A curve on the square; ``lower`` selects the face for points on the diagonal."""
     places = np.asarray(places, dtype=float)
     x, y = places.T
     below = x > y if lower is None else np.where(x == y, lower, x > y)
@@ -31,7 +31,7 @@ def on_square(places, closed=True, controls=(), lower=None):
 
 
 def contacts(curve):
-    """Points passed twice, crossings and touchings of a curve that is right otherwise."""
+    """Repeated points, crossings and touchings of a curve without other faults."""
     verdict = judge_curve(SQUARE, curve, closed=curve.closed)
     assert not verdict.off_surface
     return verdict.points_twice, verdict.crossings, verdict.touchings
@@ -74,7 +74,7 @@ class TestSelfContacts:
 
     @pytest.mark.parametrize("lower", [True, False])
     def test_a_point_that_touches_a_strand_along_an_edge(self, lower):
-        """The strand is named in the lower face, the point that touches it in either."""
+        """The strand is given in the lower face, and the point that touches it in either face."""
         places = [[0.25, 0.25], [0.75, 0.75], [0.5, 0.75], [0.5, 0.5], [0.25, 0.5]]
         curve = on_square(places, lower=[True, True, False, lower, False])
         assert contacts(curve) == (0, 0, 1)
@@ -91,7 +91,7 @@ class TestSelfContacts:
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_same_verdict_as_plain_geometry(self, closed):
-        """Random polygons on a coarse grid, where touching is as common as crossing."""
+        """Random polygons on a coarse grid, on which touching is as common as crossing."""
         generator = np.random.default_rng(3)
         counts = {True: 0, False: 0}
         for _ in range(400):
@@ -108,7 +108,7 @@ class TestSelfContacts:
 
 
 def crossing_points(corners, closed):
-    """A polygon with a point where a side crosses the diagonal, so that every chord has a face."""
+    """Polygon with points where it crosses the diagonal, so that each chord lies in one face."""
     places = []
     ends = np.roll(corners, -1, axis=0) if closed else corners[1:]
     for start, end in zip(corners, ends, strict=False):
@@ -121,7 +121,7 @@ def crossing_points(corners, closed):
 
 
 def is_simple(places, closed):
-    """Whether no two sides of a polygon have more in common than a polygon's neighbours do."""
+    """Whether no two sides of a polygon meet, except consecutive sides at their common corner."""
     exact = [tuple(Fraction(float(x)) for x in place) for place in places]
     n = len(exact)
     sides = [(exact[i], exact[(i + 1) % n]) for i in range(n if closed else n - 1)]
@@ -130,7 +130,7 @@ def is_simple(places, closed):
     for (i, first), (j, second) in combinations(enumerate(sides), 2):
         common = set(first) & set(second)
         if common:
-            # Neighbours: neither other end may lie on the other side.
+            # For consecutive sides, the free end of one must not lie on the other.
             (p,) = set(first) - common or {None}
             (q,) = set(second) - common or {None}
             if p is None or q is None or lies_on(p, second) or lies_on(q, first):
@@ -180,7 +180,7 @@ class TestSurface:
         assert judge_curve(strip, corner, closed=False).chords_off_face == 1
 
     def test_a_chord_round_an_empty_triangle(self):
-        """Three edges that bound no face of the mesh: a hole."""
+        """Three edges around a hole, which do not bound a face of the mesh."""
         faces = [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
         open_tetrahedron = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces)
         middles = np.array([[0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, 0.5, 0]])
@@ -253,7 +253,7 @@ class TestControlPoints:
 
 @pytest.mark.slow
 def test_a_curve_on_a_large_mesh():
-    """Along a parallel of a torus through vertices, and across it half an edge beside."""
+    """Curves along a parallel of a torus: through vertices, and through midpoints beside it."""
     mesh = shapes.torus(around=500, across=120)
     assert len(mesh.faces) > 100_000
     along = np.arange(500) * 120
@@ -269,7 +269,7 @@ def test_a_curve_on_a_large_mesh():
 
 
 def curve_through(mesh, corners):
-    """A closed curve through the middles of vertices or edges, (n, 1) or (n, 2)."""
+    """A closed curve through vertices (n, 1), or through the midpoints of edges (n, 2)."""
     around = {
         v: set(mesh.vertex_faces[[v]].indices.tolist()) for v in set(corners.ravel().tolist())
     }

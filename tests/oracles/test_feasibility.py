@@ -1,4 +1,4 @@
-"""The judge of errors is independent of the core, so it is tried by itself."""
+"""Tests `feasibility`, which decides independently of the core whether a curve exists."""
 
 import numpy as np
 import pytest

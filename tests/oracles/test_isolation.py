@@ -1,4 +1,4 @@
-"""Work in processes of its own: what became of each item is known, whatever happened."""
+"""Tests isolated work: every item has an outcome, even after a crash or a hang."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The perturbation of section 4.6 does what it says and is the same for the same seed."""
+"""Tests that the perturbation of section 4.6 degrades a mesh as described, and is reproducible."""
 
 import numpy as np
 

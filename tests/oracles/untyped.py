@@ -1,4 +1,4 @@
-"""Where an error that is not the package's own came from."""
+"""Origin of exceptions that are not errors of the package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def place_of(error: Exception) -> str:
-    """File and line that raised an error."""
+    """File name and line that raised an exception."""
     trace, place = error.__traceback__, ""
     while trace is not None:
         place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"

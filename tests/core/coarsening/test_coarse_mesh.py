@@ -1,4 +1,4 @@
-"""The dual of Voronoi cells is a mesh of the same surface, whatever the fine mesh is like."""
+"""Tests that the dual of Voronoi cells is a mesh of the same surface, for any fine mesh."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_a_disc_stays_a_disc(flat_disc):
 
 @pytest.mark.parametrize("origin", [0.0, 1e4])
 def test_on_a_square_grid_three_seeds_in_a_row_are_a_face_with_area(origin):
-    """Gradients on one without are not finite."""
+    """On a face without area gradients would not be finite."""
     square = grid(63)
     square = nicmm.Mesh(square.vertices + origin, square.faces)
     coarse = coarse_mesh(square, 2048)
@@ -74,7 +74,7 @@ def test_two_sides_of_a_plate_have_cells_of_their_own():
     plate = nicmm.Mesh(flat.vertices * [1.0, 1.0, 0.002], flat.faces)
     coarse = coarse_mesh(plate, 300)
     assert euler_characteristic(coarse.mesh.faces) == 2
-    # No cell reaches through: its vertices lie on the side of its seed, but for the rim.
+    # No cell extends through the plate: except at the rim, its vertices lie on the seed's side.
     middle = np.linalg.norm(plate.vertices[:, :2], axis=1) < 0.8
     sides = np.sign(plate.vertices[:, 2])
     assert (sides[middle] == sides[coarse.seed[coarse.cell[middle]]]).all()
@@ -116,7 +116,7 @@ def test_points_are_found_in_their_cells():
     points = SurfacePoints(chosen, np.full((20, 3), 1.0 / 3.0))
     found = coarse.nearest_points(mesh, points)
     apart = np.linalg.norm(found.positions(coarse.mesh) - points.positions(mesh), axis=1)
-    # The height of a cap over a face with sides of about 0.2 radii.
+    # The height of a spherical cap over a face with sides of about 0.2 radii.
     assert apart.max() < 0.02
     assert found.barycentric.min() >= 0.0
     np.testing.assert_allclose(found.barycentric.sum(axis=1), 1.0)

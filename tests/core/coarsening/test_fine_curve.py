@@ -1,4 +1,4 @@
-"""A curve on the coarse mesh is mapped to the fine one, through the points themselves."""
+"""Tests that curves on the coarse mesh are mapped to the fine mesh, through the exact points."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tests.core.checks import assert_valid_curve
 
 
 def curves_through(mesh, chosen, closed):
-    """The coarse mesh, a curve on it and the same on the fine mesh."""
+    """Coarse mesh, a curve on it, and the curve mapped to the fine mesh."""
     normals = unsigned_normals(mesh)
     coarse = build_coarse_mesh(mesh, normals, 0, 600)
     points = locate_control_points(mesh, chosen, closed)
@@ -27,7 +27,7 @@ def curves_through(mesh, chosen, closed):
 
 
 def rough_sphere():
-    """A sphere with needles and dents, on which straight traces get lost."""
+    """A sphere with needles and dents, on which straight traces fail."""
     generator = np.random.default_rng(4)
     fine = shapes.sphere(5)
     return nicmm.Mesh(

@@ -1,4 +1,4 @@
-"""On a large mesh nothing but the relaxation and single passes over its arrays is done."""
+"""Tests that a large mesh itself is used only in the relaxation and in passes over its arrays."""
 
 import tracemalloc
 
@@ -15,13 +15,13 @@ from tests.core.checks import assert_valid_design, grid
 
 @pytest.fixture(scope="module")
 def large():
-    """A body with limbs of 51,202 vertices."""
+    """A body with limbs and 51,202 vertices."""
     return shapes.creature(5, faces=400, subdivisions=4)
 
 
 @pytest.fixture
 def unknowns(monkeypatch):
-    """Sizes of all systems that are factorised."""
+    """Sizes of all matrices that are factorised."""
     sizes = []
     plain = sparse_solver.linalg.splu
 
@@ -95,7 +95,7 @@ def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch):
 
 @pytest.mark.slow
 def test_points_in_one_cell_are_told_apart(large):
-    # A vertex and its neighbours: the cells are far larger than that.
+    # A vertex and two of its neighbours; the cells are much larger.
     around = np.unique(large.faces[large.vertex_faces[[1000]].indices])
     design = nicmm.design_curve(large, around[:3])
     assert_valid_design(large, design)
@@ -104,7 +104,8 @@ def test_points_in_one_cell_are_told_apart(large):
 @pytest.mark.slow
 def test_given_order_and_via_points_hold_on_large_meshes():
     ring = shapes.torus(around=240, across=120)
-    # Three points on the outside, joined around the axis: the long way by via points, or the short.
+    # Three points on the outside of a torus: the last leg takes the short way around the axis or,
+    # with a via point, the long one.
     angle = np.arctan2(ring.vertices[:, 1], ring.vertices[:, 0])
     outside = np.linalg.norm(ring.vertices[:, :2], axis=1) > 1.39
     at = [int(np.flatnonzero(outside)[np.abs(angle[outside] - a).argmin()]) for a in (0, 0.5, 1.0)]

@@ -1,4 +1,4 @@
-"""Whole courses: simple, through the control points, and the best with the least energy."""
+"""Tests that courses are simple and pass their control points, and which of them is the best."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,12 @@ from nicmm_core import shapes
 from nicmm_core.courses import course_surface
 from nicmm_core.courses.course_search import farthest_between, find_courses
 from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
-from nicmm_core.courses.leg_combinations import CROSSING, combined, crossing_routes, laid_routes
+from nicmm_core.courses.leg_combinations import (
+    CROSSING,
+    cheapest_combinations,
+    crossing_routes,
+    nodes_on_routes,
+)
 from nicmm_core.courses.leg_routes import routes_of_legs
 from nicmm_core.geometry.refinement import refined
 from nicmm_core.relaxation.curve_nodes import curve_surface
@@ -26,7 +31,7 @@ def body():
 def test_combinations_that_cross_cost_more(body):
     graph = graph_through(body, body.vertices[[5, 100, 700]])
     routes = routes_of_legs(graph, LEGS, closed=True)
-    nodes = laid_routes(graph, routes, 1.0)
+    nodes = nodes_on_routes(graph, routes, 1.0)
     traces = traces_between_nodes(graph.graph.surface, nodes)
     crosses = crossing_routes(graph, routes, nodes, traces)
     assert crosses.any() and not crosses.all()
@@ -37,9 +42,9 @@ def test_combinations_that_cross_cost_more(body):
         one, other = np.triu_indices(3)
         return crosses[chosen[:, one], chosen[:, other]].sum(axis=1)
 
-    found = combined(graph, routes, crosses, closed=True)
+    found = cheapest_combinations(graph, routes, crosses, closed=True)
     assert (np.diff(found.cost) >= 0.0).all()
-    free = combined(graph, routes, np.zeros_like(crosses), closed=True)
+    free = cheapest_combinations(graph, routes, np.zeros_like(crosses), closed=True)
     price = CROSSING * sum(leg.cost.min() for leg in routes)
     without = {
         tuple(choice): cost for choice, cost in zip(free.choice.tolist(), free.cost, strict=True)
@@ -54,7 +59,7 @@ def test_combinations_that_cross_cost_more(body):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_courses_pass_their_points(body, closed):
-    """In the order given, or as the numbers at their nodes say."""
+    """In the given order, or in the order of the indices at the nodes."""
     surface = curve_surface(body)
     points = random_surface_points(body, 4, seed=3)
     graph, fixed = build_hop_graph(surface, 0), np.ones(4, dtype=bool)
@@ -88,7 +93,7 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
 
 @pytest.mark.slow
 def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
-    """By the geometric mean over some bodies; single ones may bend more."""
+    """In the geometric mean over some bodies; on single bodies they may bend more."""
 
     def total(seed):
         mesh = shapes.creature(seed, resolution=32, faces=1500)

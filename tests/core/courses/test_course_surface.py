@@ -1,4 +1,4 @@
-"""Where courses are sought: the density of edges, and meshes of needles."""
+"""Tests of the surfaces on which courses are searched for: edge density, and needle meshes."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from tests.core.checks import assert_valid_design
 
 
 def test_edges_crossed_are_counted_by_random_lines():
-    """Edges of a grid that straight lines in the plane cross, on the average."""
+    """Compared with the mean number of mesh edges that random segments in the plane cross."""
     n = 40
     disc = shapes.disc(n)
     generator = np.random.default_rng(1)
@@ -32,7 +32,7 @@ def test_edges_crossed_are_counted_by_random_lines():
 
 @pytest.mark.slow
 def test_no_courses_are_sought_on_needles():
-    """A prism whose sides are divided into thousands of slivers still gets its curve."""
+    """A prism whose sides consist of thousands of slivers still gets a curve."""
     count = 2_500
     angle = 2.0 * np.pi * np.arange(count) / count
     low = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])

@@ -1,11 +1,11 @@
-"""The hop graph: its costs, their symmetry, and what they say about straight and bent courses."""
+"""Tests of the hop graph: symmetry of its costs, straight and bent courses, and routes."""
 
 import numpy as np
 import pytest
 
 from nicmm_core import shapes
 from nicmm_core.courses.hop_graph import (
-    SHARPEST,
+    SHARPEST_TURN,
     build_hop_graph,
     distances_along_edges,
     with_control_points,
@@ -45,12 +45,12 @@ def test_a_path_and_its_reverse_cost_the_same(name, request):
 
 @pytest.mark.parametrize("name", ["on_square", "on_body"])
 def test_the_best_leg_by_any_of_its_states_is_the_same(name, request):
-    """Paths from both ends meet in every state of the best leg."""
+    """Paths from both ends meet in every state of the best leg, with the same total cost."""
     graph = request.getfixturevalue(name)
     for start, end in LEGS:
         total = graph.by_state(start, end)
-        arrivals = np.flatnonzero(graph.hops.end == graph.n_cells + end)
-        departures = np.flatnonzero(graph.hops.start == graph.n_cells + start)
+        arrivals = np.flatnonzero(graph.hops.end == len(graph.graph.vertex) + end)
+        departures = np.flatnonzero(graph.hops.start == len(graph.graph.vertex) + start)
         best = total[np.isfinite(total)].min()
         assert total[arrivals].min() == pytest.approx(best)
         assert total[departures].min() == pytest.approx(best)
@@ -58,7 +58,7 @@ def test_the_best_leg_by_any_of_its_states_is_the_same(name, request):
 
 def test_a_straight_leg_costs_at_least_its_length_and_not_much_more(on_square):
     for start, end in LEGS:
-        places = on_square.positions[on_square.n_cells :]
+        places = on_square.positions[len(on_square.graph.vertex) :]
         straight = on_square.tension * np.linalg.norm(places[start] - places[end])
         least = on_square.by_state(start, end).min()
         assert straight <= least <= 2.0 * straight
@@ -70,14 +70,14 @@ def test_routes_run_along_hops_and_are_simple(on_body):
     for leg in routes:
         assert len(leg.cells) > 5
         for path in leg.cells:
-            assert path[0] == on_body.n_cells + leg.start
-            assert path[-1] == on_body.n_cells + leg.end
+            assert path[0] == len(on_body.graph.vertex) + leg.start
+            assert path[-1] == len(on_body.graph.vertex) + leg.end
             assert len(np.unique(path)) == len(path)
             assert set(zip(path[:-1].tolist(), path[1:].tolist(), strict=True)) <= hops
 
 
 def test_routes_pass_a_tube_on_both_sides():
-    """On a torus, both ways round the hole and round the tube are among the routes."""
+    """On a torus, routes pass the hole on either side."""
     torus = shapes.torus(around=48, across=24)
     angle = np.array([0.0, 0.8 * np.pi])
     radius = np.linalg.norm(torus.vertices[:, :2], axis=1).max()
@@ -104,9 +104,9 @@ def test_no_hop_goes_on_with_a_turn_sharper_than_allowed_and_others_do(body):
     indptr, after, _ = graph.arcs
     before = np.repeat(np.arange(len(graph.reverse)), np.diff(indptr))
     cosine = (graph.hops.arriving[before] * graph.hops.leaving[after]).sum(axis=1)
-    assert (cosine >= np.cos(SHARPEST) - 1e-12).all()
+    assert (cosine >= np.cos(SHARPEST_TURN) - 1e-12).all()
     assert (cosine < 0.0).any()
-    # Every hop that turns less follows: as many pairs as among all hops from the same cell.
+    # All pairs of consecutive hops with a smaller turn are arcs of the graph.
     pairs = graph.hops.end[:, None] == graph.hops.start
     turns = np.einsum("ad,bd->ab", graph.hops.arriving, graph.hops.leaving)
-    assert np.count_nonzero(pairs & (turns >= np.cos(SHARPEST))) == len(after)
+    assert np.count_nonzero(pairs & (turns >= np.cos(SHARPEST_TURN))) == len(after)

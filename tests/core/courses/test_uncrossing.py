@@ -1,4 +1,4 @@
-"""Crossings removed: all nodes stay, control points keep their order, and no step crosses."""
+"""Tests that uncrossing removes crossings and keeps all nodes and the order of control points."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def with_controls(count, numbers):
 
 
 def crossings_in_plane(points, closed):
-    """Pairs of segments of a polyline in the plane, (n, 2), that cross; by signed areas."""
+    """Pairs of crossing segments of a polyline (n, 2) in the plane, by signed areas."""
     n = len(points)
     ends = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
 
@@ -52,12 +52,12 @@ def test_a_figure_of_eight_becomes_a_loop(surface):
     eight = np.column_stack([0.7 * np.sin(t), 0.5 * np.sin(2.0 * t)])
     nodes = nodes_on_disc(surface, eight, True)
     assert not simple_curves(surface, nodes)[0]
-    # One control point on each side: the order stays what it is.
+    # With one control point in each half, the order does not change.
     visit = with_controls(40, [0, 25])
     found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
     assert simple_curves(surface, found)[0] and simple[0]
     assert passed[passed >= 0].tolist() == [0, 1]
-    # Two on each side: no loop can be passed in the other direction.
+    # With two in each half, no loop can be passed in the other direction.
     visit = with_controls(40, [0, 8, 25, 33])
     found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
     np.testing.assert_array_equal(passed, visit)
@@ -69,7 +69,7 @@ def test_a_figure_of_eight_becomes_a_loop(surface):
 
 @pytest.mark.parametrize("opposite", [False, True])
 def test_strands_that_cross_twice_exchange_their_parts(surface, opposite):
-    """An open curve along a wave, then back beside it or round and along it again."""
+    """An open curve along a wave that returns beside it, or goes round and along it once more."""
     x = np.linspace(-0.7, 0.7, 29)
     there = np.column_stack([x, 0.15 * np.cos(2.2 * x / 0.7) + 0.011])
     back = np.column_stack([x[::-1], np.full(29, 0.02)])
@@ -86,7 +86,7 @@ def test_strands_that_cross_twice_exchange_their_parts(surface, opposite):
     found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
     assert simple_curves(surface, found)[0] and simple[0]
     assert passed[passed >= 0].tolist() == list(range(6))
-    # A control point on a part fixes the crossings.
+    # A control point on each part between the crossings prevents the exchange.
     visit = with_controls(n, [0, 1, 14, 28, 29, n - 15, n - 2, n - 1])
     found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
     np.testing.assert_array_equal(passed, visit)
@@ -94,7 +94,7 @@ def test_strands_that_cross_twice_exchange_their_parts(surface, opposite):
 
 @given(st.integers(0, 10**6), st.booleans())
 def test_in_any_order_a_polygon_becomes_simple(seed, closed):
-    """Repeated in the plane, where a step between new neighbours is shorter than those removed."""
+    """In the plane, every reordering replaces steps by shorter ones, so repetition terminates."""
     points = np.random.default_rng(seed).random((12, 2))
     control = np.arange(12) % 3 == 0
     control[-1] |= not closed

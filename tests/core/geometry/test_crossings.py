@@ -1,4 +1,4 @@
-"""Crossings of polylines against brute force, and the cases that lie between."""
+"""Tests crossings of polylines against brute force, and in degenerate cases."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def pairs(mesh, polyline, closed):
 
 
 def pairs_by_solving(points, closed):
-    """Segments that cross by the parameters at which their lines do."""
+    """Pairs of crossing segments, from the parameters at which their lines intersect."""
     n = len(points)
     count = n if closed else n - 1
     found = set()
@@ -54,7 +54,7 @@ def test_random_polylines_in_one_face_against_brute_force(seed, count, closed):
 @pytest.mark.slow
 @given(st.integers(0, 100_000))
 def test_random_polylines_over_many_faces_against_brute_force(flat_disc, seed):
-    """Pieces of a straight way cross where the whole ways do."""
+    """Parts of straight traces cross exactly where the whole segments do."""
     corners = np.random.default_rng(seed).uniform(-0.6, 0.6, (7, 2))
     controls = np.arange(7)
     curve = curve_through(flat_disc, np.pad(corners, ((0, 0), (0, 1))), controls)
@@ -91,12 +91,12 @@ def test_only_a_closed_polyline_has_a_last_segment():
 
 
 def rolled(points):
-    """A closed polyline from its second point on."""
+    """A closed polyline that starts at its second point."""
     return SurfacePoints(np.roll(points.faces, -1), np.roll(points.barycentric, -1, axis=0))
 
 
 def test_strands_of_different_faces_do_not_meet():
-    """The same coordinates in two faces are different places."""
+    """Equal barycentric coordinates in two faces are different points."""
     cross = in_triangle([(0.1, 0.1), (0.5, 0.3), (0.5, 0.1), (0.1, 0.3)])
     two = SurfacePoints(np.array([0, 0, 3, 3]), cross.barycentric)
     assert pairs(FAN, two, False) == set()
@@ -113,26 +113,26 @@ def test_neither_numbers_nor_orientation_matter(flat_disc, change):
         curve = curve_through(mesh, knot, [0])
         polyline = SurfacePoints(curve.faces, curve.barycentric)
         counts.append(len(crossing_segments(mesh.faces, polyline, True)))
-    # A Lissajous figure with frequencies 2 and 3, turned off the axis of the mesh.
+    # A Lissajous figure with frequencies 2 and 3 has 7 crossings; it is not aligned with the mesh.
     assert counts == [7, 7]
 
 
 @pytest.mark.parametrize("seed", [None, 1, 2, 3])
 def test_a_crossing_on_an_edge_is_found(flat_disc, seed):
-    """A figure with an axis on edges: three of its crossings are points of both faces there."""
+    """A figure whose axis lies on edges: three of its crossings are points of two faces."""
     mesh = flat_disc if seed is None else flipped(flat_disc, seed)
     angle = np.arange(50) * 2 * np.pi / 50
     knot = np.stack([0.7 * np.cos(2 * angle), 0.5 * np.sin(3 * angle + 0.4), 0 * angle], axis=1)
     curve = curve_through(mesh, knot, [0])
     found = pairs(mesh, SurfacePoints(curve.faces, curve.barycentric), True)
     places = np.array([curve.points[list(pair)].mean(axis=0) for pair in found])
-    # Up to four pairs of segments meet at one of them.
+    # Up to four pairs of segments meet at such a crossing.
     near = np.linalg.norm(places[:, None] - places, axis=2) < mesh.mean_edge_length
     assert len(np.unique(near, axis=0)) == 7
 
 
 def test_a_point_of_an_edge_passed_twice_is_found():
-    """Over the edge between faces 0 and 1, and back over the same point."""
+    """The polyline crosses the edge between faces 0 and 1 twice, at the same point."""
     weights = [[0.2, 0.5, 0.3], [0.4, 0.6, 0.0], [0.3, 0.2, 0.5], [0.2, 0.2, 0.6]]
     weights += [[0.4, 0.0, 0.6], [0.6, 0.3, 0.1]]
     polyline = SurfacePoints(np.array([0, 1, 1, 1, 0, 0]), np.array(weights))
@@ -140,7 +140,7 @@ def test_a_point_of_an_edge_passed_twice_is_found():
 
 
 def test_a_vertex_passed_twice_is_found():
-    """Through the centre of the fan and once more, in other faces."""
+    """The polyline passes the centre of the fan twice, in different faces."""
     middle = [1.0, 0.0, 0.0]
     inside = [0.4, 0.3, 0.3]
     weights = [inside, middle, inside, inside, middle, inside]
@@ -149,7 +149,7 @@ def test_a_vertex_passed_twice_is_found():
 
 
 def test_a_vertex_passed_once_in_several_faces_is_no_crossing():
-    """Round the centre from face to face without leaving it."""
+    """The same point, the centre of the fan, is given in one face after the other."""
     inside, middle = [0.4, 0.3, 0.3], [1.0, 0.0, 0.0]
     polyline = SurfacePoints(np.array([0, 1, 2, 3, 3]), np.array([inside, *[middle] * 3, inside]))
     assert pairs(FAN, polyline, False) == set()

@@ -1,4 +1,4 @@
-"""Geodesic curvature (Eq. 10) and even spacing against closed forms."""
+"""Tests geodesic curvature (Eq. 10) and resampling against closed forms."""
 
 import numpy as np
 import pytest
@@ -36,12 +36,12 @@ def test_parallel_of_the_sphere_has_the_tangent_of_its_latitude(latitude):
         curvature = geodesic_curvature(points, points)
         errors.append(np.abs(curvature - np.tan(latitude)).max() / abs(np.tan(latitude)))
     assert errors[0] < 0.01
-    # Second order: a sixteenth for a quarter of the spacing.
+    # Second order: a quarter of the spacing gives a sixteenth of the error.
     assert errors[1] < 0.1 * errors[0]
 
 
 def test_helix_parallel_and_meridian_of_a_cylinder():
-    """A parallel of a cylinder is a geodesic: unrolled it is straight."""
+    """A parallel of a cylinder is a geodesic, since it is straight after unrolling."""
     points = circle(ANGLES)
     np.testing.assert_allclose(geodesic_curvature(points, points), 0.0, atol=1e-12)
 
@@ -65,7 +65,7 @@ def test_resampled_points_are_evenly_spaced_on_the_polyline(count):
     start, end = polygon[segment], np.roll(polygon, -1, axis=0)[segment]
     side = np.linalg.norm(end - start, axis=1)
     along = np.linalg.norm(points - start, axis=1)
-    # On its segment, and at the place along the polygon that is its share of the length.
+    # Each point lies on its segment, at equal distances along the polygon.
     np.testing.assert_allclose(along + np.linalg.norm(points - end, axis=1), side, atol=1e-12)
     before = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polygon, axis=0), axis=1))])
     total = before[-1] + np.linalg.norm(polygon[0] - polygon[-1])

@@ -1,4 +1,4 @@
-"""Groups, rows and components are those that NumPy and SciPy find."""
+"""Tests that groups, distinct rows and components are those of NumPy and SciPy."""
 
 import numpy as np
 import pytest
@@ -19,11 +19,11 @@ SEEDS = st.integers(0, 10_000)
 
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch):
-    monkeypatch.setattr(grouping, "LARGE", 7)
+    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 7)
 
 
 def some_keys(seed):
-    """Few or many distinct ones, of either type, in no order or in order."""
+    """Random keys: few or many distinct ones, integers or floats, unsorted or sorted."""
     generator = np.random.default_rng(seed)
     size, kinds = generator.integers(0, 90), generator.choice([1, 5, 40, 1000])
     keys = generator.integers(-kinds, kinds, size=size)
@@ -68,21 +68,21 @@ def test_components(seed):
 
 
 def test_large_arrays_are_sorted_by_parts(monkeypatch):
-    """So that a design can be cancelled in between."""
+    """A design can be cancelled between the parts."""
     sorted_at_once, asked = [], []
     argsort = np.argsort
 
     def watched_sort(keys, **arguments):
-        if keys.dtype != np.uint8:  # of parts' numbers, by radix
+        if keys.dtype != np.uint8:  # not the sort of the part numbers, which is a radix sort
             sorted_at_once.append(len(keys))
         return argsort(keys, **arguments)
 
     monkeypatch.setattr(np, "argsort", watched_sort)
-    monkeypatch.setattr(grouping, "LARGE", 1_000)
+    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 1_000)
     monkeypatch.setattr(grouping, "checkpoint", lambda: asked.append(1))
     stable_order(np.random.default_rng(0).permutation(50_000))
     assert len(sorted_at_once) == 50 < len(asked)
-    assert max(sorted_at_once) < 1_600  # parts are of about the same size
+    assert max(sorted_at_once) < 1_600  # the parts have about the same size
 
 
 @pytest.fixture
@@ -94,11 +94,11 @@ def bumpy():
 
 @pytest.mark.slow
 def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
-    """All that a design does by parts on a large mesh, here on one of 5,120 faces."""
+    """Forces everything that is done in parts on large meshes, on a mesh with 5,120 faces."""
     points = [3, 700, 1500, 2400]
-    monkeypatch.setattr(grouping, "LARGE", 10**9)
+    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 10**9)
     whole = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
-    monkeypatch.setattr(grouping, "LARGE", 700)
+    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 700)
     monkeypatch.setattr(coarse_mesh, "SLAB", 600)
     in_parts = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
     np.testing.assert_array_equal(in_parts.curves[0].points, whole.curves[0].points)
@@ -106,7 +106,7 @@ def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
 
 @pytest.mark.parametrize("margin", [0.2, 1.0])
 def test_a_slab_finds_the_nearest_seeds_within_its_margin(bumpy, monkeypatch, margin):
-    """Exactly those that the whole mesh has at distances up to the margin."""
+    """Up to the margin the nearest seeds are those of the whole mesh; beyond it there are none."""
     surface = nicmm.Mesh(*bumpy)
     graph = coarse_mesh._edge_graph(surface, np.zeros(len(surface.vertices)))
     seed = np.sort(np.random.default_rng(0).choice(len(surface.vertices), 40, replace=False))
@@ -127,7 +127,7 @@ def test_trees_of_some_faces_find_the_same_as_one_of_all(bumpy, monkeypatch):
     rays = 3.0 * positions, -positions + 0.2 * generator.normal(size=(50, 3))
     found = []
     for size in (10**9, 900):
-        monkeypatch.setattr(mesh, "FACES_OF_A_TREE", size)
+        monkeypatch.setattr(mesh, "MOST_FACES_PER_TREE", size)
         surface = nicmm.Mesh(*bumpy)
         near, distance = nearest_points(surface, positions)
         hits, along = first_hits(surface, *rays)

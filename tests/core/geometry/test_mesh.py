@@ -1,4 +1,4 @@
-"""The mesh refuses arrays that are not a mesh, and never changes what it was given."""
+"""Tests that a mesh refuses invalid arrays and never changes the given ones."""
 
 import warnings
 
@@ -111,7 +111,7 @@ def test_unreferenced_vertices_are_allowed_and_do_not_count():
 
 
 def sides(mesh):
-    """Faces by the vertices of a side, in a plain dictionary."""
+    """Faces and opposite corners by the vertices of a side."""
     found = {}
     for face, corners in enumerate(mesh.faces.tolist()):
         for corner in range(3):
@@ -122,7 +122,7 @@ def sides(mesh):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_neighbours_have_the_side_in_common(surface, seed):
-    """Also where faces run against each other; -1 on the boundary and nowhere else."""
+    """Also where orientations disagree; the neighbour is -1 exactly at the boundary."""
     mesh = flipped(surface, seed)
     expected = np.full(mesh.faces.shape, -1)
     for sharing in sides(mesh).values():
@@ -163,7 +163,7 @@ def test_only_vertices_of_a_face_turned_over_are_unoriented(ball):
 
 def test_a_moebius_strip_is_unoriented_across_its_seam_and_nowhere_else():
     strip = shapes.moebius_strip(12, 3)
-    # The first ring, where the last one is joined to it turned over.
+    # The first ring, which is joined to the last one with a twist.
     np.testing.assert_array_equal(strip.unoriented_vertices, np.arange(4))
 
 

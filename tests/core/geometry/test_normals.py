@@ -1,4 +1,4 @@
-"""Normals at vertices."""
+"""Tests of vertex normals."""
 
 import numpy as np
 

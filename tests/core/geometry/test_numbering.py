@@ -1,4 +1,4 @@
-"""The surface numbers its vertices: other numbers, places and sizes of a mesh change nothing."""
+"""Tests that numbering, pose and size of a mesh affect neither the new numbering nor the curve."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tests.core.checks import apart, random_surface_points
 
 
 def shuffled(mesh, seed):
-    """The mesh with vertices and faces in another order, and the new number of each vertex."""
+    """Mesh with vertices and faces in another order, and the new index of each vertex."""
     generator = np.random.default_rng(seed)
     number = generator.permutation(len(mesh.vertices))
     vertices = np.empty_like(mesh.vertices)
@@ -59,7 +59,7 @@ def test_points_values_and_curves_are_mapped(surface):
         return (positions - frame.centre) @ frame.signed_axes()
 
     points = random_surface_points(surface, 7, 0)
-    mapped = there.points(points).positions(there.mesh)
+    mapped = there.points_to_copy(points).positions(there.mesh)
     np.testing.assert_allclose(mapped, in_frame(points.positions(surface)), atol=1e-14)
     back = there.in_original(mapped)
     np.testing.assert_allclose(back, points.positions(surface), atol=1e-14)
@@ -70,7 +70,7 @@ def test_points_values_and_curves_are_mapped(surface):
     np.testing.assert_allclose(there.mesh.face_normals, normals, atol=1e-12)
     chosen = np.flatnonzero(there.mesh.referenced)[[3, 40, 80]]
     curve = nicmm.design_curve(there.mesh, chosen, order="shortest").curves[0]
-    back = there.curve(curve)
+    back = there.curve_to_original(curve)
     np.testing.assert_allclose(in_frame(back.points), curve.points, atol=1e-12 * surface.diagonal)
 
 
@@ -89,7 +89,7 @@ def test_hash_is_uniform_and_knows_every_bit():
 @pytest.mark.parametrize("faces", [500, 4000])
 @pytest.mark.parametrize("closed", [True, False])
 def test_numbers_of_a_mesh_do_not_decide_the_course(faces, closed):
-    """On small meshes and on those with a coarse mesh, whatever the order of points, too."""
+    """On small meshes and on those with a coarse mesh, and for any order of the points."""
     moved = []
     for seed in range(4):
         mesh = shapes.creature(seed, resolution=32, faces=faces)

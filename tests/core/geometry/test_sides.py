@@ -1,4 +1,4 @@
-"""Sides of a curve: parity of crossings on rings, where it is known."""
+"""Tests the sides of a curve by the parity of its crossings, on rings."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Control points in every accepted form, and every way in which they can be wrong."""
+"""Tests of control points in all accepted forms, and of all errors in them."""
 
 import warnings
 
@@ -13,7 +13,7 @@ SurfacePoints = nicmm.SurfacePoints
 
 
 def at_corner(mesh, vertices):
-    """Vertices as surface points in some face."""
+    """Vertices as surface points, each in one of its faces."""
     faces, corner = zip(*(np.argwhere(mesh.faces == v)[-1] for v in vertices), strict=True)
     return SurfacePoints(np.array(faces), np.eye(3)[list(corner)])
 
@@ -126,7 +126,7 @@ def test_points_on_two_components_are_unreachable(small_ball, ring):
 
 
 def test_point_in_a_face_without_area_is_refused_or_placed():
-    # The third face is a sliver of no area along an edge of the first.
+    # The second face has no area and lies along an edge of the first.
     mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0]], [[0, 1, 2], [0, 3, 1]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -142,7 +142,7 @@ def test_point_in_a_face_without_area_is_refused_or_placed():
 
 
 def test_first_hits_of_rays(ball):
-    """From outside, from inside, past the mesh, and along a direction that is no unit vector."""
+    """Rays from outside, from inside and past the mesh; directions need not be unit vectors."""
     origins = np.array([[3.0, 0.1, 0.2], [0.0, 0.0, 0.0], [3.0, 2.0, 0.0]])
     directions = np.array([[-2.0, 0.0, 0.0], [0.1, 0.2, 0.9], [-1.0, 0.0, 0.0]])
     points, along = first_hits(ball, origins, directions)

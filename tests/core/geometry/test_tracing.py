@@ -1,4 +1,4 @@
-"""Straight ways over faces against closed forms on surfaces that unroll to a plane."""
+"""Tests straight traces over faces against closed forms, on surfaces that unroll to a plane."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from tests.core.checks import (
 
 
 def cylinder(around=24, along=12, radius=1.0):
-    """Open prism about the z axis from z = 0 to 2."""
+    """Open prism about the z axis, from z = 0 to z = 2."""
     angle, height = np.meshgrid(
         np.arange(around) * 2 * np.pi / around, np.linspace(0.0, 2.0, along + 1), indexing="ij"
     )
@@ -39,13 +39,13 @@ def cylinder(around=24, along=12, radius=1.0):
 
 
 def plane_between(mesh, start, end):
-    """Directions that stand on the surface halfway, whatever the orientation of the faces."""
+    """Sum of the normals at both ends, for any orientation of the faces."""
     first, second = mesh.face_normals[start.faces], mesh.face_normals[end.faces]
     return first + np.where((first * second).sum(axis=1) < 0.0, -1.0, 1.0)[:, None] * second
 
 
 def ways(mesh, start, end, normals=None, detour=2.0):
-    """Each way with its ends as an open curve, None for one that was lost."""
+    """Each trace, with its ends, as an open curve; None for a trace that failed."""
     normals = plane_between(mesh, start, end) if normals is None else normals
     traces = trace_between(mesh, start, end, normals, detour * distances(mesh, start, end))
     assert (np.diff(traces.pair) >= 0).all()
@@ -77,7 +77,7 @@ def test_on_a_flat_disc_a_way_is_the_straight_segment(flat_disc, factor):
 
 
 def test_a_way_crosses_every_edge_between_its_ends_once(flat_disc):
-    """The number of crossings is that of edges whose ends lie on both sides, within the segment."""
+    """The number of crossings is that of the edges that intersect the straight segment."""
     start, end = (random_surface_points(flat_disc, 30, seed=seed) for seed in (5, 6))
     plane, longest = plane_between(flat_disc, start, end), np.full(len(start), np.inf)
     traces = trace_between(flat_disc, start, end, plane, longest)
@@ -111,7 +111,7 @@ def test_on_a_cylinder_ways_come_near_the_helix_with_the_square_of_their_length(
 
 @pytest.mark.parametrize("subdivisions", [2, 4])
 def test_on_a_sphere_ways_are_arcs_of_great_circles(subdivisions):
-    """The plane through both points and the centre; faces are chords, of second order."""
+    """They lie in the plane through both points and the centre; lengths are of second order."""
     mesh = shapes.sphere(subdivisions)
     start, end = (random_surface_points(mesh, 30, seed=seed) for seed in (3, 4))
     first, second = start.positions(mesh), end.positions(mesh)
@@ -138,7 +138,7 @@ def test_ways_on_a_random_body_stay_on_it_and_in_their_plane(body, seed):
     )
     normals = plane_between(mesh, start, end)
     found = ways(mesh, start, end, normals)
-    # Bodies are thin: a few planes leave the limb that the move went round.
+    # Limbs are thin: some moves lead around a limb, where the plane section misses the end.
     assert sum(way is None for way in found) <= 4
     for way, normal in zip(found, normals, strict=True):
         if way is None:
@@ -152,14 +152,14 @@ def test_ways_on_a_random_body_stay_on_it_and_in_their_plane(body, seed):
 
 
 def tangent(mesh, points, direction):
-    """Unit vectors in the planes of the faces."""
+    """Directions projected to the planes of the faces, as unit vectors."""
     normal = mesh.face_normals[points.faces]
     direction = direction - (direction * normal).sum(axis=1, keepdims=True) * normal
     return direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def test_a_vertex_is_reached_from_every_face_round_it(ball):
-    """From points beside it on all sides; the way ends in a face that has the vertex."""
+    """From nearby points on all sides; the trace ends in a face that contains the vertex."""
     around = np.flatnonzero((ball.faces == 100).any(axis=1))
     start = SurfacePoints(around, np.full((len(around), 3), 1.0 / 3.0))
     elsewhere = points_near(ball, 1.4 * ball.vertices[100] - 0.7 * start.positions(ball))
@@ -174,7 +174,7 @@ def test_a_vertex_is_reached_from_every_face_round_it(ball):
 
 @pytest.mark.parametrize(("end", "through"), [((0.21875, 0.1875), True), ((0.21875, 0.18), False)])
 def test_a_way_through_a_vertex_passes_it_once(end, through):
-    """Past it, the way turns from face to face on the spot."""
+    """To continue, the trace changes faces at the vertex without moving."""
     mesh = grid(8)
     start = points_near(mesh, [[0.03125, 0.0625, 0.0]])
     way = ways(mesh, start, points_near(mesh, [[*end, 0.0]]))[0]
@@ -185,13 +185,13 @@ def test_a_way_through_a_vertex_passes_it_once(end, through):
 
 @pytest.mark.parametrize("thickness", [0.3, 0.03])
 def test_a_way_round_the_edge_of_a_plate_begins_ahead(thickness):
-    """Towards its end it would begin inwards, and no plane along the normals contains it."""
+    """No plane along the normals contains the trace, and the end point lies inwards."""
     plate = shapes.cube(12)
     mesh = nicmm.Mesh(0.5 * plate.vertices * [1.0, 1.0, thickness], plate.faces)
     half = 0.5 * thickness
     start, end = points_near(mesh, [[0.46, 0.1, half]]), points_near(mesh, [[0.44, 0.12, -half]])
     outwards = np.array([[1.0, 0.0, 0.0]])
-    straight = 0.04 + thickness + 0.06  # to the edge, down and back
+    straight = 0.04 + thickness + 0.06  # to the edge, down, and back
     longest = np.array([1.5 * straight])
     assert not trace_between(mesh, start, end, np.eye(3)[2:], longest).reached.any()
     traces = trace_between(mesh, start, end, outwards, longest, ahead=outwards)
@@ -211,7 +211,7 @@ def test_points_of_one_face_need_no_crossing(ball):
 
 
 def test_a_way_off_the_surface_or_too_long_is_lost():
-    """Over a gap in the disc there is none, and round half a cylinder it is π/2 times as long."""
+    """None exists across a hole; around half a cylinder it is π/2 times as long as the chord."""
     gap = shapes.annulus(12, 0.5)
     start, end = points_near(gap, [[-0.7, 0.01, 0]]), points_near(gap, [[0.7, 0.012, 0]])
     assert ways(gap, start, end) == [None]
@@ -248,7 +248,7 @@ def test_on_a_flat_disc_points_move_by_a_translation(flat_disc, factor):
     stays = np.linalg.norm(target, axis=1) < 0.97 * factor
     end, blocked, _ = trace_from(mesh, start, direction, np.full(60, 0.3 * factor))
     assert stays.sum() > 20 and not blocked[stays].any()
-    # Off an edge by no more than what keeps a point strictly inside.
+    # The tolerance is the shift that keeps a point strictly inside its face.
     np.testing.assert_allclose(
         end.positions(mesh)[stays], target[stays], rtol=0, atol=1e-6 * factor
     )
@@ -267,7 +267,7 @@ def test_points_stop_beside_the_boundary(flat_disc):
     apothem = np.cos(np.pi / (6 * 12))
     assert (radius > apothem - 1e-5).all() and (radius < 1.0).all()
     assert (end.barycentric > 0.0).all()
-    # They went straight.
+    # The moves are straight.
     across = np.cross(direction, place - before)
     np.testing.assert_allclose(across, 0.0, atol=1e-5)
 
@@ -283,7 +283,7 @@ def test_points_stop_beside_an_edge_of_three_faces():
 
 
 def test_a_move_has_the_length_asked_for_and_a_way_back(body):
-    """On any surface: the sum of the pieces, followed from face to face by `join`."""
+    """On any surface, the trace between both ends has the length of the move."""
     start = random_surface_points(body, 30, seed=11)
     direction = tangent(body, start, np.random.default_rng(11).normal(size=(30, 3)))
     for length in (0.01, 0.1):
@@ -296,7 +296,7 @@ def test_a_move_has_the_length_asked_for_and_a_way_back(body):
 
 
 def test_a_move_round_the_equator_comes_back(ball):
-    """2π less what chords are shorter than arcs."""
+    """The length is 2π, less the difference between arcs and chords."""
     start = points_near(ball, [[0.8, 0.6, 0.013]])
     place = start.positions(ball)
     normal = ball.face_normals[start.faces]

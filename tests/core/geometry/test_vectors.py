@@ -1,4 +1,4 @@
-"""Products and lengths of vectors against those of NumPy."""
+"""Tests products and lengths of vectors against NumPy."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Meshes in, curves out: every format keeps what it is given, and bad paths are refused."""
+"""Tests that all formats of meshes and curves preserve data, and that bad paths are refused."""
 
 import csv
 import json
@@ -24,7 +24,7 @@ def test_mesh_survives_the_file(small_ball, tmp_path, ending):
     mesh = read_mesh(path)
     assert len(mesh.vertices) == len(small_ball.vertices)
     assert len(mesh.faces) == len(small_ball.faces)
-    # STL holds single precision.
+    # STL stores single precision.
     assert surface_area(mesh) == pytest.approx(surface_area(small_ball), rel=1e-6)
     if ending != ".stl":
         np.testing.assert_allclose(mesh.vertices, small_ball.vertices, rtol=0, atol=1e-6)
@@ -32,7 +32,7 @@ def test_mesh_survives_the_file(small_ball, tmp_path, ending):
 
 
 def test_corners_of_stl_are_joined(tmp_path):
-    """Two triangles written with six corners, and one that joining collapses."""
+    """Two triangles with six separate corners, and one that is degenerate after joining."""
     facets = [
         [(0, 0, 0), (1, 0, 0), (0, 1, 0)],
         [(1, 0, 0), (1, 1, 0), (0, 1, 0)],
@@ -84,7 +84,7 @@ def test_files_without_a_triangle_mesh_are_refused(tmp_path, name, capfd):
     bad_mesh_files(tmp_path)
     with pytest.raises(nicmm.MeshError):
         read_mesh(tmp_path / name)
-    # The reader underneath speaks of its own accord; what it says belongs into the error.
+    # The underlying reader prints messages; these belong in the error instead.
     assert capfd.readouterr() == ("", "")
 
 
@@ -100,7 +100,7 @@ def test_larger_faces_are_triangulated_or_refused(tmp_path):
 
 @pytest.fixture(params=[True, False], ids=["closed", "open"])
 def curve(request, ball, flat_disc):
-    """A circle of latitude, or a chord of the disc; with two control vertices."""
+    """A circle of latitude on the ball, or a chord of the disc."""
     mesh = ball if request.param else flat_disc
     working, _ = SplitMesh(mesh).assemble(0)
     field = mesh.vertices[:, 2 if request.param else 0] - 0.2

@@ -1,4 +1,4 @@
-"""Mesh files by hand: what readers understand, and that nothing else gets past them."""
+"""Tests hand-written mesh files: which ones readers accept and which ones they refuse."""
 
 import struct
 import warnings
@@ -15,7 +15,7 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a file with this content."""
+    """Function that reads a file with the given content."""
 
     def from_content(name, content):
         path = tmp_path / name
@@ -37,7 +37,7 @@ FLOAT_FACES = ("element face 1", "property list int float vertex_index")
 
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_ply_with_properties_of_different_types(read, order):
-    """A file that takes other readers down: colours among the coordinates, lists of any length."""
+    """Such files crash some readers: colours after the coordinates, and lists of varying length."""
     layout = "binary_little_endian" if order == "<" else "binary_big_endian"
     body = b"".join(struct.pack(f"{order}3f3Bd", *p, 255, 0, 7, 0.5) for p in SQUARE)
     body += struct.pack(f"{order}B3iBh", 3, 0, 1, 2, 1, -7)
@@ -63,7 +63,7 @@ def test_ply_as_text_with_other_elements(read):
 
 
 def test_triangle_strips(read):
-    """Of a grid of two columns; both strips go the same way round as its triangles."""
+    """Two strips on a grid of four squares; all triangles have the same orientation."""
     positions = [(x, y, 0) for y in range(3) for x in range(3)]
     body = b"".join(struct.pack("<3f", *p) for p in positions)
     strip = [0, 3, 1, 4, 2, 5, -1, 3, 6, 4, 7, 5, 8, -1]
@@ -103,7 +103,7 @@ def test_binary_stl_that_begins_like_text(read):
 
 
 def test_quad_with_a_notch_is_cut_inside(read):
-    """A dart: only the diagonal from its reflex corner lies inside."""
+    """In a dart, only the diagonal from the reflex corner lies inside."""
     for turn in range(4):
         corners = " ".join(str((i + turn) % 4 + 1) for i in range(4))
         mesh = read("dart.obj", f"v 0 0 0\nv 2 -1 0\nv 0.5 0 0\nv 2 1 0\nf {corners}\n")

@@ -1,11 +1,11 @@
-"""The contour of known fields: its course, that it stays in one piece, and its direction."""
+"""Tests contours of known fields: position, connectedness and direction."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from nicmm_core.level_set.contour import PASSING_MARGIN, extract_curves
+from nicmm_core.level_set.contour import SNAP_MARGIN, extract_curves
 from nicmm_core.path.virtual_splits import SplitMesh
 from tests.core.checks import (
     assert_does_not_touch_itself,
@@ -21,7 +21,7 @@ NONE = np.zeros(0, dtype=np.int64)
 
 
 def curves_of(mesh, field, controls=NONE):
-    """The contour of a field at the input vertices of a mesh of one component."""
+    """Contour of a field that is given at the vertices of a connected mesh."""
     working, _ = SplitMesh(mesh).assemble(0)
     np.testing.assert_array_equal(working.input_vertex, np.arange(len(mesh.vertices)))
     curves = extract_curves(mesh, working, np.asarray(field, dtype=float), np.asarray(controls))
@@ -32,8 +32,8 @@ def curves_of(mesh, field, controls=NONE):
 
 
 def assert_nearly_all_exact(mesh, deviation):
-    """The contour is exact except at vertices to which it snaps."""
-    assert np.abs(deviation).max() < PASSING_MARGIN * 1.5 * mean_edge_length(mesh)
+    """Assert that the contour is exact except at vertices to which it snaps."""
+    assert np.abs(deviation).max() < SNAP_MARGIN * 1.5 * mean_edge_length(mesh)
     assert np.quantile(np.abs(deviation), 0.8) < 1e-9
 
 
@@ -45,7 +45,7 @@ def test_linear_field_gives_a_straight_line_from_boundary_to_boundary(flat_disc,
     assert_nearly_all_exact(flat_disc, curve.points @ across - offset)
     along = curve.points @ [-0.8, 0.6, 0.0]
     assert (np.diff(along) > 0).all() or (np.diff(along) < 0).all()
-    # The rim is a polygon of 72 sides, so the chord ends a little inside the unit circle.
+    # The rim is a polygon with 72 sides, so the chord ends slightly inside the unit circle.
     assert curve.length == pytest.approx(2 * np.sqrt(1 - offset**2), rel=5e-3)
     ends = np.linalg.norm(curve.points[[0, -1]], axis=1)
     assert (ends > 0.99).all()
@@ -70,7 +70,7 @@ def test_several_curves_come_longest_first(ring):
 
 
 def test_curve_with_the_control_points_comes_first(ring):
-    """Even where the other is longer."""
+    """Even if another curve is longer."""
     angles = np.array([0.0, 2.0, 4.0])
     controls = nearest_vertices(ring, circle(angles, radius=0.6))
     curves = curves_of(ring, ring.vertices[:, 2], controls)
@@ -81,7 +81,7 @@ def test_curve_with_the_control_points_comes_first(ring):
 
 
 def test_zeros_at_other_vertices_do_not_shatter_the_contour(ball, flat_disc):
-    """A great circle and a diameter that run through many vertices."""
+    """A great circle and a diameter that pass through many vertices."""
     on_circle = np.abs(ball.vertices[:, 2]) < 1e-12
     assert on_circle.sum() > 20
     (curve,) = curves_of(ball, np.where(on_circle, 0.0, ball.vertices[:, 2]))
@@ -95,7 +95,7 @@ def test_zeros_at_other_vertices_do_not_shatter_the_contour(ball, flat_disc):
 
 
 def test_a_patch_of_zeros_counts_as_one_side(ball):
-    """All zeros are read alike, so a plateau shifts the curve to its rim and no further."""
+    """All zeros count as the same sign, so a plateau moves the curve to its rim at most."""
     height = ball.vertices[:, 2]
     (curve,) = curves_of(ball, np.where(np.abs(height) < 0.3, 0.0, height))
     assert_valid_curve(ball, curve)
@@ -104,7 +104,7 @@ def test_a_patch_of_zeros_counts_as_one_side(ball):
 
 @pytest.fixture(scope="module")
 def equator(ball):
-    """Four vertices of the equator in order, none of them neighbours."""
+    """Four vertices of the equator in order; no two are neighbours."""
     controls = nearest_vertices(ball, circle(np.pi / 2 * np.arange(4)))
     assert (ball.vertices[controls, 2] == 0.0).all()
     return controls
@@ -139,7 +139,7 @@ def test_sign_of_the_field_does_not_matter_to_the_place(ball, equator):
 
 
 def test_missed_control_vertex_is_marked(ball, equator):
-    """A control vertex in the middle of one side is on no curve."""
+    """A control vertex inside one of the regions is on no curve."""
     pole = nearest_vertices(ball, [[0.0, 0.0, 1.0]])
     curves = curves_of(ball, ball.vertices[:, 2] - 0.01, np.append(equator[:2], pole))
     passing = curves[0]
@@ -152,7 +152,7 @@ def test_no_sign_change_gives_no_curve(ball):
 
 
 def test_contour_on_split_faces_refers_to_the_input_mesh(small_ball):
-    """Splits inside a face leave the contour of a linear field where it was."""
+    """Splits of faces do not move the contour of a linear field."""
     split = SplitMesh(small_ball)
     for face in (5, 77, 200):
         split.split_face(face)

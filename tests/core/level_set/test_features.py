@@ -1,4 +1,4 @@
-"""The network's input channels and the feature map."""
+"""Tests of the input channels of the network and of the feature map."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from tests.core.checks import random_surface_points
 
 
 def pairwise_distances(points):
-    """Between the first points, enough to fix a shape."""
+    """Distances between the first 60 points, enough to determine a shape."""
     return np.linalg.norm(points[:60, None] - points[None, :60], axis=2)
 
 
@@ -35,14 +35,14 @@ def test_channels_are_position_normal_indicator_and_distance(body):
     assert problem.features.shape == (len(working.vertices), 8)
     assert np.isfinite(problem.features).all()
     position, normal = problem.features[:, :3], problem.features[:, 3:6]
-    # Positions keep their shape, in units of the square root of the area about the centroid.
+    # Positions keep their shape; the unit is the square root of the area, the origin the centroid.
     unit = np.sqrt(working.face_areas.sum())
     np.testing.assert_allclose(
         pairwise_distances(unit * position), pairwise_distances(working.vertices), atol=1e-9
     )
     centroid = working.face_areas @ position[working.faces].mean(axis=1)
     np.testing.assert_allclose(centroid, 0.0, atol=1e-9)
-    # Normals are those of the positions, on the outside.
+    # Normals match the positions and point outwards.
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
     corner = position[working.faces]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -61,7 +61,7 @@ def test_maps_add_a_ninth_channel(small_ball):
 
 
 def test_map_weights_are_interpolated_at_inserted_points(small_ball):
-    """A control point amid three painted vertices is painted itself."""
+    """A control point in a face with three painted vertices is painted itself."""
     weights = np.zeros(len(small_ball.vertices))
     weights[small_ball.faces[10]] = 1.0
     points = random_surface_points(small_ball, 3, seed=0)
@@ -74,7 +74,7 @@ def test_map_weights_are_interpolated_at_inserted_points(small_ball):
 
 @pytest.mark.slow
 def test_turned_and_moved_surface_has_the_same_positions_and_normals(body):
-    """At the input's vertices; but for a ball and its like, whose axes are undetermined."""
+    """At input vertices; not on a ball or similar shapes, whose principal axes are undetermined."""
     points = locate_control_points(body, [3, 50, 200, 333], closed=True)
     turn = Rotation.from_rotvec([0.4, -1.1, 0.7])
     moved = nicmm.Mesh(turn.apply(body.vertices.copy()) + [3.0, 1.0, -2.0], body.faces)

@@ -1,4 +1,4 @@
-"""The operators: exact where linear elements are, converging where they are not."""
+"""Tests that operators are exact where linear elements are, and converge elsewhere."""
 
 import igl
 import numpy as np
@@ -50,7 +50,7 @@ def test_centroid_values_of_a_linear_function_are_exact(surface):
 
 
 def test_stiffness_is_the_energy_of_the_gradient(surface):
-    """S = Gᵀ A G: two assemblies that share no formula."""
+    """S = Gᵀ A G, although the two are assembled from different formulas."""
     _, elements = elements_of(surface)
     areas = np.tile(elements.face_areas, 3)[:, None]
     product = elements.gradient.T @ (elements.gradient * areas).tocsr()
@@ -91,7 +91,7 @@ def test_laplacian_of_a_paraboloid_is_four(flat_disc):
 
 
 def test_laplacian_of_a_linear_function_vanishes_on_the_flat_disc(flat_disc):
-    """Also on the boundary, whose rows are zero."""
+    """Also on the boundary, where the rows of the Laplacian are zero."""
     working, elements = elements_of(flat_disc)
     values = elements.laplacian @ working.vertices[:, 0]
     assert np.abs(values).max() < 1e-9
@@ -100,7 +100,7 @@ def test_laplacian_of_a_linear_function_vanishes_on_the_flat_disc(flat_disc):
 
 
 def test_harmonics_of_the_sphere_converge():
-    """Δz = -2z, and the energy of xy is 6 times its square: errors fall with the edges."""
+    """Δz = -2z, and the energy of xy is 6 ∫ (xy)²; errors decrease with the edge length."""
     field_error, quotient_error = [], []
     for subdivisions in (1, 2, 3):
         working, elements = elements_of(shapes.sphere(subdivisions))
@@ -112,7 +112,7 @@ def test_harmonics_of_the_sphere_converge():
             abs((x * y) @ elements.stiffness @ (x * y) / (mass @ (x * y) ** 2) - 6)
         )
     assert field_error[1] < 0.65 * field_error[0] and field_error[2] < 0.65 * field_error[1]
-    # Energies converge at second order: a quarter for each halving of the edges.
+    # Energies converge with second order: halving the edges gives a quarter of the error.
     assert quotient_error[1] < 0.35 * quotient_error[0]
     assert quotient_error[2] < 0.35 * quotient_error[1]
 

@@ -1,4 +1,4 @@
-"""Each equation against a value by hand or a closed form, and what all of them share."""
+"""Tests every energy term against closed forms or values by hand, and their common properties."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ CPU = torch.device("cpu")
 
 
 def dense_tensors(mesh, delta_width, controls=(), phi_fea=None):
-    """The same surface in double precision with dense matrices, in the mesh's own unit."""
+    """The surface in double precision, with dense matrices and in the unit of the mesh."""
     working, _ = SplitMesh(mesh).assemble(0)
     elements = build_finite_elements(working.vertices, working.faces, working.on_boundary)
 
@@ -55,7 +55,7 @@ def field(values):
 
 @pytest.mark.parametrize("slope", [0.0, 0.5, 1.0, 2.0])
 def test_level_set_term_of_a_linear_field(flat_disc, slope):
-    """Eq. 3 and 8: ½ (c² - 1)² times the area, so zero for an exact distance."""
+    """Eq. 3 and 8 give ½ (c² - 1)² times the area, which is zero for an exact distance."""
     surface = dense_tensors(flat_disc, 0.1)
     phi = field(slope * (flat_disc.vertices @ [0.6, 0.8, 0.0] - 0.2))
     expected = 0.5 * (slope**2 - 1.0) ** 2 * flat_disc.face_areas.sum()
@@ -63,7 +63,7 @@ def test_level_set_term_of_a_linear_field(flat_disc, slope):
 
 
 def test_interpolation_term_by_hand(small_ball):
-    """Eq. 4: the sum of the squares at the control points and nothing else."""
+    """Eq. 4 is the sum of φ² at the control points."""
     phi = np.full(len(small_ball.vertices), 100.0)
     phi[[3, 40, 111]] = [0.5, -2.0, 0.0]
     surface = dense_tensors(small_ball, 0.1, controls=[3, 40, 111])
@@ -72,7 +72,7 @@ def test_interpolation_term_by_hand(small_ball):
 
 @pytest.mark.parametrize("radius", [0.4, 0.6])
 def test_smoothness_term_of_a_circle(radius):
-    """Eq. 6 and 8: ½ ∮ κ² dl = π / R for φ = r - R, approached as mesh and Gaussian shrink."""
+    """Eq. 6 and 8 converge to ½ ∮ κ² dl = π / R for φ = r - R as mesh and Gaussian are refined."""
     errors = []
     for rings in (12, 24):
         mesh = shapes.disc(rings)
@@ -90,7 +90,7 @@ def test_smoothness_term_of_a_straight_line_is_zero(flat_disc):
 
 @pytest.mark.parametrize("phi_fea", [1.0, 0.5, 2.0])
 def test_feature_term_of_a_circle(phi_fea):
-    """Eq. 7 and 8: ½ b² times the length for a constant map b."""
+    """Eq. 7 and 8 give ½ b² times the length for a constant map b."""
     mesh, radius = shapes.disc(24), 0.5
     phi = field(np.linalg.norm(mesh.vertices, axis=1) - radius)
     surface = dense_tensors(mesh, 1 / 24, phi_fea=np.full(len(mesh.faces), phi_fea))
@@ -99,7 +99,7 @@ def test_feature_term_of_a_circle(phi_fea):
 
 
 def test_feature_term_of_a_circle_on_the_sphere(ball):
-    """The length of a parallel at height z, φ its signed distance."""
+    """Half the length of a parallel, where φ is its signed distance."""
     height = 0.3
     phi = field(np.arccos(np.clip(ball.vertices[:, 2], -1, 1)) - np.arccos(height))
     surface = dense_tensors(ball, 0.15, phi_fea=np.ones(len(ball.faces)))
@@ -108,7 +108,7 @@ def test_feature_term_of_a_circle_on_the_sphere(ball):
 
 
 def test_feature_term_weighs_the_map_where_the_curve_runs(flat_disc):
-    """A map that is 2 on one half and 1 on the other: the mean of both squares on a diameter."""
+    """With a map of 2 and 1 on the two halves, a diameter gets the mean of the squares."""
     left = flat_disc.vertices[flat_disc.faces].mean(axis=1)[:, 0] < 0.0
     surface = dense_tensors(flat_disc, 0.08, phi_fea=np.where(left, 2.0, 1.0))
     phi = field(flat_disc.vertices[:, 1] - 0.01)
@@ -145,7 +145,7 @@ def problem_on(mesh):
 
 
 def terms_of(problem, factor=0.9):
-    """The terms of a field that is nothing special: no term of it is zero."""
+    """Terms of a generic field; all of them are nonzero."""
     phi = torch.as_tensor(factor * problem.initial_distance + 0.01, dtype=torch.float32)
     return {name: v.item() for name, v in loss_terms(surface_tensors(problem, CPU), phi).items()}
 
@@ -181,7 +181,7 @@ def test_sparse_operator_and_its_gradient_equal_the_dense_matrix():
 
 
 def test_gradients_of_all_terms_are_those_of_differences(small_ball):
-    """In double precision, by finite differences."""
+    """Compared with finite differences in double precision."""
     surface = dense_tensors(
         small_ball, 0.3, controls=[3, 40, 111], phi_fea=np.linspace(0.5, 2.0, 320)
     )
@@ -200,7 +200,7 @@ def test_gradients_of_all_terms_are_those_of_differences(small_ball):
 
 
 def test_single_precision_operators_give_the_same_terms_and_gradients(problem):
-    """The tensors that solve against dense matrices in double precision."""
+    """The tensors used by the solver, compared with dense matrices in double precision."""
     elements = problem.elements
     double = EnergySurface(
         face_areas=torch.as_tensor(elements.face_areas),

@@ -1,4 +1,4 @@
-"""The band's energy is the energy of the losses, and its derivatives are derivatives."""
+"""Tests the energy of the narrow band against the losses, and its derivatives."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def problem(request, ball):
 
 
 def test_whole_surface_has_the_energy_of_the_losses(problem):
-    """A band that contains everything gives the same Eq. 2."""
+    """A band that contains the whole surface has the energy of Eq. 2."""
     phi = problem.initial_distance
     band = build_narrow_band(problem, phi, np.inf)
     assert len(band.unknowns) == len(phi) - len(problem.loop.control_vertices)
@@ -30,7 +30,7 @@ def test_whole_surface_has_the_energy_of_the_losses(problem):
 
 @pytest.mark.parametrize("half_width_in_edges", [3.0, np.inf])
 def test_gradient_is_the_derivative(problem, half_width_in_edges):
-    """Central differences along random directions."""
+    """Compared with central differences along random directions."""
     phi = problem.initial_distance
     band = build_narrow_band(problem, phi, half_width_in_edges * problem.edge_length)
     values = phi[band.unknowns]
@@ -55,7 +55,7 @@ def test_hessian_is_symmetric_and_positive_semidefinite(problem):
 
 
 def test_hessian_is_that_of_a_perfect_fit(ball):
-    """Where all residuals vanish, Gauss–Newton's Hessian is the exact one."""
+    """Up to the known terms of nonzero residuals, the Gauss–Newton Hessian is the exact one."""
     points = locate_control_points(ball, [3, 200, 400], closed=True)
     problem = build_problem(ball, points, "shortest")
     weights = LossWeights(smooth=0.0)
@@ -68,7 +68,7 @@ def test_hessian_is_that_of_a_perfect_fit(ball):
     step = 1e-5 * problem.edge_length * direction
     _, before = gauss_newton_system(band, weights, evaluate(band, weights, values - step))
     _, after = gauss_newton_system(band, weights, evaluate(band, weights, values + step))
-    # What Gauss–Newton leaves out is 2 (|∇φ|² - 1) |∇δ|² in faces with a slope below 1.
+    # Gauss–Newton leaves out 2 (|∇φ|² - 1) |∇δ|² in faces where the slope is below 1.
     left_out = 2.0 * weights.sdf * band.face_areas * np.minimum(residuals.slope, 0.0)
     exact = direction @ (after - before) / 2e-5 / problem.edge_length
     missing = left_out @ ((band.gradient @ direction).reshape(3, -1) ** 2).sum(axis=0)
@@ -76,13 +76,13 @@ def test_hessian_is_that_of_a_perfect_fit(ball):
 
 
 def test_band_follows_the_curve_and_not_the_mesh(problem):
-    """Halving the width about halves the unknowns, and bending needs complete surroundings."""
+    """Half the width gives about half the unknowns; bending needs complete one-rings."""
     h = problem.edge_length
     narrow = build_narrow_band(problem, problem.distance, 2.0 * h)
     wide = build_narrow_band(problem, problem.distance, 4.0 * h)
     assert 1.4 < len(wide.unknowns) / len(narrow.unknowns) < 2.6
     assert 0 < len(wide.inner_areas) < len(wide.face_areas)
-    # A Laplacian that lacks no neighbour vanishes on constants.
+    # A Laplacian with complete one-rings vanishes on constants.
     constant = wide.laplacian @ np.ones(len(wide.unknowns))
     beside_controls = wide.centroid @ np.ones(len(wide.unknowns)) < 1.0 - 1e-9
     assert np.abs(constant[~beside_controls]).max() < np.abs(wide.laplacian).max()

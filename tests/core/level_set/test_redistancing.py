@@ -1,4 +1,4 @@
-"""Distances to the zero set of a field against closed forms."""
+"""Tests distances to the zero set of a field against closed forms."""
 
 import numpy as np
 import pytest
@@ -18,20 +18,20 @@ def distance_surface(mesh):
 
 
 def distance_to_small_circle(mesh, axis, height):
-    """Exact signed distance on the unit sphere to the circle at a height above an axis."""
+    """Exact signed distance on the unit sphere to a parallel about an axis, at a latitude."""
     return np.arcsin(np.clip(mesh.vertices @ axis, -1.0, 1.0)) - height
 
 
 @pytest.mark.parametrize("limit_in_edges", [5.0, np.inf])
 def test_any_field_with_the_same_zero_set_gives_the_same_distance(flat_disc, limit_in_edges):
-    """The zero set decides, and not how steep the field is; on a line the distance is exact."""
+    """Only the zero set matters, not the slope of the field; to a straight line it is exact."""
     line = flat_disc.vertices @ [0.6, 0.8, 0.0] - 0.21
     radius = np.linalg.norm(flat_disc.vertices, axis=1)
     limit = limit_in_edges * flat_disc.mean_edge_length
     surface = distance_surface(flat_disc)
     for steepness in (0.1, 1.0, 7.0):
         found = redistanced(surface, steepness * line, NOTHING, limit)
-        # Farther out the nearest point of the line may lie beyond the disc's rim.
+        # Farther out, the nearest point of the line may lie beyond the rim of the disc.
         near = (np.abs(line) < 0.5 * min(limit, 0.4)) & (radius < 0.7)
         np.testing.assert_allclose(found[near], line[near], rtol=0, atol=1e-9)
         assert np.abs(found).max() <= limit
@@ -43,7 +43,7 @@ def test_a_field_without_zero_set_stays_as_it_is(ball):
 
 
 def test_error_falls_with_the_mesh():
-    """Plane waves make an error of first order on a curved front."""
+    """Plane waves have a first-order error on a curved front."""
     axis = np.array([0.36, 0.48, 0.8])
     errors = []
     for subdivisions in (3, 4, 5):
@@ -56,7 +56,7 @@ def test_error_falls_with_the_mesh():
 
 
 def test_signs_and_zeros_stay(body):
-    """No vertex changes its side, and zero vertices are zero and nothing else is."""
+    """No vertex changes its sign, and exactly the given zero vertices are zero."""
     generator = np.random.default_rng(3)
     field = body.vertices @ generator.normal(size=3)
     field -= np.median(field)
@@ -77,7 +77,7 @@ def test_scaling_the_mesh_scales_the_distance(body):
 @pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_distance_never_rises_faster_than_edges_are_long(ball, seed):
-    """|d(a) - d(b)| ≤ |ab|, as for every distance."""
+    """|d(a) - d(b)| ≤ |ab| holds on every edge, as for any distance."""
     generator = np.random.default_rng(seed)
     field = ball.vertices @ generator.normal(size=3) + 0.3 * generator.normal()
     found = np.abs(redistanced(distance_surface(ball), field, NOTHING))
@@ -87,7 +87,7 @@ def test_distance_never_rises_faster_than_edges_are_long(ball, seed):
 
 
 def twisted_prism(around, rows, height, twist):
-    """Rings of obtuse triangles: each ring of vertices is turned by some steps from the last."""
+    """A prism of obtuse triangles: each ring of vertices is rotated against the previous one."""
     ring, place = np.divmod(np.arange(rows * around), around)
     angle = 2.0 * np.pi * (place + twist * ring) / around
     vertices = np.stack([np.cos(angle), np.sin(angle), height * ring], axis=1)
@@ -100,13 +100,13 @@ def twisted_prism(around, rows, height, twist):
 
 @pytest.mark.parametrize("twist", [3, 8])
 def test_needles_in_a_ring_do_not_lower_one_anothers_distance(monkeypatch, twist):
-    """Of the hostile input one case took 11,000 rounds on 3,400 vertices."""
+    """One case of the hostile input once took 11,000 rounds on 3,400 vertices."""
     mesh = twisted_prism(100, 10, 0.001, twist)
     rounds = []
     monkeypatch.setattr(distances, "checkpoint", lambda: rounds.append(1))
     line = mesh.vertices[:, 0] - 0.01
     found = np.abs(redistanced(distance_surface(mesh), line, NOTHING))
     assert len(rounds) < 200
-    # A quarter of the circle at most, and no less than the plane is away.
+    # At most a quarter of the circle, and at least the distance to the plane.
     assert found.max() < 0.5 * np.pi + 0.05
     assert (found >= np.abs(line) - 1e-9).all()

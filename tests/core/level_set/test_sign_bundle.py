@@ -1,4 +1,4 @@
-"""Open curves, loops that bound no region, and one-sided surfaces: all by the signs of corners."""
+"""Tests sign bundles: open curves, loops that bound no region, and one-sided surfaces."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def assert_one_curve(mesh, result, points, closed=True):
 class TestLoopsThatBoundNothing:
     @pytest.mark.parametrize("method", METHODS)
     def test_meridian_of_a_torus(self, ring, method):
-        """A geodesic: the circle in its plane."""
+        """The meridian is a geodesic, a circle in a plane."""
         points = torus_points(ring, 0, 1, 3)
         result = design(ring, points, method=method)
         assert_one_curve(ring, result, points)
@@ -57,7 +57,7 @@ class TestLoopsThatBoundNothing:
 
     @pytest.mark.parametrize("half", [-1.0, 1.0])
     def test_round_each_handle_of_a_double_torus(self, half):
-        """Through the hole and back on the outside, on either handle."""
+        """A loop through the hole and back on the outside, for each handle."""
         mesh = shapes.double_torus()
         points = handle_points(mesh, half)
         result = design(mesh, points, order="shortest")
@@ -65,13 +65,13 @@ class TestLoopsThatBoundNothing:
         assert not judge(mesh, result, points, True, "shortest").faults
 
     def test_round_a_boundary(self):
-        """Round the hole of an annulus, which bounds together with the rim only."""
+        """A loop round the hole of an annulus bounds a region only together with the rim."""
         annulus = shapes.annulus()
         points = nearest_vertices(annulus, circle([0.0, 1.5, 3.0, 4.5], radius=0.6))
         assert_one_curve(annulus, design(annulus, points), points)
 
     def test_core_of_a_moebius_strip(self):
-        """After one turn left has become right; the middle circle is a geodesic."""
+        """After one turn left and right are exchanged; the core is a geodesic."""
         strip = shapes.moebius_strip()
         middle = circle([0.0, 2.0, 4.0])
         points = nearest_vertices(strip, middle)
@@ -96,7 +96,7 @@ class TestOpenCurves:
         assert curve.length == pytest.approx(np.pi, rel=0.01)
 
     def test_two_points_are_enough(self, flat_disc):
-        """About the straight line between them."""
+        """The curve is nearly the straight line between them."""
         points = nearest_vertices(flat_disc, [[-0.6, 0.1, 0.0], [0.5, -0.2, 0.0]])
         result = design(flat_disc, points, closed=False)
         assert_one_curve(flat_disc, result, points, closed=False)
@@ -127,7 +127,7 @@ class TestOpenCurves:
 
 class TestOperators:
     def test_a_change_of_signs_at_vertices_changes_nothing(self, small_ball):
-        """Reading vertices with other signs, everywhere the same, is the ordinary surface."""
+        """One sign per vertex, the same at all of its corners, gives the ordinary operators."""
         generator = np.random.default_rng(5)
         sign = generator.choice([-1, 1], size=len(small_ball.vertices))
         bundle = SignBundle(sign[small_ball.faces], sign, np.zeros(0, dtype=np.int64))
@@ -144,7 +144,7 @@ class TestOperators:
         )
 
     def test_distance_to_the_path_is_smooth_across_it(self, ring):
-        """|∇φ₀| is 1 on both sides of a meridian, where φ₀ changes its sign."""
+        """|∇φ₀| is 1 on both sides of a meridian, across which φ₀ changes its sign."""
         points = locate_control_points(ring, torus_points(ring, 0, 1, 3), closed=True)
         problem = build_problem(ring, points)
         assert problem.bundle is not None

@@ -1,4 +1,4 @@
-"""The signed distance against closed forms, and loops that bound nothing."""
+"""Tests the signed distance against closed forms, and for loops that bound nothing."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tests.core.checks import joined
 
 
 def distance_to(mesh, on_loop):
-    """Signed distance to the vertices given, which are in the order of a loop."""
+    """Signed distance to a loop, given by its vertices in order."""
     working, renumbered = SplitMesh(mesh).assemble(mesh.face_component[0])
     edge_length = working.edge_lengths.mean()
     loop = InitialLoop(
@@ -31,7 +31,7 @@ def distance_to(mesh, on_loop):
 
 
 def globe(rings):
-    """Unit sphere of parallels with 2 ``rings`` vertices each; parallel i is at iπ/rings."""
+    """Unit sphere with 2 ``rings`` vertices per parallel; parallel i is at angle iπ/rings."""
     around = 2 * rings
     tilt = np.arange(1, rings) * np.pi / rings
     turn = np.arange(around) * 2 * np.pi / around
@@ -66,7 +66,7 @@ def sphere_error(rings):
 
 
 def disc_error(rings):
-    """Mean error of the distance to the circle of half the radius."""
+    """Mean error of the distance to the circle with half the radius."""
     mesh = shapes.disc(rings)
     radius = np.linalg.norm(mesh.vertices, axis=1)
     on_circle = np.flatnonzero(np.isclose(radius, 0.5))
@@ -115,7 +115,7 @@ def test_other_components_do_not_matter():
 
 @pytest.mark.slow
 def test_loop_round_the_tube_of_a_torus_bounds_nothing(ring):
-    """Three vertices of a meridian; likewise of a parallel, round the hole."""
+    """Neither do loops round the hole; the control points are on a meridian or a parallel."""
     meridian = [0, 6, 12]
     parallel = [0, 12 * 18, 24 * 18]
     for vertices in (meridian, parallel):

@@ -1,4 +1,4 @@
-"""Smoothing: a minimiser, zero at the control points, with a response to each of them."""
+"""Tests the smoother: a minimiser that is zero at control points, and their response fields."""
 
 import numpy as np
 import pytest
@@ -48,6 +48,12 @@ def test_response_fades_away_from_its_point(smoother, small_ball):
     assert np.abs(smoother.response[far, 0]).max() < 0.1
 
 
+def test_control_points_with_the_same_response(elements, smoother, noise):
+    """As two control points on an extremely thin surface have."""
+    twice = build_smoother(elements, np.append(CONTROLS, CONTROLS[-1]), LENGTH)
+    np.testing.assert_allclose(twice.smoothed(noise), smoother.smoothed(noise), rtol=0, atol=1e-9)
+
+
 def test_smoothing_bends_less(elements, smoother, noise):
     assert bending(elements, smoother.smoothed(noise)) < 0.1 * bending(elements, noise)
 
@@ -68,7 +74,7 @@ def test_no_length_changes_nothing(elements, noise):
 
 
 def test_smoothed_field_is_the_minimiser(elements, smoother, noise):
-    """No field that is zero at the control points has less ∫ (φ - f)² + ℓ⁴ (Δφ)²."""
+    """It minimises ∫ (φ - f)² + ℓ⁴ (Δφ)² among the fields that are zero at the control points."""
 
     def energy(field):
         return elements.vertex_areas @ (field - noise) ** 2 + LENGTH**4 * bending(elements, field)
@@ -79,7 +85,7 @@ def test_smoothed_field_is_the_minimiser(elements, smoother, noise):
         change = size * generator.normal(size=len(noise))
         change[CONTROLS] = 0.0
         assert energy(best + change) > energy(best)
-        # At a minimum the energy of a step does not depend on its direction.
+        # At a minimum the energy is the same for a change and its opposite.
         assert energy(best + change) == pytest.approx(energy(best - change), rel=1e-6)
 
 

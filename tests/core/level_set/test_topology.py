@@ -1,4 +1,4 @@
-"""The zero set stays one loop through the control points, whatever the solver wants."""
+"""Tests that the zero set stays one loop through the control points, for any given field."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tests.oracles.named_curves import nearest_vertices
 
 
 def keep(working, start, wanted, controls):
-    """The field kept to a loop through control vertices whose zero set the start's is."""
+    """Result of `keep_topology` for a loop through control vertices, from a start field."""
     edge_length = working.edge_lengths.mean()
     loop = InitialLoop(
         vertices=controls,
@@ -35,7 +35,7 @@ def working(ball):
 
 @pytest.fixture(scope="module")
 def equator(ball):
-    """Four vertices of the equator, none of them neighbours."""
+    """Four vertices of the equator; no two are neighbours."""
     return nearest_vertices(ball, circle(np.pi / 2 * np.arange(4)))
 
 
@@ -54,7 +54,7 @@ def test_field_of_the_same_signs_comes_back_as_it_is(working, equator):
 
 
 def test_isotopic_field_comes_back_as_it_is(ball, working, equator):
-    """The equator swings to both sides by several edges, through the same points."""
+    """The new zero set passes the same points but deviates by several edges between them."""
     x, y, z = working.vertices.T
     wanted = z + 0.8 * x * y
     assert (np.sign(wanted) != np.sign(z)).sum() > 50
@@ -65,7 +65,7 @@ def test_isotopic_field_comes_back_as_it_is(ball, working, equator):
 
 
 def test_blobs_are_removed_and_the_rest_kept(ball, working, equator):
-    """A second loop round the north pole goes; the south keeps what was wanted there."""
+    """A second loop round the north pole is removed; the south keeps the given field."""
     x, y, z = working.vertices.T
     pole = np.linalg.norm(working.vertices - [0.0, 0.0, 1.0], axis=1)
     wanted = z + 0.3 * x * y - 2.0 * np.exp(-((pole / 0.3) ** 2))
@@ -79,7 +79,7 @@ def test_blobs_are_removed_and_the_rest_kept(ball, working, equator):
 
 
 def test_strands_do_not_merge(flat_disc):
-    """A long ellipse whose waist the wanted field pinches off."""
+    """The given field would pinch an ellipse into two loops."""
     working, _ = SplitMesh(flat_disc).assemble(0)
     x, y, _ = working.vertices.T
     start = np.sqrt((x / 0.8) ** 2 + (y / 0.4) ** 2) - 1.0
@@ -98,7 +98,7 @@ def test_strands_do_not_merge(flat_disc):
 
 
 def test_control_points_are_not_lost(ball, working, equator):
-    """A field that is positive all round a control point would leave it behind."""
+    """A field that is positive all around a control point would lose it."""
     start = working.vertices[:, 2].copy()
     away = np.linalg.norm(working.vertices - working.vertices[equator[1]], axis=1)
     wanted = start + np.exp(-((away / 0.4) ** 2))
@@ -133,7 +133,7 @@ PROBLEMS = {}
 
 
 def problem_on(name, seed):
-    """A problem on a mesh through random points of a small region, so that a loop bounds one."""
+    """Problem through random points in a small part of a mesh, so that the loop bounds a region."""
     if (name, seed) not in PROBLEMS:
         mesh = MESHES[name]
         centre = mesh.vertices[np.random.default_rng(seed).integers(len(mesh.vertices))]

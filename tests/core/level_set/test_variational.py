@@ -1,4 +1,4 @@
-"""The variational method on curves that are known, and against the network."""
+"""Tests the variational method on known curves, and against the network."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tests.core.checks import assert_valid_curve, assert_valid_design, circle
 from tests.oracles.named_curves import nearest_vertices
 
 SAME_CURVE = 0.08
-"""Farthest that the network's curve lies from the variational one in easy cases, in radii."""
+"""Greatest distance of the network's curve from the variational one in easy cases, in radii."""
 
 
 def design(mesh, points, **settings):
@@ -25,7 +25,7 @@ def design(mesh, points, **settings):
 
 @pytest.mark.slow
 def test_points_of_a_great_circle_give_a_great_circle():
-    """No geodesic curvature; the error falls with the mesh."""
+    """A great circle has no geodesic curvature; tested at two resolutions."""
     farthest = []
     for subdivisions in (3, 4):
         mesh = shapes.sphere(subdivisions)
@@ -37,7 +37,7 @@ def test_points_of_a_great_circle_give_a_great_circle():
 
 @pytest.mark.slow
 def test_points_of_a_circle_in_a_disc_give_that_circle():
-    """The closed elastic curve of the plane."""
+    """The circle is the closed elastic curve of the plane."""
     mesh = shapes.disc(24)
     points = circle(np.arange(6) * np.pi / 3, radius=0.55)
     curve = design(mesh, points).curves[0]
@@ -48,7 +48,7 @@ def test_points_of_a_circle_in_a_disc_give_that_circle():
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["nicmm-paper", "nicmm"])
 def test_network_and_variational_method_reach_the_same_curve(method):
-    """On easy cases, within the distance that is stated above."""
+    """In easy cases, within `SAME_CURVE`."""
     mesh = shapes.sphere(3)
     points = nearest_vertices(mesh, circle([0.0, 1.5, 3.0, 4.6]))
     here = design(mesh, points).curves[0].points
@@ -59,7 +59,7 @@ def test_network_and_variational_method_reach_the_same_curve(method):
 
 @pytest.mark.slow
 def test_curves_are_valid_on_every_surface(surface):
-    """One simple loop on the surface, exactly through the points."""
+    """The result is one simple loop on the surface, exactly through the points."""
     points = np.random.default_rng(4).choice(len(surface.vertices), 4, replace=False)
     result = design(surface, points, order="shortest")
     assert_valid_design(surface, result)
@@ -69,7 +69,7 @@ def test_curves_are_valid_on_every_surface(surface):
 
 @pytest.mark.slow
 def test_loss_falls_far_and_the_loop_stays_one(body):
-    """From the smoothed edge path to rest, without ever leaving its isotopy class."""
+    """From the smoothed initial path to convergence, the isotopy class does not change."""
     points = locate_control_points(body, [5, 150, 300, 400], closed=True)
     problem = build_problem(body, points, "shortest")
     solution = solve(problem, LossWeights(), VariationalConfig())
@@ -84,7 +84,7 @@ def test_loss_falls_far_and_the_loop_stays_one(body):
 
 @pytest.mark.slow
 def test_stops_by_the_papers_rule(ball):
-    """Change of the least loss below 1e-5 over ten iterations; the cap otherwise."""
+    """It stops if the least loss changes by less than 1e-5 over ten iterations, or at the cap."""
     points = locate_control_points(ball, [3, 200, 400, 600], closed=True)
     problem = build_problem(ball, points, "shortest")
     config = VariationalConfig()
@@ -133,7 +133,7 @@ def distance_to(curve, place):
 
 @pytest.mark.slow
 def test_needs_no_pytorch(monkeypatch, small_ball):
-    """The energy is arrays; a missing PyTorch does not matter."""
+    """The energy uses NumPy arrays only, so PyTorch may be missing."""
     import sys
 
     monkeypatch.setitem(sys.modules, "torch", None)

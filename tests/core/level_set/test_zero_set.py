@@ -1,4 +1,4 @@
-"""Which zero set a design with maps begins with."""
+"""Tests which zero set a design with maps starts from."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def problem_on(mesh, **maps):
 
 
 def bow(mesh, height):
-    """A level set's zero set that leads over a height, given by its curve alone."""
+    """A zero set, given only by its curve, that rises to a height in the middle."""
     x = np.linspace(-0.6, 0.6, 41)
     y = 0.03 + height * (1.0 - (x / 0.6) ** 2)
     return ZeroSet(
@@ -42,7 +42,7 @@ def test_a_shorter_curve_is_kept_and_a_longer_one_replaced(flat_disc, lane):
 
 
 def test_lengths_count_by_the_map(flat_disc):
-    """The straight path leads through an obstacle, by which it is the longer one."""
+    """The straight path leads through an obstacle, so it is longer in the metric of the map."""
     x, y, _ = flat_disc.vertices.T
     wall = ((np.abs(x) < 0.1) & (y < 0.25)).astype(float)
     problem = problem_on(flat_disc, obstacles=wall)
@@ -57,7 +57,7 @@ def test_what_is_no_simple_curve_is_replaced(flat_disc, lane):
     none = ZeroSet(np.zeros(0), 0, [])
     found = shortest_by_map(flat_disc, problem, none)
     assert found.is_simple_curve(flat_disc, closed=False)
-    # What replaces it needs no repair: φ₀ and the path's own distance are one loop already.
+    # The replacement needs no repair: the zero sets of φ₀ and of the distance are one curve.
     for field in (problem.initial_distance, problem.distance):
         as_it_is, repaired = (zero_set(flat_disc, problem, field, kept) for kept in (True, False))
         assert repaired.breaking_vertices == 0

@@ -1,4 +1,4 @@
-"""Maps that a mesh gives by itself: closed forms, invariances, errors."""
+"""Tests maps computed from the mesh: closed forms, invariances and errors."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from nicmm_core.maps.feature_maps import SHARP_ANGLE
 
 
 def tube(radius=0.5, around=40, along=21):
-    """An open cylinder about the z axis, of height 3."""
+    """An open cylinder about the z axis, with height 3."""
     angle = np.arange(around) * 2 * np.pi / around
     height = np.linspace(0.0, 3.0, along)
     index = np.arange(around * along).reshape(along, around)
@@ -34,14 +34,14 @@ def moved(mesh, scale=1e3):
 
 
 def with_faces_turned(mesh):
-    """Every third face seen from the other side."""
+    """The mesh with every third face reversed."""
     faces = mesh.faces.copy()
     faces[::3] = faces[::3, ::-1]
     return nicmm.Mesh(mesh.vertices, faces)
 
 
 def folded(angle, turned=False):
-    """Two triangles about the x axis, folded from a plane by an angle."""
+    """Two triangles that share an edge on the x axis and meet at an angle."""
     tip = [0.5, -np.cos(angle), np.sin(angle)]
     second = [0, 1, 3] if turned else [1, 0, 3]
     return nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], tip], [[0, 1, 2], second])
@@ -67,7 +67,7 @@ class TestCurvature:
         np.testing.assert_allclose(curvature[:, 0], 0.0, atol=0.01)
 
     def test_of_a_torus(self):
-        """1 / 0.4 across, cos v / (1 + 0.4 cos v) around."""
+        """They are 1 / 0.4 around the tube and cos v / (1 + 0.4 cos v) around the axis."""
         mesh = shapes.torus()
         radius = np.linalg.norm(mesh.vertices[:, :2], axis=1)
         around = (radius - 1.0) / 0.4 / radius
@@ -81,7 +81,7 @@ class TestCurvature:
         assert np.abs(nicmm.principal_curvatures(flat_disc)).max() < 1e-9
 
     def test_needs_no_orientation(self):
-        """Signs are to either side; along a Möbius strip no choice of them agrees."""
+        """Signs depend on the orientation, and on a Möbius strip no choice is consistent."""
         mesh = shapes.torus(around=36, across=18)
         plain, turned = (
             np.sort(np.abs(nicmm.principal_curvatures(one)), axis=1)
@@ -92,7 +92,7 @@ class TestCurvature:
         assert strip.max() < 2.0
 
     def test_a_vertex_with_many_neighbours_costs_no_more_than_the_mesh(self):
-        """A pyramid of 20,000 faces: through its tip all corners are two rings apart."""
+        """On a pyramid with 20,000 faces, the tip puts all vertices into each other's two-ring."""
         angle = np.arange(20_000) * 2 * np.pi / 20_000
         rim = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         onward = np.roll(np.arange(len(rim)), -1)
@@ -125,7 +125,7 @@ class TestCurvatureMap:
         np.testing.assert_allclose(nicmm.curvature_map(moved(body, scale)), plain, atol=1e-6)
 
     def test_of_meshes_of_every_kind(self):
-        """Unreferenced vertices, faces without area, an edge of three faces, single faces."""
+        """Unreferenced vertices, faces without area, an edge with three faces, and single faces."""
         vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [2, 0, 0], [9, 9, 9]]
         for faces in ([[0, 1, 2]], [[0, 1, 2], [1, 0, 3], [0, 1, 4]], [[0, 1, 2], [0, 1, 5]]):
             mesh = nicmm.Mesh(vertices, faces)

@@ -1,4 +1,4 @@
-"""φ_fea: what weights of obstacles and alignment become."""
+"""Tests of φ_fea, computed from the weights of obstacles and alignment."""
 
 import igl
 import numpy as np
@@ -53,7 +53,7 @@ def test_the_square_is_what_is_painted_and_never_below_zero(ball):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_gaussian_falls_along_the_surface(sheet, kind):
-    """A lane of one row: the square is 1 + height · exp(-d² / 2σ²)."""
+    """For one painted vertex, φ_fea² is 1 + height · exp(-d² / 2σ²)."""
     middle = int(np.linalg.norm(sheet.vertices, axis=1).argmin())
     distance = np.linalg.norm(sheet.vertices, axis=1)
     squared = map_of(sheet, **{kind: painted(sheet, middle)}) ** 2
@@ -61,12 +61,12 @@ def test_the_gaussian_falls_along_the_surface(sheet, kind):
     sigma = np.sqrt(-0.5 * distance**2 / np.log(np.clip(share, 1e-2, 1.0 - 1e-9)))
     near = (share > 0.02) & (distance > 0.0)
     assert near.sum() > 30
-    # Ways along edges are up to 16 % longer than straight ones.
+    # Paths along edges are up to 16 % longer than straight ones.
     assert sigma[near].max() / sigma[near].min() < 1.2
 
 
 def test_two_sides_of_a_plate_are_apart():
-    """Near in space, but not along the surface."""
+    """They are close in space, but not along the surface."""
     cube = shapes.cube(16)
     plate = nicmm.Mesh(cube.vertices * [1.0, 1.0, 0.01], cube.faces)
     top = np.flatnonzero((plate.vertices[:, 2] > 0) & (np.abs(plate.vertices[:, :2]) < 0.3).all(1))
@@ -97,7 +97,7 @@ def test_more_painted_vertices_do_not_make_an_obstacle_stronger(ball):
 
 @pytest.mark.parametrize("width", [0.06, 0.15, 0.3])
 def test_a_broad_strip_is_lowest_along_its_middle(sheet, width):
-    """Not along its rim, and it attracts all over."""
+    """It is not lowest along its rim, and it attracts everywhere."""
     x, y, _ = sheet.vertices.T
     strip = np.abs(y) < width
     value = map_of(sheet, alignment=strip.astype(float))
@@ -120,7 +120,7 @@ def test_of_graded_paint_the_strongest_attracts_most(sheet):
 
 
 def test_a_painted_plain_is_as_good_everywhere(ball):
-    """Where all is painted there is no rim and no ridge."""
+    """Where everything is painted, there is neither a rim nor a ridge."""
     np.testing.assert_array_equal(map_of(ball, alignment=np.ones(len(ball.vertices))), 0.0)
     half = (ball.vertices[:, 2] > 0).astype(float)
     assert map_of(ball, alignment=half)[ball.vertices[:, 2] > 0.6].max() == 0.0
@@ -140,7 +140,7 @@ def test_the_map_knows_no_unit_and_no_numbers(body, factor):
 
 
 def test_a_finer_mesh_has_the_same_map():
-    """Of a strip, at the vertices that both have, but for the metric of edges."""
+    """For a strip, at common vertices, up to the error of distances along edges."""
     coarse = shapes.torus(around=48, across=20)
     fine = nicmm.Mesh(*igl.upsample(coarse.vertices, coarse.faces))
     maps = []

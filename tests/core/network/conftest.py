@@ -1,6 +1,6 @@
-"""The tests of the network load PyTorch; no other conftest does."""
+"""Set-up of the network tests; no other conftest imports PyTorch."""
 
 import torch
 
-# The matrices here are so small that a second thread costs more time than it saves.
+# The matrices are so small that a second thread would cost more time than it saves.
 torch.set_num_threads(1)

@@ -1,4 +1,4 @@
-"""Stage 2: never worse than the start, and it stops when it should."""
+"""Tests stage 2, fine-tuning: its result is never worse than its start, and it stops as specified."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from nicmm_core.status import Status
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
 NEVER = {"fluctuation": -1.0, "threshold": -1.0}
-"""Settings with which nothing but the cap stops it."""
+"""Settings with which only the cap stops fine-tuning."""
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_terms_are_those_of_the_field_returned(network, problem):
 
 
 def test_stops_when_the_energy_has_been_still_for_the_patience(network, problem):
-    """With a fluctuation that any energy stays within, that is as soon as it may."""
+    """With a fluctuation that every energy satisfies, it stops at the first opportunity."""
     for patience, least, expected in ((3, 1, 3), (7, 1, 7), (3, 12, 12)):
         result = run(
             network,
@@ -159,7 +159,7 @@ def test_random_state_of_the_caller_does_not_matter_and_stays(network, problem):
 
 
 def test_band_energy_of_a_distance_sees_the_band_only(problem):
-    """Whatever happens far from the zero set leaves it alone."""
+    """Changes far from the zero set do not affect it."""
     surface = surface_tensors(problem, CPU)
     phi = torch.as_tensor(problem.initial_distance, dtype=torch.float32)
     far = phi.abs() > 0.5 * phi.max()

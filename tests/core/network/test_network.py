@@ -1,4 +1,4 @@
-"""The network: what it guarantees for any weights, its switches, and its file."""
+"""Tests the network: guarantees for any weights, its switches, and weights files."""
 
 import io
 import json
@@ -16,7 +16,7 @@ from nicmm_core.network.forward_pass import (
     NetworkConfig,
     NetworkInput,
     NetworkWeights,
-    attended,
+    channel_attention,
     gated_unit,
     level_set,
     linear,
@@ -33,7 +33,7 @@ SWITCHES = ("attention", "gating", "normals", "control_indicator", "distance")
 
 
 def random_weights(config=SMALL, seed=0, channels=8):
-    """Weights with every parameter random, the last layer's too."""
+    """Random weights, also in the last layer."""
     generator = np.random.default_rng(seed)
     return NetworkWeights(
         config,
@@ -44,12 +44,12 @@ def random_weights(config=SMALL, seed=0, channels=8):
     )
 
 
-def output(weights, given):
-    return level_set(weights, given, NUMPY)
+def output(weights, inputs):
+    return level_set(weights, inputs, NUMPY)
 
 
-def as_tensors(given):
-    return NetworkInput(*(torch.as_tensor(array) for array in given))
+def as_tensors(inputs):
+    return NetworkInput(*(torch.as_tensor(array) for array in inputs))
 
 
 @pytest.fixture(scope="module")
@@ -59,39 +59,39 @@ def problem(small_ball):
 
 
 @pytest.fixture(scope="module")
-def given(problem):
+def inputs(problem):
     return network_input(problem)
 
 
-def with_ninth(given, seed=5):
-    ninth = np.random.default_rng(seed).random((len(given.features), 1), dtype=np.float32)
-    return given._replace(features=np.concatenate([given.features, ninth], axis=1))
+def with_ninth(inputs, seed=5):
+    ninth = np.random.default_rng(seed).random((len(inputs.features), 1), dtype=np.float32)
+    return inputs._replace(features=np.concatenate([inputs.features, ninth], axis=1))
 
 
 def count(weights):
     return sum(array.size for array in weights.parameters.values())
 
 
-def test_untrained_network_returns_the_initial_distance(given):
-    tensors = as_tensors(given)
+def test_untrained_network_returns_the_initial_distance(inputs):
+    tensors = as_tensors(inputs)
     assert torch.equal(CurveNetwork(SMALL)(tensors), tensors.initial_distance)
 
 
-def test_output_is_zero_at_the_control_points_for_any_weights(given):
+def test_output_is_zero_at_the_control_points_for_any_weights(inputs):
     for seed in range(3):
-        phi = output(random_weights(seed=seed), given)
-        change = np.abs(phi - given.initial_distance).max()
+        phi = output(random_weights(seed=seed), inputs)
+        change = np.abs(phi - inputs.initial_distance).max()
         assert change > 1e-2
-        assert np.abs(phi[given.control_vertices]).max() < 1e-6 * change
+        assert np.abs(phi[inputs.control_vertices]).max() < 1e-6 * change
 
 
 @pytest.mark.parametrize("switch", [None, *SWITCHES])
-def test_arrays_and_tensors_give_the_same(given, switch):
-    """What is trained in torch is what NumPy runs."""
+def test_arrays_and_tensors_give_the_same(inputs, switch):
+    """The network that PyTorch trains is the one that NumPy evaluates."""
     config = SMALL if switch is None else replace(SMALL, **{switch: False})
     weights = random_weights(config)
-    expected = build_network(weights)(as_tensors(given)).detach().numpy()
-    np.testing.assert_allclose(output(weights, given), expected, atol=1e-5 * expected.max())
+    expected = build_network(weights)(as_tensors(inputs)).detach().numpy()
+    np.testing.assert_allclose(output(weights, inputs), expected, atol=1e-5 * expected.max())
 
 
 def test_operations_of_both_libraries_agree():
@@ -105,7 +105,7 @@ def test_operations_of_both_libraries_agree():
         np.testing.assert_allclose(NUMPY.correlate(values, weights), expected, rtol=1e-6)
 
 
-def test_single_precision_is_enough(problem, given):
+def test_single_precision_is_enough(problem, inputs):
     areas = problem.elements.vertex_areas
     exact = NetworkInput(
         problem.features,
@@ -118,75 +118,75 @@ def test_single_precision_is_enough(problem, given):
     parameters = {name: array.astype(np.float64) for name, array in weights.parameters.items()}
     expected = output(NetworkWeights(weights.config, parameters), exact)
     assert expected.dtype == np.float64
-    phi = output(weights, given)
+    phi = output(weights, inputs)
     assert phi.dtype == np.float32
     assert np.abs(phi - expected).max() < 1e-6
 
 
-def test_every_parameter_takes_part(given):
+def test_every_parameter_takes_part(inputs):
     network = build_network(random_weights())
-    (network(as_tensors(given)) ** 2).sum().backward()
+    (network(as_tensors(inputs)) ** 2).sum().backward()
     idle = [
         name
         for name, parameter in network.weights.parameters.items()
-        # A constant added everywhere is taken off again at the control points, or nearly.
+        # A constant added everywhere is almost removed by the correction at the control points.
         if name != "head.bias" and not parameter.grad.abs().max() > 0.0
     ]
     assert not idle
 
 
-def test_switches_remove_parameters(given):
+def test_switches_remove_parameters(inputs):
     full = random_weights()
     without_attention = random_weights(replace(SMALL, attention=False))
     without_gating = random_weights(replace(SMALL, gating=False))
     assert count(full) - count(without_attention) == SMALL.depth * SMALL.attention_kernel
-    # A gate: down to its rank, up to the width, and a bias.
+    # A gate maps down to its rank and up to the width, and has a bias.
     assert count(full) - count(without_gating) == SMALL.depth * (2 * 8 * 2 + 8)
     for weights in (without_attention, without_gating):
-        assert np.isfinite(output(weights, given)).all()
+        assert np.isfinite(output(weights, inputs)).all()
 
 
 SWITCHED_CHANNELS = {"normals": [3, 4, 5], "control_indicator": [6], "distance": [7]}
 
 
 @pytest.mark.parametrize("switch", SWITCHED_CHANNELS)
-def test_a_channel_switched_off_is_not_seen(given, switch):
-    features = given.features.copy()
+def test_a_channel_switched_off_is_not_seen(inputs, switch):
+    features = inputs.features.copy()
     features[:, SWITCHED_CHANNELS[switch]] += 0.3
-    changed = given._replace(features=features)
+    changed = inputs._replace(features=features)
     on = random_weights()
     off = random_weights(replace(SMALL, **{switch: False}))
-    assert not np.array_equal(output(on, changed), output(on, given))
-    np.testing.assert_array_equal(output(off, changed), output(off, given))
+    assert not np.array_equal(output(on, changed), output(on, inputs))
+    np.testing.assert_array_equal(output(off, changed), output(off, inputs))
 
 
-def test_without_distance_the_output_knows_nothing_of_it(given):
+def test_without_distance_the_output_knows_nothing_of_it(inputs):
     torch.manual_seed(0)
     weights = network_weights(CurveNetwork(replace(SMALL, distance=False)))
-    phi = output(weights, given)
-    reversed_distance = given._replace(initial_distance=-given.initial_distance)
+    phi = output(weights, inputs)
+    reversed_distance = inputs._replace(initial_distance=-inputs.initial_distance)
     np.testing.assert_array_equal(phi, output(weights, reversed_distance))
-    assert np.abs(phi[given.control_vertices]).max() < 1e-5
-    # At φ = 0 the energy has no slope, so training could not begin there.
+    assert np.abs(phi[inputs.control_vertices]).max() < 1e-5
+    # At φ = 0 the energy has no gradient, so training could not start.
     assert np.abs(phi).max() > 1e-3
 
 
-def test_without_attention_a_vertex_does_not_feel_the_others(given):
-    """Only attention connects vertices, except for the control points."""
-    elsewhere = np.ones(len(given.features), dtype=bool)
-    elsewhere[given.control_vertices] = False
+def test_without_attention_a_vertex_does_not_feel_the_others(inputs):
+    """Except at the control points, only attention connects different vertices."""
+    elsewhere = np.ones(len(inputs.features), dtype=bool)
+    elsewhere[inputs.control_vertices] = False
     elsewhere[0] = False
-    features = given.features + np.float32(0.3) * elsewhere[:, None]
-    moved = given._replace(features=features)
+    features = inputs.features + np.float32(0.3) * elsewhere[:, None]
+    moved = inputs._replace(features=features)
     for attention in (False, True):
         weights = random_weights(replace(SMALL, attention=attention))
-        change = output(weights, moved)[0] - output(weights, given)[0]
+        change = output(weights, moved)[0] - output(weights, inputs)[0]
         assert bool(abs(change) > 1e-4) is attention
 
 
 def attention(inner, area_share):
     across = np.array([[[0.7, -0.4, 0.9]]], dtype=np.float32)
-    return attended({"a.across.weight": across}, "a", inner, area_share, NUMPY)
+    return channel_attention({"a.across.weight": across}, "a", inner, area_share, NUMPY)
 
 
 def test_attention_couples_neighbouring_channels_only():
@@ -196,7 +196,7 @@ def test_attention_couples_neighbouring_channels_only():
     changed[:, 5] += 1.0
     before = attention(inner, share) / inner
     after = attention(changed, share) / changed
-    # One weight a channel, the same at every vertex.
+    # One weight per channel, the same at every vertex.
     np.testing.assert_allclose(before, np.broadcast_to(before[0], before.shape), atol=1e-6)
     touched = np.abs(before - after).max(axis=0) > 1e-5
     assert np.flatnonzero(touched).tolist() == [4, 5, 6]
@@ -212,7 +212,7 @@ def test_attention_sees_the_mean_over_the_area():
 
 
 def test_gate_is_light():
-    """The gate's matrix has the rank asked for, and the gate lies between 0 and 1."""
+    """The matrix of the gate has the given rank, and the gate lies between 0 and 1."""
     config = NetworkConfig(width=16, depth=1, gate_rank=3)
     parameters, name = random_weights(config).parameters, "blocks.0.gated"
     up, down = parameters[f"{name}.gate_up.weight"], parameters[f"{name}.gate_down.weight"]
@@ -224,24 +224,24 @@ def test_gate_is_light():
     assert share.max() - share.min() > 0.1
 
 
-def test_renumbering_the_vertices_renumbers_the_output(given):
+def test_renumbering_the_vertices_renumbers_the_output(inputs):
     weights = random_weights()
-    shuffle = np.random.default_rng(2).permutation(len(given.features))
+    shuffle = np.random.default_rng(2).permutation(len(inputs.features))
     shuffled = NetworkInput(
-        features=given.features[shuffle],
-        initial_distance=given.initial_distance[shuffle],
-        area_share=given.area_share[shuffle],
-        response=given.response[shuffle],
-        control_vertices=np.argsort(shuffle)[given.control_vertices],
+        features=inputs.features[shuffle],
+        initial_distance=inputs.initial_distance[shuffle],
+        area_share=inputs.area_share[shuffle],
+        response=inputs.response[shuffle],
+        control_vertices=np.argsort(shuffle)[inputs.control_vertices],
     )
-    expected = output(weights, given)[shuffle]
+    expected = output(weights, inputs)[shuffle]
     np.testing.assert_allclose(
         output(weights, shuffled), expected, atol=1e-4 * np.abs(expected).max()
     )
 
 
 def test_weights_without_numbers_give_the_initial_distance(problem):
-    """Whether they overflow in between or are NaN from the start."""
+    """The weights overflow during the computation, or are NaN from the start."""
     for bad in (1e38, np.nan):
         weights = random_weights()
         weights.parameters["head.weight"][:] = bad
@@ -295,43 +295,43 @@ def test_files_without_input_switches_see_every_channel(tmp_path):
     assert_same_weights(load_weights(tmp_path / "weights.npz"), weights)
 
 
-def test_ninth_channel_starts_without_effect(given, tmp_path):
+def test_ninth_channel_starts_without_effect(inputs, tmp_path):
     weights = random_weights()
     save_weights(tmp_path / "weights.npz", weights)
     loaded = load_weights(tmp_path / "weights.npz", channels=9)
-    first, second = (output(loaded, with_ninth(given, seed)) for seed in (5, 6))
+    first, second = (output(loaded, with_ninth(inputs, seed)) for seed in (5, 6))
     np.testing.assert_array_equal(first, second)
-    np.testing.assert_allclose(first, output(weights, given), rtol=1e-4, atol=1e-5)
-    # Yet it can learn one.
+    np.testing.assert_allclose(first, output(weights, inputs), rtol=1e-4, atol=1e-5)
+    # Its weights have a gradient, so training can give it an effect.
     network = build_network(loaded)
-    (network(as_tensors(with_ninth(given))) ** 2).sum().backward()
+    (network(as_tensors(with_ninth(inputs))) ** 2).sum().backward()
     assert network.weights.parameters["stem.weight"].grad[:, 8].abs().max() > 0.0
 
 
-def test_shipped_weights_load_for_both_numbers_of_channels(given):
-    for channels, features in ((8, given), (9, with_ninth(given))):
+def test_shipped_weights_load_for_both_numbers_of_channels(inputs):
+    for channels, features in ((8, inputs), (9, with_ninth(inputs))):
         phi = output(load_weights(channels=channels), features)
         assert np.isfinite(phi).all()
-        assert phi.shape == given.initial_distance.shape
+        assert phi.shape == inputs.initial_distance.shape
 
 
-def test_the_network_that_ships_for_maps_sees_them(given):
+def test_the_network_that_ships_for_maps_sees_them(inputs):
     weights = shipped_weights(9)
-    painted = with_ninth(given)
+    painted = with_ninth(inputs)
     neutral = painted._replace(features=painted.features.copy())
     neutral.features[:, 8] = 1.0
     assert np.abs(output(weights, painted) - output(weights, neutral)).max() > 1e-3
 
 
 def altered(path, **changes):
-    """Weights with some arrays changed, or left out where they are None."""
+    """Write a weights file with some arrays changed, or omitted if None."""
     arrays = {"config": np.array(json.dumps(asdict(SMALL))), **random_weights().parameters}
     arrays.update(changes)
     np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
 
 
 def bad_files(folder):
-    """Files that are no weights, each with its defect."""
+    """Write invalid weights files; return their paths by defect."""
     paths = {name: folder / f"{name.replace(' ', '-')}.npz" for name in BAD_FILES}
     paths["text"].write_text("not weights")
     paths["nothing in it"].write_bytes(b"")
@@ -409,7 +409,7 @@ def test_bad_weights_are_refused_by_name(tmp_path, name):
 
 
 def test_archives_that_unpack_to_too_much_are_refused_before(tmp_path, monkeypatch):
-    monkeypatch.setattr(weights_file, "LARGEST", 1_000_000)
+    monkeypatch.setattr(weights_file, "MOST_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "zeros.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for index in range(3):
             archive.writestr(f"{index}.npy", bytes(500_000))

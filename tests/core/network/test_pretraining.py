@@ -1,4 +1,4 @@
-"""Stage 1 at toy size: it learns, it is seeded, and an interruption changes nothing."""
+"""Tests stage 1, pretraining, at toy size: it learns, is reproducible, and can be interrupted."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from nicmm_core.level_set.losses import (
 )
 from nicmm_core.network import pretraining
 from nicmm_core.network.forward_pass import NetworkConfig, NetworkInput
-from nicmm_core.network.pretraining import PretrainingConfig, pretrain, turned
+from nicmm_core.network.pretraining import PretrainingConfig, pretrain, randomly_reoriented
 from nicmm_core.network.weights_file import load_weights
 
 NETWORK = NetworkConfig(width=12, depth=1, gate_rank=2)
@@ -45,7 +45,7 @@ def assert_same_weights(first, second):
 
 @pytest.fixture(scope="module")
 def finished(meshes, tmp_path_factory):
-    """An uninterrupted run: where its weights are and the losses of its epochs."""
+    """An uninterrupted run: path of its weights, and losses of its epochs."""
     path = tmp_path_factory.mktemp("pretraining") / "weights.npz"
     return path, train(meshes, path)
 
@@ -88,11 +88,11 @@ def test_other_seed_gives_other_weights(meshes, finished, tmp_path):
 
 
 class StopError(Exception):
-    """What a progress function may raise to stop a run."""
+    """Exception that a progress function raises to stop a run."""
 
 
 def interrupt_in_epoch(number, settings=SETTINGS):
-    """A progress function that stops the run in the middle of an epoch."""
+    """Progress function that stops a run in the middle of an epoch."""
 
     def progress(stage, done, total, loss):
         if stage == "training" and done == (number - 1) * settings.sets + 2:
@@ -116,7 +116,7 @@ def test_interrupted_run_ends_with_the_weights_of_an_uninterrupted_one(
         path,
         progress=lambda stage, done, *_: steps.append(done) if stage == "training" else None,
     )
-    # It goes on after the last epoch that was complete instead of starting again.
+    # It continues after the last complete epoch.
     assert steps[0] == (epoch - 1) * SETTINGS.sets + 1
     assert losses == finished[1]
     assert_same_weights(weights_in(path), weights_in(finished[0]))
@@ -139,7 +139,7 @@ def test_checkpoint_of_other_settings_is_refused(meshes, tmp_path):
 
 @pytest.mark.slow
 def test_checkpoint_of_other_meshes_is_refused(meshes, tmp_path):
-    """Going on with other meshes would give weights that no command made."""
+    """Continuing on other meshes would give weights that no single command can reproduce."""
     path = tmp_path / "weights.npz"
     with pytest.raises(StopError):
         train(meshes, path, progress=interrupt_in_epoch(2))
@@ -149,7 +149,7 @@ def test_checkpoint_of_other_meshes_is_refused(meshes, tmp_path):
 
 @pytest.mark.slow
 def test_unreadable_checkpoint_is_refused_by_name(meshes, tmp_path):
-    """As a run leaves it that is stopped while it writes."""
+    """A checkpoint is truncated if a run is killed while it writes."""
     path = tmp_path / "weights.npz"
     with pytest.raises(StopError):
         train(meshes, path, progress=interrupt_in_epoch(2))
@@ -189,7 +189,7 @@ def test_folder_that_does_not_exist_is_refused_before_the_training(meshes, tmp_p
 
 @pytest.fixture
 def prepared(monkeypatch):
-    """Collects what sets a training asks for: whether closed, in which order, and the problem."""
+    """List of the sets of a training: whether closed, order, and problem."""
     asked = []
     build = pretraining.build_problem
 
@@ -231,7 +231,7 @@ def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
 
 @pytest.mark.slow
 def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared):
-    """An untrained network returns φ₀, or -φ₀ where a set is turned: the same energy."""
+    """An untrained network returns φ₀, or -φ₀ where the sign is reversed; the energy is the same."""
     settings = replace(SETTINGS, learning_rate=0.0)
     losses = train(meshes, tmp_path / "weights.npz", settings)
     expected = [
@@ -260,14 +260,14 @@ def test_loss_weights_are_lowered_set_by_set(prepared, meshes, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("channels", [8, 9])
-def test_turned_sets_are_the_same_but_for_axes_and_sign(channels):
+def test_reoriented_sets_are_the_same_but_for_axes_and_sign(channels):
     generator = np.random.default_rng(3)
     features = torch.as_tensor(generator.normal(size=(20, channels)), dtype=torch.float32)
-    given = NetworkInput(features, features[:, 7].clone(), None, None, None)
+    inputs = NetworkInput(features, features[:, 7].clone(), None, None, None)
     before = features.clone()
     orientations = set()
     for _ in range(1000):
-        other = turned(given, generator)
+        other = randomly_reoriented(inputs, generator)
         axes = np.zeros((3, 3))
         for new in range(3):
             for old in range(3):
@@ -302,7 +302,7 @@ def test_impossible_settings_are_refused_by_name(meshes, tmp_path, change, named
 
 @pytest.mark.slow
 def test_sets_with_maps_train_the_ninth_channel(meshes, tmp_path, prepared):
-    """Also in sets without one, where φ_fea is neutral."""
+    """Some of the sets have no map; there φ_fea is neutral."""
     settings = replace(SETTINGS, sets=12, epochs=1, map_share=0.5)
     train(meshes, tmp_path / "weights.npz", settings)
     weights = load_weights(tmp_path / "weights.npz", channels=9).parameters

@@ -1,4 +1,4 @@
-"""What every cut must fulfil, told without the code that makes it."""
+"""Assertions that every cut must satisfy, independent of the code that cuts."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from tests.core.checks import euler_characteristic
 
 
 def sides(faces):
-    """Sides of faces in the direction in which they turn."""
+    """Directed sides of faces, in the orientation of the faces."""
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
@@ -19,7 +19,7 @@ def assert_valid_cut(mesh, cut, curve=None):
     np.testing.assert_array_equal(cut.vertices[:n_input], mesh.vertices)
     assert len(np.unique(cut.faces)) == len(np.unique(mesh.faces)) + len(cut.new_face)
 
-    # The surface is as it was.
+    # The surface has not changed.
     assert euler_characteristic(cut.faces) == euler_characteristic(mesh.faces)
     edges, count = edges_with_counts(cut.faces)
     assert count.max() <= max(2, edges_with_counts(mesh.faces)[1].max())
@@ -35,13 +35,13 @@ def assert_valid_cut(mesh, cut, curve=None):
         np.bincount(cut.source_face, areas), mesh.face_areas, rtol=1e-7, atol=1e-12 * areas.max()
     )
 
-    # Every part turns as its source does and has an area; none has a corner outside of it.
+    # Every part has an area and the orientation of its source face, and lies inside it.
     weights = cut.corner_weights(mesh)
     assert np.linalg.det(weights).min() > 0.0
     assert weights.min() >= 0.0
     np.testing.assert_allclose(weights.sum(axis=2), 1.0, atol=1e-9)
 
-    # Values that are linear on each face come out exact, also where faces do not agree on them.
+    # Values that are linear on each face are reproduced, even if they differ between faces.
     generator = np.random.default_rng(0)
     linear = mesh.vertices @ generator.normal(size=(3, 2)) + 1.0
     np.testing.assert_allclose(
@@ -75,7 +75,7 @@ def longest_edge(mesh):
 
 
 def components_without(faces, chain_edges):
-    """Number of components of faces that are not connected across some edges."""
+    """Number of components of the faces if some edges do not connect them."""
     forbidden = {tuple(sorted(edge)) for edge in chain_edges.tolist()}
     keys = np.sort(sides(faces), axis=1)
     at_edge = {}

@@ -1,4 +1,4 @@
-"""Surfaces with curves on them."""
+"""Surfaces with designed curves, for the tests of outputs."""
 
 from functools import cache
 
@@ -12,7 +12,7 @@ KINDS = ("sphere", "torus", "creature", "disc", "Möbius strip", "annulus")
 
 @cache
 def designed(kind, seed, noisy, closed, method):
-    """A surface and a curve through random points of it; no curve where the surface forbids it."""
+    """A surface and a curve through random points on it, or None if no such curve exists."""
     mesh = surface(kind, seed, noisy)
     generator = np.random.default_rng(seed)
     faces = generator.choice(len(mesh.faces), 4, replace=False)

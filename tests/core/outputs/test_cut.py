@@ -1,4 +1,4 @@
-"""Cuts along designed curves, and along curves made to be awkward."""
+"""Tests cuts along designed curves, and along curves in degenerate positions."""
 
 from collections import Counter
 
@@ -23,7 +23,7 @@ NO_CONTROLS = np.zeros(0, dtype=np.int64)
 
 
 def curve_at(mesh, points, closed):
-    """A curve through (face, coordinates) pairs."""
+    """A curve through points, given as (face, barycentric coordinates) pairs."""
     faces, barycentric = zip(*points, strict=True)
     barycentric = np.array(barycentric, dtype=float)
     return curve_on_mesh(mesh, closed, np.array(faces), barycentric, NO_CONTROLS)
@@ -185,12 +185,12 @@ def test_points_near_a_vertex_move_there():
 
 
 def test_strands_that_snapping_would_join_stay_apart():
-    """Two strands pass a vertex on either side, both nearer than the margin."""
+    """Strands pass a vertex on opposite sides, both closer than the snapping margin."""
     mesh = grid(2)
     near = 1e-4
     around = np.flatnonzero((mesh.faces == 4).any(axis=1)).tolist()
     loop = []
-    # A loop round the vertex, so small that all of it would fall on the vertex.
+    # A loop round the vertex, so small that all of its points would snap to the vertex.
     for face in around:
         corner = int((mesh.faces[face] == 4).argmax())
         here = mesh.faces[face][(corner + 1) % 3]
@@ -207,7 +207,7 @@ def test_strands_that_snapping_would_join_stay_apart():
 
 @pytest.mark.slow
 def test_quads_stay_whole_polygons_where_they_can():
-    """A curve through a row of quads leaves two polygons of each."""
+    """A curve through a row of quads cuts each of them into two polygons."""
     mesh = grid(4)
     quad = np.tile(np.arange(16), 2)
     curve = nicmm.design_curve(mesh, [2, 22], closed=False).curves[0]
@@ -269,7 +269,7 @@ def test_polygons_of_random_pairs_of_triangles(seed, closed, kind):
 
 
 def pairs_of_faces(mesh, seed):
-    """Every face with one neighbour that is still free, if any, as the triangles of quads."""
+    """Quad of each face: pairs of adjacent faces, chosen greedily; some faces stay single."""
     owner = np.full(len(mesh.faces), -1)
     for face in np.random.default_rng(seed).permutation(len(mesh.faces)):
         if owner[face] < 0:
@@ -289,7 +289,7 @@ def test_curves_that_cannot_be_cut():
     centre = (1 / 3, 1 / 3, 1 / 3)
     with pytest.raises(nicmm.CurveError, match="point 1 has face 99"):
         cut_mesh(mesh, no_positions([0, 99], [centre, centre]))
-    with pytest.raises(nicmm.CurveError, match="no face holds its points 0 and 1"):
+    with pytest.raises(nicmm.CurveError, match="no face contains its points 0 and 1"):
         cut_mesh(mesh, curve_at(mesh, [(0, centre), (7, centre)], False))
     with pytest.raises(nicmm.CurveError, match="has 1 points, too few"):
         cut_mesh(mesh, curve_at(mesh, [(0, centre)], False))

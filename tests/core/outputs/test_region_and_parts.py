@@ -1,4 +1,4 @@
-"""What curves enclose, and surfaces parted along them, against independent counts."""
+"""Tests enclosed regions, and surfaces parted along curves, against independent counts."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from tests.oracles.named_curves import named_curves
 
 @pytest.fixture(scope="module")
 def cap():
-    """A parallel of the sphere with the angle 0.5 to the pole, as good as the mesh allows."""
+    """A curve near the parallel of the sphere at an angle of 0.5 from the pole, and its cut."""
     mesh = shapes.sphere(4)
     angles = np.arange(8) * 2 * np.pi / 8
     ring = np.stack(
@@ -74,7 +74,7 @@ def test_random_curves_bound_where_they_separate(kind, seed, closed):
         return
     region = enclosed_region(mesh, cut)
     assert 0.0 < region.area <= 0.5 * mesh.face_areas.sum() * (1 + 1e-9)
-    # A side may be several parts, where the curve touches the rim.
+    # A side may have several parts if the curve touches the rim.
     assert not set(parted.part[region.cut_faces]) & set(parted.part[~region.cut_faces])
     for wanted in (region.cut_faces, ~region.cut_faces):
         here = np.flatnonzero(wanted)[0]
@@ -97,7 +97,7 @@ def test_curves_round_a_tube_bound_nothing_and_open_the_surface(name):
     parted = part_mesh(cut)
     assert parted.part.max() == 0
     assert euler_characteristic(parted.faces) == euler_characteristic(found.mesh.faces)
-    # One-sided curves have one bank as long as both would be.
+    # A cut along a one-sided curve has one rim, as long as the two rims of a two-sided one.
     two_sided = "Möbius" not in name
     assert len(parted.vertices) - len(cut.vertices) == len(cut.chain)
     rims = rim_loops(parted.faces) - rim_loops(found.mesh.faces)

@@ -1,4 +1,4 @@
-"""One triangle cut along random segments."""
+"""Tests the triangulation of one face along random segments."""
 
 import numpy as np
 import pytest
@@ -118,7 +118,7 @@ def test_without_segments_it_is_delaunay():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_points_along_a_line_leave_no_sliver(seed):
-    """As a curve has them that runs straight on inside a face."""
+    """As on a curve that runs straight inside a face."""
     generator = np.random.default_rng(seed)
     start, end = generator.dirichlet([1.0] * 3, size=2)
     share = np.linspace(0.0, 1.0, 7)[:, None]

@@ -1,4 +1,4 @@
-"""The initial loop: simple, without chords, along edges and through the points in order."""
+"""Tests that the initial loop is simple, has no chords, and passes the points in order."""
 
 import json
 import re
@@ -90,20 +90,20 @@ PLACES = st.lists(
 @given(places=PLACES, order=st.sampled_from(["given", "shortest"]))
 @example(places=[(0, (1, 0, 0)), (0, (0.5, 0.5, 0)), (0, (0.2, 0.3, 0.5))], order="given")
 def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
-    """A path never cuts a sphere in two, so every order of different points has a loop."""
+    """An open path does not separate a sphere, so every order of distinct points has a loop."""
     faces, barycentric = zip(*places, strict=True)
     given_points = nicmm.SurfacePoints(np.array(faces), np.array(barycentric, dtype=float))
     try:
         points = locate_control_points(BALL, given_points, closed=True)
     except nicmm.ControlPointError:
-        return  # Two of them are the same point.
+        return  # two of the points coincide
     working, loop = build_initial_loop(BALL, points, order)
     assert_simple_loop(BALL, points, order, working, loop)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_loops_of_many_strands_are_simple(small_ball, seed):
-    """Points in random order: the paths wind round one another and split the mesh often."""
+    """With points in random order, paths wind round one another and split the mesh often."""
     chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
     points = locate_control_points(small_ball, chosen, closed=True)
     working, loop = build_initial_loop(small_ball, points, "given")
@@ -116,7 +116,7 @@ def test_shortest_order_is_that_of_the_distances(ball):
     _, loop = build_initial_loop(ball, points, "shortest")
     chord = np.linalg.norm(circle(angles)[:, None] - circle(angles)[None], axis=2)
     expected = shortest_order(chord, closed=True).tolist()
-    # On the mesh the points are not quite evenly spaced, so the tour may start at another one.
+    # On the mesh the points are not exactly evenly spaced, so the tour may start elsewhere.
     found = loop.order.tolist()
     found = np.roll(found, -found.index(expected[0])).tolist()
     assert found in (expected, [expected[0], *expected[:0:-1]])
@@ -135,7 +135,7 @@ SURFACES = {
 
 @pytest.mark.slow
 class TestEveryOrder:
-    """Arcs that are apart separate no surface without boundary, so every order has a path."""
+    """Disjoint arcs do not separate a surface without boundary, so every order has a path."""
 
     @settings(max_examples=40)
     @given(
@@ -157,7 +157,7 @@ class TestEveryOrder:
     @settings(max_examples=15)
     @given(count=st.integers(3, 9), seed=st.integers(0, 10**6), closed=st.booleans())
     def test_inside_a_disc(self, flat_disc, count, seed, closed):
-        """Nor do they separate a disc as long as they keep off its boundary."""
+        """Disjoint arcs do not separate a disc either, unless they touch its boundary."""
         inner = interior_vertices(flat_disc)
         chosen = np.random.default_rng(seed).choice(inner, count, replace=False)
         points = locate_control_points(flat_disc, chosen, closed)
@@ -167,7 +167,7 @@ class TestEveryOrder:
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_many_points(self, ball, closed):
-        """Twenty points back and forth: legs in this order made the path four times as long."""
+        """Twenty points back and forth; with legs found in this order the path was four times as long."""
         chosen = np.random.default_rng(20).choice(len(ball.vertices), 20, replace=False)
         points = locate_control_points(ball, chosen, closed)
         working, loop = build_initial_loop(ball, points, "given", None, closed)
@@ -185,7 +185,7 @@ class TestBoundary:
     def test_an_order_along_the_rim_works_and_any_other_names_one(
         self, flat_disc, count, seed, closed
     ):
-        """Two legs between points of the rim cross exactly if their ends alternate round it."""
+        """Two legs between points on the rim cross exactly if their ends alternate along it."""
         generator = np.random.default_rng(seed)
         rim = boundary_loop(flat_disc)
         places = np.sort(generator.choice(len(rim), count, replace=False))
@@ -208,7 +208,7 @@ class TestBoundary:
     @pytest.mark.parametrize("closed", [True, False])
     @pytest.mark.parametrize("seed", range(3))
     def test_points_inside_do_not_hinder_those_of_the_rim(self, flat_disc, seed, closed):
-        """Leg 0 cuts the disc, and all points inside have to be left on one side of it."""
+        """Leg 0 divides the disc and has to leave all inner points on the same side."""
         rim = nearest_vertices(flat_disc, circle([0.0, np.pi]))
         inner = np.setdiff1d(interior_vertices(flat_disc), flat_disc.faces[0])
         chosen = np.random.default_rng(seed).choice(inner, 4, replace=False)
@@ -217,7 +217,7 @@ class TestBoundary:
         assert_simple_loop(flat_disc, points, "given", working, loop, closed)
 
     def test_strip_one_triangle_wide(self):
-        """Every vertex is on the boundary, and there and back lead through the same triangles."""
+        """All vertices are on the boundary, and the loop passes the same triangles twice."""
         x = np.repeat(np.arange(12.0), 2)
         vertices = np.stack([x, np.tile([0.0, 1.0], 12), 0 * x], axis=1)
         faces = [f for i in range(0, 22, 2) for f in ((i, i + 2, i + 1), (i + 1, i + 2, i + 3))]
@@ -233,7 +233,7 @@ class TestBoundary:
         assert working.on_boundary[loop.vertices].sum() == 3
 
     def test_triangle_through_its_corners(self):
-        """A face whose three edges are all boundary has to be split before any leg."""
+        """A face with three boundary edges has to be split before any leg is found."""
         mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         points = locate_control_points(mesh, [0, 1, 2], closed=True)
         working, loop = build_initial_loop(mesh, points, "given")
@@ -242,7 +242,7 @@ class TestBoundary:
 
 class TestNoManifold:
     def test_spheres_that_touch_have_open_curves_only(self):
-        """A curve may pass the common vertex once."""
+        """A curve may pass the common vertex only once."""
         ball = shapes.sphere(1)
         top = int(ball.vertices[:, 2].argmax())
         other = ball.vertices * [1, 1, -1] + [0, 0, 2 * ball.vertices[top, 2]]
@@ -257,11 +257,11 @@ class TestNoManifold:
         assert_simple_loop(mesh, points, "given", working, loop, closed=False)
         chosen = [lowest, lowest + count, int(ball.vertices[:, 0].argmax())]
         points = locate_control_points(mesh, chosen, closed=True)
-        with pytest.raises(nicmm.UnreachableError, match="no order was found"):
+        with pytest.raises(nicmm.UnreachableError, match="no order works"):
             build_initial_loop(mesh, points, "given")
 
     def test_a_path_leaves_an_edge_of_three_faces_alone(self):
-        """A fin stands on a sheet; points on either side of it are joined round its end."""
+        """A fin stands on a sheet; a path between its two sides leads round its end."""
         x, y = (c.ravel() for c in np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"))
         corner = np.array([7 * i + j for i in range(6) for j in range(6)])
         sheet = np.concatenate([corner[:, None] + [0, 7, 8], corner[:, None] + [0, 8, 1]])
@@ -279,25 +279,25 @@ def test_a_path_that_winds_too_often_names_an_order(ball, monkeypatch):
     monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
     chosen = np.random.default_rng(0).choice(len(ball.vertices), 24, replace=False)
     points = locate_control_points(ball, chosen, closed=True)
-    with pytest.raises(nicmm.UnreachableError, match=r"winds round itself too often.*which works"):
+    with pytest.raises(nicmm.UnreachableError, match=r"winds around itself too often.*which works"):
         build_initial_loop(ball, points, "given")
 
 
 def boundary_loop(mesh):
-    """Vertices of a boundary in order; the mesh has only one, about the origin."""
+    """Vertices of the only boundary loop, about the origin, in order."""
     rim = np.setdiff1d(mesh.faces, interior_vertices(mesh))
     return rim[np.argsort(np.arctan2(mesh.vertices[rim, 1], mesh.vertices[rim, 0]))]
 
 
 def legs_alternate(order, closed):
-    """Whether any two legs of an order of places on a circle have ends that alternate."""
+    """Whether the ends of two legs alternate, for points on a circle in a visiting order."""
     onward = np.roll(order, -1) if closed else order[1:]
     pairs = [sorted(pair) for pair in zip(order.tolist(), onward.tolist(), strict=False)]
     return any(first[0] < second[0] < first[1] < second[1] for first in pairs for second in pairs)
 
 
 def interior_vertices(mesh):
-    """Vertices off the boundary."""
+    """Vertices that are not on the boundary."""
     sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
     return np.setdiff1d(mesh.faces, edges[count == 1])
@@ -338,7 +338,7 @@ class TestBoundaries:
     @pytest.mark.parametrize("closed", [True, False])
     @pytest.mark.parametrize("seed", range(6))
     def test_many_points_on_boundaries_are_visited_in_an_order_that_works(self, seed, closed):
-        """The shortest one, from side to side of a narrow ring, is often impossible."""
+        """The shortest order changes sides of a narrow ring often, which is usually impossible."""
         mesh = shapes.annulus(5, hole=0.7)
         rim = np.unique(mesh.unpaired_edges[0])
         chosen = np.random.default_rng(seed).choice(rim, 9, replace=False)

@@ -1,4 +1,4 @@
-"""Via points: the curve comes out on the side that they lie on, and bad ones are refused."""
+"""Tests that via points determine the course of the curve, and that invalid ones are refused."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def design(mesh, points, **settings):
 
 
 def windings(curve):
-    """How often a curve on a torus goes round the axis and round the tube."""
+    """Winding numbers of a curve on a torus, around the axis and around the tube."""
     points = np.concatenate([curve.points, curve.points[:1]])
     around = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
     across = np.unwrap(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]) - 1.0))
@@ -28,7 +28,7 @@ def windings(curve):
 class TestWhichWay:
     @pytest.mark.slow
     def test_open_curve_goes_round_the_other_side_of_a_sphere(self, ball):
-        """Nothing but the initial path tells the shorter arc of a great circle from the longer."""
+        """Only the initial path decides between the shorter and the longer arc of a great circle."""
         points = nearest_vertices(ball, circle([0.0, 2.0]))
         far = nearest_vertices(ball, circle([4.1]))
         near_side = design(ball, points, closed=False)
@@ -38,7 +38,7 @@ class TestWhichWay:
             along = result.curves[0].points
             turned = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
             assert turned[-1] - turned[0] == pytest.approx(angle, abs=0.1)
-            # Open curves are free near their ends and somewhat longer than they need be.
+            # Open curves are free near their ends and slightly longer than necessary.
             assert abs(angle) * 0.98 < result.curves[0].length < abs(angle) * 1.2
 
     @pytest.mark.slow
@@ -82,7 +82,7 @@ class TestWhichWay:
     @pytest.mark.slow
     @pytest.mark.parametrize("closed", [True, False])
     def test_on_the_boundary_they_steer_and_the_curve_keeps_off_it(self, flat_disc, closed):
-        """The via point is beyond the line that joins the other two points of the rim."""
+        """The via point is on the other side of the line between the two adjacent control points."""
         rim = nearest_vertices(flat_disc, circle(np.pi / 3 * np.arange(6)))
         found = design(flat_disc, rim[[0, 2, 4]], closed=closed, via_points={0: rim[[3]]})
         assert_valid_design(flat_disc, found, flat_disc.vertices[rim[[0, 2, 4]]], closed)
@@ -91,16 +91,17 @@ class TestWhichWay:
 
     @pytest.mark.slow
     def test_impossible_ones_are_named_and_left_out_in_the_advice(self, ball, monkeypatch):
-        """Through many points back and forth the path winds more often than it may."""
+        """Through many points back and forth the path needs more splits than allowed."""
         monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
         chosen = np.random.default_rng(0).choice(len(ball.vertices), 40, replace=False)
         points = locate_control_points(ball, chosen[:3], closed=True)
-        with pytest.raises(nicmm.UnreachableError, match=r"without via points.*\[0, 1, 2\]"):
+        with pytest.raises(nicmm.UnreachableError, match=r"leave the via points out.*\[0, 1, 2\]"):
             build_initial_loop(ball, points, "given", via_points={0: chosen[3:]})
 
 
 BAD = {
     "no mapping": ([57], nicmm.ArgumentError, "via_points is a list"),
+    "an array": (np.array([57.0, 3.0]), nicmm.ArgumentError, "via_points is a ndarray"),
     "no such control point": ({3: [57]}, nicmm.ArgumentError, r"via_points\[3\].*0 … 2"),
     "negative": ({-1: [57]}, nicmm.ArgumentError, r"via_points\[-1\]"),
     "key is text": ({"1": [57]}, nicmm.ArgumentError, r"via_points\['1'\]"),

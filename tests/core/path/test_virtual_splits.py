@@ -1,4 +1,4 @@
-"""Virtual splits: the surface stays what it is, and every control point becomes a vertex."""
+"""Tests that virtual splits keep the surface and make every control point a vertex."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ WHERE = {
 
 
 def inserted(mesh, points, component=0):
-    """The working mesh with the points inserted, and the points' vertices."""
+    """Working mesh with the points inserted, and their vertices."""
     split = SplitMesh(mesh)
     vertices = split.insert_points(points)
     working, renumbered = split.assemble(component)
@@ -73,7 +73,7 @@ def test_edge_split_halves_both_faces_and_face_split_makes_three():
 
 
 def test_point_seen_from_the_other_face_of_an_edge_is_the_same_vertex(small_ball):
-    """A point on an edge may be given in either face; two there must not split it twice alike."""
+    """A point on an edge may be given in either face; two such points must not split it twice."""
     a, b, _ = small_ball.faces[7]
     (other,) = set(
         np.flatnonzero(((small_ball.faces == a) | (small_ball.faces == b)).sum(1) == 2)
@@ -109,7 +109,7 @@ def test_input_mesh_is_left_alone(small_ball):
 
 
 def test_edges_of_the_working_mesh_by_hand():
-    """Edges, their mean length and the boundary, on two right triangles that share an edge."""
+    """Edges, their lengths and the boundary, on two right triangles that share an edge."""
     mesh = nicmm.Mesh(
         [[0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 1], [3, 4, 0]], [[0, 1, 2], [2, 1, 4]]
     )
@@ -128,7 +128,7 @@ def test_boundary_is_the_rim(flat_disc, small_ball):
 
 
 def assert_same_surface(mesh, working):
-    """Same area, topology and orientation, and every face within its parent."""
+    """Assert equal area, topology and orientation, and that every face lies in its parent."""
     assert working.face_areas.min() > 0.0
     np.testing.assert_allclose(
         np.bincount(working.parent_face, weights=working.face_areas), mesh.face_areas, rtol=1e-9

@@ -1,4 +1,4 @@
-"""The shortest order: optimal for few points, never worse than the obvious tour for many."""
+"""Tests the shortest order: optimal for few points, at least as good as greedy for many."""
 
 from itertools import permutations
 
@@ -52,7 +52,7 @@ def test_few_points_get_the_optimal_open_tour(count, seed):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_many_points_get_a_tour_that_no_reversal_shortens(seed):
-    """And never a longer one than going to the nearest point each time."""
+    """The tour is at most as long as the nearest-neighbour tour, too."""
     count = EXACT_UP_TO + 11
     distance = distances(np.random.default_rng(seed).normal(size=(count, 3)))
     tour = shortest_order(distance, closed=True)
@@ -69,7 +69,7 @@ def test_many_points_get_a_tour_that_no_reversal_shortens(seed):
 
 @pytest.mark.parametrize("count", [EXACT_UP_TO, EXACT_UP_TO + 1, 24])
 def test_points_of_a_circle_are_visited_round_it(count):
-    """The tour round a convex polygon is the only one without a crossing."""
+    """For points in convex position, only the tour along the polygon has no crossing."""
     angle = np.random.default_rng(count).permutation(count) * 2 * np.pi / count
     tour = shortest_order(distances(np.stack([np.cos(angle), np.sin(angle)], 1)), closed=True)
     steps = np.diff(np.unwrap(angle[np.append(tour, tour[0])]))
@@ -96,13 +96,13 @@ def test_numbers_of_the_points_make_no_difference(count, closed):
 
 
 def test_equal_distances_end():
-    """2-opt on ties must not exchange for ever."""
+    """With ties, 2-opt must terminate."""
     distance = 1.0 - np.eye(EXACT_UP_TO + 3)
     assert sorted(shortest_order(distance, closed=True).tolist()) == list(range(len(distance)))
 
 
 class TestAlongBoundaries:
-    """Points of one loop of the boundary follow one another in its direction."""
+    """Points on one boundary loop are visited in the direction of the loop."""
 
     @pytest.mark.parametrize("closed", [True, False])
     @pytest.mark.parametrize("seed", range(4))
@@ -113,7 +113,7 @@ class TestAlongBoundaries:
         tour = order_along_boundaries(distance, loops, closed)
         assert sorted(tour.tolist()) == list(range(11))
         for loop in loops:
-            # The direction of the loop from any of its points on.
+            # In the direction of the loop, starting at any of its points.
             met = [point for point in tour.tolist() if point in loop]
             start = met.index(loop[0]) if len(loop) else 0
             assert met[start:] + met[:start] == loop.tolist()

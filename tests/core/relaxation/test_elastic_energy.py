@@ -20,7 +20,7 @@ from nicmm_core.relaxation.elastic_energy import (
     elastic_energy,
     elastic_system,
     feature_energy,
-    predicted_fall,
+    predicted_decrease,
 )
 from nicmm_core.relaxation.noded_curve import moved_along_conormals
 from tests.core.checks import circle, flipped, points_near, renumbered, scaled
@@ -342,7 +342,7 @@ def test_with_contact_a_step_solves_the_dense_system_too(count, held):
     np.testing.assert_array_equal(step[~free], 0.0)
     np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)
     expected = -2.0 * system.slope @ step - step @ dense(system) @ step
-    assert predicted_fall(system, step) == pytest.approx(expected)
+    assert predicted_decrease(system, step) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("mapped", [False, True])
@@ -361,7 +361,7 @@ def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
         moved_along_conormals(surface, nodes, step)[0], weights
     )
     assert fall > 0.0
-    assert fall == pytest.approx(predicted_fall(system, step), rel=0.05)
+    assert fall == pytest.approx(predicted_decrease(system, step), rel=0.05)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

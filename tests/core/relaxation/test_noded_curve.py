@@ -17,7 +17,7 @@ from nicmm_core.relaxation.noded_curve import (
     noded_curve,
     respaced,
     retraced,
-    rounded,
+    smoothed,
     traced_through,
     without_short_segments,
 )
@@ -280,7 +280,7 @@ def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(
     polygon = traced_through(surface, ring, ring.nodes)
     finer = respaced(surface, polygon, 144)
     assert bending_energy(finer.nodes) > 2.0 * 2.0 * np.pi / 0.6
-    smooth = rounded(surface, polygon, finer)
+    smooth = smoothed(surface, polygon, finer)
     assert is_simple(surface, smooth)
     assert bending_energy(smooth.nodes) == pytest.approx(2.0 * np.pi / 0.6, rel=0.1)
     controls = ring.nodes.positions[ring.control_nodes]

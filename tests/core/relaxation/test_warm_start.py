@@ -8,7 +8,7 @@ from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.noded_curve import without_short_segments
 from nicmm_core.relaxation.relaxing import RelaxationConfig, relax
-from nicmm_core.relaxation.warm_start import WARM, moved_along
+from nicmm_core.relaxation.warm_start import WARM, with_moved_controls
 from tests.core.checks import apart
 
 CHOSEN = [12, 80, 41, 150]
@@ -22,7 +22,7 @@ def test_a_dragged_curve_keeps_its_nodes(ball):
     result = without_short_segments(ball, first.noded_curve)
     np.testing.assert_array_equal(result.points, first.curve.points)
     places = locate_control_points(ball, first.curve.points[first.curve.control_index], True)
-    moved = moved_along(surface, first.noded_curve, places)
+    moved = with_moved_controls(surface, first.noded_curve, places)
     again = relax(surface, moved, 1.0, WARM)
     assert len(again.noded_curve.nodes.positions) == len(first.noded_curve.nodes.positions)
     assert again.iterations <= 2

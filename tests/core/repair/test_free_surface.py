@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.geometry.distances import build_distance_surface, spread
+from nicmm_core.geometry.distances import build_distance_surface, propagate
 from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import assert_valid_design
 from tests.oracles.named_curves import nearest_vertices
@@ -96,7 +96,7 @@ def test_clearance_keeps_the_curve_away():
     design = nicmm.design_curve(ball, chosen, obstacles=weights, clearance=0.2)
     assert_valid_design(ball, design)
     distance = np.where(weights >= 1.0, 0.0, np.inf)
-    spread(
+    propagate(
         build_distance_surface(ball.vertices, ball.faces, ball.mean_edge_length), distance, np.inf
     )
     curve = design.curves[0]

@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.splines.offset import lifted
+from nicmm_core.splines.offset import offset_points
 from tests.core.checks import random_surface_points
 
 
@@ -13,7 +13,7 @@ from tests.core.checks import random_surface_points
 def test_points_of_a_sphere_move_along_its_radii(ball, height):
     points = random_surface_points(ball, 50, seed=0)
     place = points.positions(ball)
-    moved = lifted(ball, points.faces, points.barycentric, height)
+    moved = offset_points(ball, points.faces, points.barycentric, height)
     np.testing.assert_allclose(np.linalg.norm(moved - place, axis=1), abs(height), atol=1e-12)
     radial = place / np.linalg.norm(place, axis=1, keepdims=True)
     np.testing.assert_allclose(moved, place + height * radial, atol=0.02 * abs(height))
@@ -21,7 +21,7 @@ def test_points_of_a_sphere_move_along_its_radii(ball, height):
 
 def test_height_is_exact_over_a_plane(flat_disc):
     points = random_surface_points(flat_disc, 20, seed=1)
-    moved = lifted(flat_disc, points.faces, points.barycentric, 0.3)
+    moved = offset_points(flat_disc, points.faces, points.barycentric, 0.3)
     place = points.positions(flat_disc)
     np.testing.assert_allclose(moved - place, np.tile([0.0, 0.0, 0.3], (20, 1)), atol=1e-12)
 
@@ -38,7 +38,7 @@ def test_direction_is_continuous_over_an_edge():
                 shared = np.delete(cube.faces[face], side)
                 break
     seen = [
-        lifted(cube, np.array([face]), (0.5 * np.isin(cube.faces[face], shared))[None], 0.1)
+        offset_points(cube, np.array([face]), (0.5 * np.isin(cube.faces[face], shared))[None], 0.1)
         for face in (edge, neighbour)
     ]
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-12)
@@ -49,7 +49,7 @@ def test_face_normal_counts_where_normals_cancel():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
     mesh = nicmm.Mesh(vertices, np.array([[0, 1, 2], [0, 2, 1]]))
     third = np.full((2, 3), 1.0 / 3.0)
-    moved = lifted(mesh, np.array([0, 1]), third, 0.1)
+    moved = offset_points(mesh, np.array([0, 1]), third, 0.1)
     np.testing.assert_allclose(moved[:, 2], [0.1, -0.1])
     np.testing.assert_allclose(moved[:, :2], 1.0 / 3.0)
 
@@ -57,6 +57,6 @@ def test_face_normal_counts_where_normals_cancel():
 def test_faces_without_area_give_finite_positions():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
     mesh = nicmm.Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3]]))
-    flat = lifted(mesh, np.array([0]), np.array([[0.0, 1.0, 0.0]]), 0.1)
+    flat = offset_points(mesh, np.array([0]), np.array([[0.0, 1.0, 0.0]]), 0.1)
     assert np.isfinite(flat).all()
     assert np.linalg.norm(flat - vertices[1]) <= 0.1 + 1e-12
