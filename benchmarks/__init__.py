@@ -1,1 +1,1 @@
-"""Measurements of the method, one command a result; see `__main__`."""
+"""Benchmarks of the method: one module and one command per measurement; see `__main__`."""

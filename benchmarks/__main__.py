@@ -1,10 +1,12 @@
-"""Measure, and write down what was measured.
+"""Run measurements, save their data and generate the documents that present them.
 
-python -m benchmarks NAME [--quick]    one measurement
-python -m benchmarks all [--hours H] [--jobs N]   all that are stale, timed ones first and alone,
-                                       the others N at a time; run again to go on
-python -m benchmarks stale             what was measured on other code, with what changed
-python -m benchmarks write             RESULTS.md and the figures in other documents, from the data
+python -m benchmarks NAME [--quick]    run one measurement
+python -m benchmarks all [--hours H] [--jobs N]
+                                       run all stale measurements: timed ones first, one at a time,
+                                       then the others, N at a time; after an interruption, run
+                                       the same command again
+python -m benchmarks stale             list the measurements of other code, and what has changed
+python -m benchmarks write             regenerate RESULTS.md and the figures in other documents
 """
 
 from __future__ import annotations
@@ -42,6 +44,9 @@ MEASUREMENTS = (
     "degraded",
     "degraded_start",
     "courses",
+    "course_pictures",
+    "symmetry",
+    "dabs",
     "resolution",
     "gallery",
     "obstacles",
@@ -53,16 +58,16 @@ MEASUREMENTS = (
     "fuzz",
     "cuts",
 )
-"""Modules of this package, in the order of RESULTS.md; `report` says what is in them."""
+"""Modules of this package, in the order of RESULTS.md; see `report` for what each one defines."""
 
 UNKNOWN = 600.0
-"""Seconds that a measurement is expected to take which was never timed."""
+"""Expected duration, in seconds, of a measurement that has never been run."""
 
 BAR = "{desc}: {percentage:.0f} % |{bar}| {elapsed} passed, {remaining} left"
 
 
 def main() -> int:
-    """Parse the command line and run."""
+    """Parse the command line, run the command and return the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
         description=__doc__,
@@ -73,10 +78,15 @@ def main() -> int:
     how_much.add_argument("--quick", action="store_true", help="fewer meshes and points: minutes")
     how_much.add_argument("--smoke", action="store_true", help="generated meshes: seconds")
     parser.add_argument(
-        "--hours", type=float, help="with `all`: begin nothing that would end later"
+        "--hours",
+        type=float,
+        help="with `all`: do not start a measurement that would end after this time",
     )
     parser.add_argument(
-        "--jobs", type=int, default=1, help="with `all`: measurements at a time that are not timed"
+        "--jobs",
+        type=int,
+        default=1,
+        help="with `all`: number of untimed measurements to run in parallel",
     )
     options = parser.parse_args()
     scale = Scale.QUICK if options.quick else Scale.SMOKE if options.smoke else Scale.FULL
@@ -93,7 +103,7 @@ def main() -> int:
 
 
 def measure_one(name: str, scale: Scale) -> None:
-    """Run a measurement, keep its data, draw its plots and print its section."""
+    """Run a measurement, save its data, draw its plots and print its section."""
     started = time.perf_counter()
     results = importlib.import_module(f"benchmarks.{name}").measure(scale)
     record = evidence.save(name, results, time.perf_counter() - started, scale)
@@ -104,23 +114,25 @@ def measure_one(name: str, scale: Scale) -> None:
 
 
 def measure_all(scale: Scale, hours: float | None, jobs: int) -> list[str]:
-    """Run what is stale and return what failed.
+    """Run all stale measurements and return the names of those that failed.
 
-    Timed measurements run first and one by one, while the machine is quiet, then the others, `jobs`
-    at a time. Each keeps its data when it ends, so an interrupted run goes on where it was.
+    Timed measurements run first, one at a time, while the machine is otherwise idle. The others
+    follow, `jobs` at a time. Each measurement saves its data when it ends, so a second call
+    continues where an interrupted one stopped.
     """
     full = scale is Scale.FULL
     stale = [name for name in MEASUREMENTS if not full or evidence.what_changed(name)]
     expected = {name: _expected(name) for name in stale}
     timed = [name for name in stale if _is_timed(name)]
-    others = sorted(set(stale) - set(timed), key=lambda name: -expected[name])
+    others = [name for name in stale if name not in timed]
+    others.sort(key=lambda name: -expected[name])  # the longest first, so that all end together
     failed: list[str] = []
     started = time.perf_counter()
 
     def run(name: str) -> None:
         passed = time.perf_counter() - started
         if hours is not None and passed + expected[name] > 3600.0 * hours:
-            tqdm.write(f"{name} would end after the hours given: not begun")
+            tqdm.write(f"{name} not started: it would end after the given time")
         else:
             tqdm.write(f"{name} begun, {_in_words(expected[name])} expected")
             if not run_apart(name, scale):
@@ -139,7 +151,7 @@ def measure_all(scale: Scale, hours: float | None, jobs: int) -> list[str]:
 
 
 def run_apart(name: str, scale: Scale) -> bool:
-    """Run a measurement in a process of its own; return whether it succeeded."""
+    """Run a measurement in a separate process; return whether it succeeded."""
     log = _log_of(name)
     log.parent.mkdir(parents=True, exist_ok=True)
     flags = [] if scale is Scale.FULL else [f"--{scale.value}"]
@@ -155,7 +167,7 @@ def run_apart(name: str, scale: Scale) -> bool:
 
 
 def list_stale() -> int:
-    """Print measurements on other code, with what changed; return whether there are any."""
+    """Print the stale measurements and what has changed; return 1 if there are any, else 0."""
     stale = False
     for name in MEASUREMENTS:
         if changed := evidence.what_changed(name):
@@ -165,7 +177,7 @@ def list_stale() -> int:
 
 
 def write() -> None:
-    """Generate RESULTS.md, and the figures in other documents."""
+    """Generate RESULTS.md and the figures in other documents."""
     records = report.kept_records(MEASUREMENTS)
     for name, record in records.items():
         report.draw(name, record, Scale.FULL)
@@ -182,7 +194,7 @@ def _is_timed(name: str) -> bool:
 
 
 def _expected(name: str) -> float:
-    """Seconds that a full run took last time."""
+    """Duration of the last full run in seconds, or `UNKNOWN`."""
     return float(evidence.load(name)["seconds"] or UNKNOWN) if evidence.is_kept(name) else UNKNOWN
 
 

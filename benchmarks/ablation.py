@@ -1,4 +1,4 @@
-"""What the network's modules and input features are worth (Table 3, Table 4)."""
+"""Ablation study of the modules of the network and of its input features (Table 3, Table 4)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ PAPER_MODULES = {
 """Milliseconds and loss of Table 3."""
 
 LOSS_WITHOUT_CURVE = 0.5
-"""Of φ = 0 on a surface of unit area, by Eq. 8."""
+"""Loss of φ = 0 on a surface of unit area, by Eq. 8."""
 
 ALL_FEATURES = "all features"
 
@@ -71,7 +71,7 @@ PAPER_FEATURES = {ALL_FEATURES: 32.0, "w/o normals": 35.4, "w/o φ_p": 75.4, "w/
 
 
 def measure(scale: Scale) -> Results:
-    """Pretrain every variant alike on one mesh and fine-tune for other sets of that mesh."""
+    """Pretrain all variants alike on one mesh and fine-tune them on other sets of that mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets, epochs = scale.choose(100, 6, 4), scale.choose(10, 2)
     networks, seconds = _pretrained({**MODULES, **FEATURES}, mesh, sets, epochs)
@@ -100,33 +100,41 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """Both tables, and whether they agree with the paper's."""
+    """Both tables, and whether they agree with the paper."""
     pretraining, modules, features = (
         results[part] for part in ("pretraining", "modules", "features")
     )
     seconds, runs, stops = pretraining["seconds"].values(), modules["runs"], features["stops"]
     return (
-        f"Mesh {results['mesh']} ({results['collection']}), {results['vertices']} vertices. Every "
-        f"variant is pretrained on the same {pretraining['sets']} sets (seed "
-        f"{pretraining['seed']}) × {pretraining['epochs']} epochs; that takes "
-        f"{min(seconds):.0f} to {max(seconds):.0f} s on one core, where the "
-        "paper has 30 minutes (Table 3) and 2 minutes (Table 4) on an RTX 4090, out of reach "
-        "here. Sets have 3–5 random vertices, shortest order.\n\n"
-        f"### Modules (Table 3)\n\n{len(runs[FULL]['seconds'])} sets (seed {modules['seed']}), "
-        f"{modules['iterations']} iterations.\n\n{_module_table(runs)}\n\n"
-        f"{_module_findings(runs)}\n\n"
+        "Variants of the network, each without a module (Table 3) or without an input feature "
+        "(Table 4), were pretrained alike and compared on other sets of control points of the same "
+        f"mesh. The mesh is {results['mesh']} ({results['collection']}; {results['vertices']} "
+        f"vertices), and pretraining uses {pretraining['sets']} sets (seed "
+        f"{pretraining['seed']}) and {pretraining['epochs']} epochs for every variant. That takes "
+        f"{min(seconds):.0f} to {max(seconds):.0f} s on one core; the paper pretrains for 30 "
+        "minutes (Table 3) and 2 minutes (Table 4) on an RTX 4090, which was not repeated. A set "
+        "has 3–5 random vertices in the shortest order.\n\n"
+        "### Modules (Table 3)\n\nEach row is a network without some of its modules, and each "
+        "measured value stands beside that of the paper. Time is that of "
+        f"{modules['iterations']} iterations of fine-tuning, and loss the lowest one up to then, "
+        f"both averaged over {len(runs[FULL]['seconds'])} sets (seed {modules['seed']}); relative "
+        "values are divided by those of the full network. Only relative values can be compared, "
+        "since machines and units differ.\n\n"
+        f"{_module_table(runs)}\n\n{_module_findings(runs)}\n\n"
         f"{report.figure('ablation.png', plots.LEAST_LOSSES)}\n\n"
-        f"### Input features (Table 4)\n\n{len(stops[ALL_FEATURES])} sets (seed "
-        f"{features['seed']}), with early stop.\n\n{_feature_table(stops, features['cap'])}\n\n"
+        "### Input features (Table 4)\n\nEach row is a network without one of its input "
+        "features, and the main value is the average number of iterations up to the early stop, "
+        f"over {len(stops[ALL_FEATURES])} sets (seed {features['seed']}).\n\n"
+        f"{_feature_table(stops, features['cap'])}\n\n"
         f"{_feature_findings(stops, features['least_iterations'])}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the losses of the networks without their modules."""
+    """Plot the losses of the networks with and without their modules."""
     plots.least_losses(
         {label: run["mean_losses"] for label, run in results["modules"]["runs"].items()},
-        "Networks without their modules (Table 3)",
+        "Networks with and without their modules (Table 3)",
         folder / "ablation.png",
     )
 
@@ -134,7 +142,7 @@ def draw(results: Results, folder: Path) -> None:
 def _pretrained(
     configs: Mapping[str, NetworkConfig], mesh: Mesh, sets: int, epochs: int
 ) -> tuple[dict[str, CurveNetwork], dict[str, float]]:
-    """A network for each variant, and the seconds of its training; equal variants share one."""
+    """Network of each variant, and its training time in seconds; equal variants share a network."""
     networks: dict[str, CurveNetwork] = {}
     seconds: dict[str, float] = {}
     for label, config in configs.items():
@@ -166,7 +174,8 @@ def _module_table(runs: Mapping[str, Results]) -> str:
             )
         )
     header = (
-        "network", "time (ms)", "paper", "relative", "paper", "loss", "paper", "relative", "paper",
+        "network", "time (ms)", "paper: time (ms)", "relative time", "paper: relative time",
+        "loss", "paper: loss", "relative loss", "paper: relative loss",
     )  # fmt: skip
     return report.table(header, rows)
 
@@ -180,7 +189,7 @@ def _loss_ratio(runs: Mapping[str, Results], label: str) -> float:
 
 
 def _module_findings(runs: Mapping[str, Results]) -> str:
-    """What Table 3 says, in words."""
+    """What the table of modules shows, in words, and whether it agrees with Table 3."""
     text = ""
     for label in runs:
         if label == FULL:
@@ -190,30 +199,27 @@ def _module_findings(runs: Mapping[str, Results]) -> str:
         if loss < 1.0:
             verdict = "lower, which contradicts the paper"
         elif loss - 1.0 < 0.25 * (paper - 1.0):
-            verdict = "hardly higher, which contradicts the paper's size of the effect"
+            verdict = "hardly higher, which contradicts the size of the effect in the paper"
         else:
-            verdict = "higher, as in the paper"
+            verdict = "higher, which agrees with the paper"
         text += (
-            f"{label[0].upper()}{label[1:]} the loss is {verdict} ({loss:.2f} against "
-            f"{paper:.2f}; higher on {100 * higher.mean():.0f} % of the sets). "
+            f"{label[0].upper()}{label[1:]}, the loss is {verdict} ({loss:.2f} times that of the "
+            f"full network; paper: {paper:.2f}; higher on {100 * higher.mean():.0f} % of the "
+            "sets). "
         )
     faster = all(_time_ratio(runs, label) < 1.0 for label in runs if label != FULL)
     text += (
-        "Each module costs time, as in the paper. "
+        "Each module costs time, which agrees with the paper. "
         if faster
-        else ("Not every variant without a module is faster, unlike in the paper. ")
+        else "Not every network without a module is faster, which contradicts the paper. "
     )
-    return text + (
-        "Times are of the prediction stage alone and on different machines; losses carry "
-        "different units. Only ratios can be compared, and each variant is pretrained once, so "
-        "small differences may be chance."
-    )
+    return text + "Each variant was pretrained only once, so small differences may be chance."
 
 
 def _early_stops(
     networks: Mapping[str, CurveNetwork], name: str, mesh: Mesh, count: int, cap: int
 ) -> dict[str, list[Results]]:
-    """How fine-tuning ends, by network."""
+    """How fine-tuning ends on each set, by network."""
     stops: dict[str, list[Results]] = {label: [] for label in networks}
     for sample in random_samples([(name, mesh)], count, FEATURE_SEED):
         started = time.perf_counter()
@@ -227,10 +233,10 @@ def _early_stops(
 
 
 def _stop(network: CurveNetwork, sample: Sample, cap: int) -> Results:
-    """How fine-tuning for one set ends.
+    """How fine-tuning on one set ends.
 
-    It is early if the early stop ends it and not the cap, and one loop if the level set itself is
-    one closed loop through all points.
+    "early" says whether the early stop ended it, and not the cap on iterations; "one_loop" whether
+    the level set itself is one closed loop through all points.
     """
     config = FinetuningConfig(iterations=cap)
     finetuned = finetune(network, sample.problem, sample.weights, config)
@@ -255,8 +261,9 @@ def _feature_table(stops: Mapping[str, Sequence[Results]], cap: int) -> str:
         for label, ends in stops.items()
     ]
     header = (
-        "features", "average iterations", "paper", f"stopped at the cap of {cap}", "loss then",
-        "level set one loop through all points",
+        "features", "average iterations", "paper: average iterations",
+        f"sets stopped by the cap of {cap} iterations", "final loss",
+        "level sets that are one loop through all points",
     )  # fmt: skip
     return report.table(header, rows)
 
@@ -266,7 +273,7 @@ def _iterations(ends: Sequence[Results]) -> float:
 
 
 def _feature_findings(stops: Mapping[str, Sequence[Results]], least_iterations: int) -> str:
-    """What Table 4 says, in words."""
+    """What the table of features shows, in words, and whether it agrees with Table 4."""
     full = _iterations(stops[ALL_FEATURES])
     text = ""
     for label, ends in stops.items():
@@ -276,33 +283,37 @@ def _feature_findings(stops: Mapping[str, Sequence[Results]], least_iterations: 
             _iterations(ends) / full,
             PAPER_FEATURES[label] / PAPER_FEATURES[ALL_FEATURES],
         )
-        agrees = "as in the paper" if ratio > 1.0 else "which contradicts the paper"
+        agrees = "agrees with" if ratio > 1.0 else "contradicts"
         text += (
-            f"{label[0].upper()}{label[1:]} it takes {ratio:.2f} times as many iterations, "
-            f"{agrees} ({paper:.2f}). "
+            f"{label[0].upper()}{label[1:]}, fine-tuning takes {ratio:.2f} times as many "
+            f"iterations as with all features, which {agrees} the paper ({paper:.2f} times). "
         )
     losses = {label: float(np.mean([end["loss"] for end in ends])) for label, ends in stops.items()}
     if losses[ALL_FEATURES] == min(losses.values()):
         text += (
-            "Fewer iterations do not mean a better end: the early stop fires when the energy "
-            "rests, at whatever value, and the loss then is least with all features. "
+            "Fewer iterations do not mean a better result: the early stop fires when the energy "
+            "no longer changes, whatever its value, and the final loss is lowest with all "
+            "features. "
         )
     without = stops["w/o φ₀"]
     loops = sum(end["one_loop"] for end in without)
     text += (
-        "A channel switched off is fed as zeros, in pretraining too. Without φ₀ the network's "
-        "output is no longer added to it either, so nothing says how the points are joined or "
-        f"which side is inside: {loops} of {len(without)} level sets are one loop through the "
-        "points. "
+        "A removed channel is zero in pretraining as well. Without φ₀, the output of the network "
+        "is not added to φ₀ either, so nothing determines how the points are joined or which side "
+        f"is inside: {loops} of {len(without)} level sets are one loop through the points. "
     )
     if losses["w/o φ₀"] > 0.9 * LOSS_WITHOUT_CURVE:
         text += (
-            f"Their loss, {losses['w/o φ₀']:.2f}, is that of φ = 0, no curve at all "
-            f"({LOSS_WITHOUT_CURVE:g}). "
+            f"Their mean loss of {losses['w/o φ₀']:.2f} is about that of φ = 0 "
+            f"({LOSS_WITHOUT_CURVE:g}), which has no curve at all. "
         )
     if loops < len(without):
         text += (
-            "The early stop only sees that the energy rests, not whether there is a curve, so "
-            "that row's iterations say little; the paper does not mention this. "
+            "The early stop tests whether the energy still changes, not whether there is a curve, "
+            "so the number of iterations in that row means little; the paper does not mention "
+            "this. "
         )
-    return text + f"The early stop does not count stillness before {least_iterations} iterations."
+    return text + (
+        f"Before iteration {least_iterations}, an energy that no longer changes does not count as "
+        "convergence."
+    )

@@ -1,7 +1,7 @@
-"""Generated bodies with flat and round sides and sharp edges, finely meshed as CAD exports are not.
+"""Generates CAD-like bodies: flat and curved sides, sharp edges, and a fine triangulation.
 
-A map has weights at vertices, so it can tell an edge from the sides beside it only where these have
-vertices of their own.
+CAD exports themselves are too coarse here. A map has its weights at vertices, so it can distinguish
+an edge from the adjacent sides only where the sides have interior vertices.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.mesh import Mesh
 
 PIECES = 36
-"""Edges along the longest side of a body, about."""
+"""Approximate number of edges along the longest side of a body."""
 
 
 def cad_shapes(generator: np.random.Generator, count: int) -> Iterator[tuple[str, Mesh]]:
-    """Bodies with random proportions, kinds in turn."""
+    """Named bodies with random proportions, cycling through the kinds."""
     makers = (_box, _bracket, _shaft, _wedge)
     for number in range(count):
         maker = makers[number % len(makers)]
@@ -33,14 +33,14 @@ def _box(generator: np.random.Generator) -> Mesh:
 
 
 def _bracket(generator: np.random.Generator) -> Mesh:
-    """An angle of two plates."""
+    """An L-shaped bracket of two plates."""
     a, b = generator.uniform(0.25, 0.5, 2)
     outline = np.array([[0, 0], [1, 0], [1, a], [b, a], [b, 1], [0, 1]])
     return extruded(outline, float(generator.uniform(0.4, 0.9)))
 
 
 def _wedge(generator: np.random.Generator) -> Mesh:
-    """A plate with a slope and a round end."""
+    """A plate with a sloping side and a rounded end."""
     angle = np.linspace(-0.5, 0.5, 13) * np.pi
     arc = np.stack([1.0 + 0.3 * np.cos(angle), 0.3 + 0.3 * np.sin(angle)], axis=1)
     top = generator.uniform(0.6, 0.9)
@@ -49,7 +49,7 @@ def _wedge(generator: np.random.Generator) -> Mesh:
 
 
 def _shaft(generator: np.random.Generator) -> Mesh:
-    """Cylinders of different radii, one on the other."""
+    """A stepped shaft: stacked cylinders with different radii."""
     radii = np.repeat(generator.uniform(0.2, 0.5, 3), 2)
     heights = np.repeat(np.cumsum(generator.uniform(0.3, 0.5, 4)), 2)[1:-1] - 0.5
     profile = np.concatenate(
@@ -59,12 +59,12 @@ def _shaft(generator: np.random.Generator) -> Mesh:
 
 
 def extruded(outline: FloatArray, height: float) -> Mesh:
-    """A prism over a polygon that runs anticlockwise, (n, 2), as high as said."""
+    """Prism over an anticlockwise polygon (n, 2)."""
     step = float(np.ptp(outline, axis=0).max()) / PIECES
     rim = _divided(np.concatenate([outline, outline[:1]]), step)[:-1]
     grid = np.arange(-PIECES, 2 * PIECES) * step
     inner = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-    # Rows are shifted, so that Delaunay's triangles are about regular.
+    # Every other row is shifted, so that the Delaunay triangles are nearly equilateral.
     inner[:, 0] += np.where(np.round(inner[:, 1] / step) % 2, 0.5 * step, 0.0)
     apart = np.linalg.norm(inner[:, None] - rim, axis=2).min(axis=1) > 0.7 * step
     flat = np.concatenate([rim, inner[apart & _inside(inner, outline)]])
@@ -93,7 +93,7 @@ def extruded(outline: FloatArray, height: float) -> Mesh:
 
 
 def revolved(profile: FloatArray) -> Mesh:
-    """A body of revolution about z; the profile (n, 2) of radii and heights ends on the axis."""
+    """Body of revolution about z; the profile (n, 2) of radii and heights ends on the axis."""
     step = float(np.ptp(profile, axis=0).max()) / PIECES
     path = _divided(profile, step)[1:-1]
     around = 2 * PIECES
@@ -121,7 +121,7 @@ def revolved(profile: FloatArray) -> Mesh:
 
 
 def _divided(polygon: FloatArray, step: float) -> FloatArray:
-    """A polygonal line with its segments in pieces of about a length, (m, 2)."""
+    """Polyline (m, 2) whose segments are divided into pieces of about the length ``step``."""
     parts = [polygon[:1]]
     for start, end in zip(polygon[:-1], polygon[1:], strict=True):
         pieces = max(1, round(float(np.linalg.norm(end - start)) / step))
@@ -131,7 +131,7 @@ def _divided(polygon: FloatArray, step: float) -> FloatArray:
 
 
 def _inside(points: FloatArray, outline: FloatArray) -> FloatArray:
-    """Whether each point lies in a polygon, by the crossings of a ray, (p,)."""
+    """Whether each point lies in a polygon, by counting ray crossings, shape (p,)."""
     x, y = points.T[:, :, None]
     (ax, ay), (bx, by) = outline.T, np.roll(outline, -1, axis=0).T
     across = (ay > y) != (by > y)

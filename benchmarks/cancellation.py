@@ -1,4 +1,4 @@
-"""How soon a design stops after it is cancelled: the time between two checks."""
+"""Measures how soon a design stops after it is cancelled: the time between two checkpoints."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ WITHOUT = ("outputs",)
 SEED = 0
 
 LONG = 0.1
-"""Seconds between two questions from which they are counted."""
+"""Time between two checkpoints, in seconds, above which a gap is counted."""
 
 
 @dataclass
 class Gaps:
-    """Seconds of CPU time from one question to the next, and where each was asked."""
+    """Progress function that records CPU time, place and fraction at every checkpoint."""
 
     seconds: list[float] = field(default_factory=list)
     places: list[str] = field(default_factory=list)
     fractions: list[float] = field(default_factory=list)
 
     def __call__(self, done: float, _: FloatArray) -> None:
-        """Be asked whether to go on."""
+        """Record a checkpoint; the design always continues."""
         self.note(_asking())
         self.fractions.append(done)
 
     def note(self, place: str) -> None:
-        """A moment."""
+        """Record the CPU time now, under the name of a place."""
         self.seconds.append(time.thread_time())
         self.places.append(place)
 
     @property
     def longest(self) -> tuple[float, str]:
-        """The longest time and where it began and ended."""
+        """Longest time between two checkpoints in seconds, and the places of both."""
         gaps = np.diff(self.seconds)
         place = int(gaps.argmax())
         return float(gaps[place]), f"{self.places[place]} to {self.places[place + 1]}"
 
 
 def measure(scale: Scale) -> Results:
-    """Design on large and on bad meshes, and note every question."""
+    """Design curves on large and on difficult meshes, and record every checkpoint."""
     return {
         "seed": SEED,
         "long": LONG,
@@ -68,11 +68,11 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The longest times, and where they passed."""
+    """Longest times between two checkpoints, and their places."""
     header = (
-        "mesh", "faces", "status", "seconds", "questions",
-        f"longer than {results['long']:g} s apart", "longest, s", "from … to",
-        "fractions that fell",
+        "mesh", "faces", "status", "CPU time (s)", "checkpoints",
+        f"gaps longer than {results['long']:g} s", "longest gap (s)", "its two checkpoints",
+        "decreases of the fraction",
     )  # fmt: skip
     rows = [
         (
@@ -89,18 +89,23 @@ def section(results: Results) -> str:
         for each in results["designs"]
     ]
     return (
-        f"Seed {results['seed']}. CPU time between two places where a design asks whether to go "
-        "on; the progress function itself is called at most every "
-        f"{results['interval']:g} s. The longest times are single calls that pass over arrays of "
-        "the size of the mesh.\n\n" + report.table(header, rows)
+        "A design can be cancelled at its checkpoints, and the table shows how far apart they are "
+        "on large and on difficult meshes. Each row is one design through random vertices (seed "
+        f"{results['seed']}). A gap is the CPU time between two consecutive checkpoints; the "
+        "longest one is how long a design may continue after it is cancelled, in addition to the "
+        f"{results['interval']:g} s between two calls of the progress function. The places are the "
+        "modules of `nicmm_core` that ask. On large meshes the longest gaps are single operations "
+        "on arrays of the size of the mesh. The last column counts how often the reported fraction "
+        "of the work decreased. The paper has no corresponding measurement.\n\n"
+        + report.table(header, rows)
     )
 
 
 def _designed(
     name: str, mesh: nicmm.Mesh, points: IntArray | FloatArray, arguments: dict[str, Any]
 ) -> Results:
-    """One design with the times between its questions."""
-    gaps, designer = Gaps(), nicmm.Designer  # which loads the core, once
+    """One design, with the times between its checkpoints."""
+    gaps, designer = Gaps(), nicmm.Designer  # the attribute access loads the core
     with _always_asked():
         gaps.note("start")
         design = designer(mesh).design(points, progress=gaps, **arguments)
@@ -121,7 +126,7 @@ def _designed(
 
 @contextmanager
 def _always_asked() -> Iterator[None]:
-    """Call progress functions at every question."""
+    """Make progress functions be called at every checkpoint."""
     interval = progress.INTERVAL
     progress.INTERVAL = 0.0
     try:
@@ -131,7 +136,7 @@ def _always_asked() -> Iterator[None]:
 
 
 def _asking() -> str:
-    """The module of the core that asks."""
+    """Module of the core that called the progress function."""
     frame = sys._getframe(2)
     while frame.f_back is not None:
         name = str(frame.f_globals["__name__"])
@@ -144,7 +149,7 @@ def _asking() -> str:
 def _requests(
     scale: Scale,
 ) -> Iterator[tuple[str, nicmm.Mesh, IntArray | FloatArray, dict[str, Any]]]:
-    """Name, mesh, points and arguments."""
+    """Name, mesh, points and arguments of every design."""
     creature = shapes.creature(1, faces=1_300, subdivisions=0)
     for subdivisions in range(scale.choose(2, 2, 1), scale.choose(6, 4, 2)):
         mesh = nicmm.Mesh(*igl.loop(creature.vertices, creature.faces, subdivisions))

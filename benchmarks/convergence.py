@@ -1,4 +1,4 @@
-"""How fast the loss falls and how little the curve changes after the early stop (Fig. 3, 4)."""
+"""Measures how the loss decreases and how the curve changes after the early stop (Fig. 3, 4)."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ WITHOUT = PARTS_WITHOUT
 
 SEED = 3
 LATER = (100, 200, 500)
-"""Iterations at which the curve is looked at again, as in Fig. 4."""
+"""Iterations after the early stop at which the curve is compared, as in Fig. 4."""
 
 PAPER_EARLY_STOP = 41
 PAPER_PLATEAU = 200
-"""Iterations of the early stop in Fig. 4, and from which on the loss rests (Fig. 3)."""
+"""Iteration of the early stop in Fig. 4, and iteration after which the loss plateaus in Fig. 3."""
 
 INDISTINGUISHABLE = 1.0
-"""Greatest distance in percent of the diagonal up to which two curves look the same."""
+"""Greatest distance, in percent of the diagonal, up to which two curves look the same."""
 
 RESTING = 0.1
-"""Share of its value that a loss may fall further when it is said to rest."""
+"""Greatest relative decrease of a loss that has reached its plateau."""
 
 STILLS = "convergence_curves.png"
 PICTURED = 3
@@ -50,7 +50,7 @@ COLOURS = (renders.BLUE, renders.ORANGE, renders.GREEN, renders.YELLOW)
 
 
 def measure(scale: Scale) -> Results:
-    """Continue fine-tuning beyond its early stop, on several meshes."""
+    """Continue fine-tuning beyond the early stop, on several meshes."""
     network = load_network()
     meshes = collections.surfaces(scale, scale.choose(8, 1))
     courses: list[Results] = []
@@ -73,28 +73,35 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The course of every loss and curve, and whether they agree with the paper's."""
+    """How the loss and the curve develop on each mesh, and whether that agrees with the paper."""
     courses, later = results["courses"], results["later"]
     loss_plot = report.figure(
         "convergence.png",
-        "Loss against the iteration; dots: early stop; dashed: where the paper sees a plateau",
+        "Loss against the iteration. Dots: early stop. Dashed: start of the plateau in the paper",
     )
     first, second, third = later
     stills = report.figure(
         results["stills"],
-        f"Curves at the early stop (blue), {first} (orange), {second} (green) and {third} (yellow)",
+        f"Curves at the early stop (blue) and after {first} (orange), {second} (green) and {third} "
+        "(yellow) iterations (Fig. 4)",
     )
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, "
-        f"{results['collection']}, shipped weights. Distances are mean / greatest in percent "
-        "of the bounding box's diagonal; seconds are of the prediction stage alone.\n\n"
+        "Fine-tuning by `nicmm-paper` was continued beyond its early stop, to see how the loss "
+        "decreases and how much the curve still changes, as in Fig. 3 and 4 of the paper. Each row "
+        "is a mesh with one set of 3–5 random vertices. Its columns are the iteration of the early "
+        f"stop; the time of fine-tuning up to the early stop and up to iterations {first}, "
+        f"{second} and {third}; mean / greatest distances between the curves at two of these "
+        "iterations, in percent of the bounding box diagonal; whether the level set was one loop "
+        "without a repair of its topology; and the share of the total decrease of the loss that "
+        f"had taken place by iteration {PAPER_PLATEAU}. Meshes: {results['collection']}; shortest "
+        f"order, shipped weights, seed {results['seed']}.\n\n"
         f"{_table(courses, later)}\n\n{_findings(courses, later)}\n\n{loss_plot}\n\n{stills}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the losses."""
-    figure, axes = plots.labelled("Loss of every iteration (Fig. 3)", "iteration", "total loss")
+    """Plot the losses."""
+    figure, axes = plots.labelled("Loss at every iteration (Fig. 3)", "iteration", "total loss")
     for course in results["courses"]:
         losses = _losses(course)
         (line,) = axes.plot(losses, linewidth=1.0, label=course["mesh"])
@@ -108,7 +115,7 @@ def draw(results: Results, folder: Path) -> None:
 
 
 def _followed(network: CurveNetwork, sample: Sample) -> tuple[Results, list[SurfaceCurve]]:
-    """One fine-tuning run, continued far beyond its early stop, and its curves there and later."""
+    """Results of a run continued far beyond its early stop, and its curves there and later."""
     early = finetune(network, sample.problem, sample.weights, FinetuningConfig())
     wanted = (early.iterations, *LATER)
     fields: dict[int, FloatArray] = {}
@@ -142,7 +149,7 @@ def _followed(network: CurveNetwork, sample: Sample) -> tuple[Results, list[Surf
 
 
 def _distances(sample: Sample, curves: Sequence[SurfaceCurve]) -> list[list[float | None]]:
-    """Mean and greatest from each curve to the next, and from the first to the last."""
+    """Mean and greatest distance of consecutive curves, and of the first and the last."""
     pairs = [*zip(curves, curves[1:], strict=False), (curves[0], curves[-1])]
     return [[significant(value) for value in relative_distances(sample, *pair)] for pair in pairs]
 
@@ -153,12 +160,12 @@ def _picture(sample: Sample, stop: int, curves: Sequence[SurfaceCurve]) -> rende
 
 
 def _losses(course: Results) -> FloatArray:
-    """Of every iteration; NaN where they were not finite."""
+    """Losses of all iterations; NaN where they were not finite."""
     return np.array(course["losses"], dtype=np.float64)
 
 
 def _fallen(course: Results, iteration: int) -> float:
-    """Share of the loss's fall, from the start to the end, that is done by an iteration."""
+    """Share of the total decrease of the loss that has taken place by an iteration."""
     least = np.fmin.accumulate(_losses(course))
     whole = least[0] - least[-1]
     return float((least[0] - least[iteration]) / whole) if whole > 0.0 else 1.0
@@ -173,7 +180,7 @@ def _table(courses: Sequence[Results], later: Sequence[int]) -> str:
                 f"{course['stop']}" if course["early"] else f"{course['stop']} (cap)",
                 " · ".join(f"{value:.1f}" for value in course["seconds"]),
                 *(f"{mean:.2f} / {most:.2f}" for mean, most in course["distances"]),
-                " ".join("yes" if one else "no" for one in course["by_itself"]),
+                " · ".join("yes" if one else "no" for one in course["by_itself"]),
                 f"{100 * _fallen(course, PAPER_PLATEAU):.0f} %",
             )
         )
@@ -185,14 +192,14 @@ def _table(courses: Sequence[Results], later: Sequence[int]) -> str:
     header = (
         "mesh", "early stop", f"seconds at the stop · {first} · {second} · {third}",
         f"stop to {first}", f"{first} to {second}", f"{second} to {third}", f"stop to {third}",
-        f"one loop by itself at the stop, {first} · {second} · {third}",
-        f"loss fallen by iteration {PAPER_PLATEAU}",
+        f"one loop by itself at the stop · {first} · {second} · {third}",
+        f"decrease of the loss by iteration {PAPER_PLATEAU}",
     )  # fmt: skip
     return report.table(header, rows)
 
 
 def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
-    """What the table says, in words."""
+    """What the table shows, in words, and whether it agrees with the paper."""
     stops = [course["stop"] for course in courses]
     greatest = [course["distances"][-1][1] for course in courses]
     same = sum(value <= INDISTINGUISHABLE for value in greatest)
@@ -202,27 +209,28 @@ def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     further = float(np.median([1.0 - one[-1] / one[PAPER_PLATEAU] for one in least]))
     longer = float(np.median([course["seconds"][-1] / course["seconds"][0] for course in courses]))
     text = (
-        f"Fig. 3: by iteration {PAPER_PLATEAU} the loss has fallen by "
-        f"{100 * np.median(fallen):.0f} % (median) of what it falls until {later[-1]}, "
+        f"Fig. 3: by iteration {PAPER_PLATEAU}, {100 * np.median(fallen):.0f} % (median) of the "
+        f"decrease of the loss up to iteration {later[-1]} has taken place; after it the loss "
+        f"decreases by a further {100 * further:.0f} % of its value, "
     )
-    text += f"and falls by a further {100 * further:.0f} % of its value there" + (
-        ": it rests, as in the paper. "
+    text += (
+        "so it has reached a plateau, which agrees with the paper. "
         if further <= RESTING
-        else ": most of the way is done, but it does not rest as in the paper. "
+        else "so it has not reached a plateau, which contradicts the paper. "
     )
     text += (
         f"At the early stop, after {np.median(stops):.0f} iterations (median; paper: "
-        f"{PAPER_EARLY_STOP}), it has fallen by {100 * np.median(at_stop):.0f} %. "
+        f"{PAPER_EARLY_STOP}), {100 * np.median(at_stop):.0f} % of the decrease has taken place. "
         f"{_jumps(courses, later[0])}\n\n"
-        f"Fig. 4: {later[-1]} iterations take {longer:.1f} times as long as the early stop "
-        f"(median). From there to {later[-1]} the curve moves by at most "
-        f"{np.median(greatest):.2f} % of the diagonal by the median and {max(greatest):.2f} % on "
-        f"the worst set; {same} of {len(courses)} stay within {INDISTINGUISHABLE:g} %, "
+        f"Fig. 4: {later[-1]} iterations take {longer:.1f} times as long as those up to the early "
+        f"stop (median). In between, the greatest distance of the curves is "
+        f"{np.median(greatest):.2f} % of the diagonal (median) and {max(greatest):.2f} % on the "
+        f"worst set. {same} of {len(courses)} curves stay within {INDISTINGUISHABLE:g} %, "
     )
     text += (
         "which agrees with the paper's “nearly indistinguishable”."
         if same == len(courses)
-        else "so curves are “nearly indistinguishable” as in the paper only on those."
+        else "so the paper's “nearly indistinguishable” holds only for those."
         if same
         else "which contradicts the paper's “nearly indistinguishable”."
     )
@@ -230,23 +238,23 @@ def _findings(courses: Sequence[Results], later: Sequence[int]) -> str:
     if changing:
         text += (
             f" On {changing} sets the level set was one loop by itself at some of these iterations "
-            "and not at others; there the part of the curve that follows φ₀ changes."
+            "and not at others; on these the part of the curve that follows φ₀ changes."
         )
     return text
 
 
 def _jumps(courses: Sequence[Results], after: int) -> str:
-    """On how many sets the loss left its course after the early iterations."""
+    """Sentence about the sets on which the loss exceeds its initial value after an iteration."""
     heights = {
         course["mesh"]: np.nanmax(_losses(course)[after:]) / _losses(course)[0]
         for course in courses
     }
     jumping = [name for name, height in heights.items() if height > 1.0]
     if not jumping:
-        return f"After iteration {after} no loss ever exceeds that of the start."
+        return f"After iteration {after} no loss exceeds its initial value."
     return (
-        f"After iteration {after} the loss jumps above that of the start on {len(jumping)} of "
-        f"{len(courses)} sets ({report.listed(jumping)}), up to {max(heights.values()):.0f} times "
-        "that value: the “numerical instability” of too many iterations that the paper warns of. "
-        "The field of the least loss is kept."
+        f"After iteration {after} the loss jumps above its initial value on {len(jumping)} of "
+        f"{len(courses)} sets ({report.listed(jumping)}), to up to {max(heights.values()):.0f} "
+        "times that value. This agrees with the paper, which warns of “numerical instability” "
+        "after too many iterations. The result is the field with the lowest loss."
     )

@@ -1,6 +1,6 @@
-"""Every mesh that is there: a valid curve, or an error where no curve can be.
+"""Tests on every available mesh that a request gives a good curve, or an error if none exists.
 
-`tests.oracles.corpus` asks for a curve and says which of four kinds the answer is.
+`tests.oracles.corpus` makes the requests and classifies the answers into four kinds.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .evidence import Results
 from .scale import Scale
 
 PATIENCE = 1200.0
-"""Seconds by the wall clock after which a curve is given up: it hangs."""
+"""Wall-clock time in seconds after which a request counts as hanging."""
 
 LISTED = 60
 SLOWEST = 8
@@ -40,11 +40,11 @@ SLOWEST = 8
 KIND = {True: "closed", False: "open"}
 
 
-TITLE = "Every mesh"
+TITLE = "Requests on every mesh"
 
 
 def measure(scale: Scale) -> Results:
-    """Ask for curves on all meshes, one collection after the other."""
+    """Request curves on all meshes, one collection after the other."""
     found = []
     for one in isolated(outcome, _items(scale), PATIENCE):
         found.append(_answer(one))
@@ -54,7 +54,7 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What came, sorted."""
+    """Answers by collection, and the ones that are declined or wrong."""
     answers = results["answers"]
     rows = []
     for folder in dict.fromkeys(each["folder"] for each in answers):
@@ -63,14 +63,23 @@ def section(results: Results) -> str:
     slowest = sorted(answers, key=lambda each: -each["seconds"])[:SLOWEST]
     listed = [each for each in answers if each["verdict"] in (DECLINED, WRONG)]
     return (
-        f"Seed {results['seed']}; on each mesh {results['requests']} curves through random "
-        "vertices, shortest order: 3–5 closed and 2–4 open, drawn from one part of the surface "
-        "that common edges connect, and from all of its vertices. Whether an error is due is "
-        "decided from the arrays alone.\n\n"
-        + report.table(("meshes", "curves", GOOD, DUE, DECLINED, WRONG, "CPU seconds"), rows)
+        "Curves were requested on every available mesh, sound or defective, and the table counts "
+        "the answers. Each row is a collection. A *good curve* is one simple curve through all "
+        "points according to the independent checker; an *error where due* is an error on a "
+        "request for which no curve exists, which is decided from the arrays of the mesh alone; "
+        "any other error of the package is *declined though possible*; everything else is *wrong*. "
+        f"There are {results['requests']} requests per mesh through random vertices (shortest "
+        f"order, seed {results['seed']}): closed curves through 3–5 and open ones through 2–4, "
+        "each once with all points on one part of the surface that is connected by common edges, "
+        "and once with points anywhere. The paper has no corresponding measurement; it shows a "
+        "gallery of third-party meshes (Fig. 15).\n\n"
+        + report.table(("meshes", "requests", GOOD, DUE, DECLINED, WRONG, "CPU seconds"), rows)
         + "\n\n"
-        + ("".join(f"- {_line(each)}\n" for each in listed[:LISTED]) or "None declined or wrong.\n")
-        + "\nThe slowest: "
+        + (
+            "".join(f"- {_line(each)}\n" for each in listed[:LISTED])
+            or "No request was declined or answered wrongly.\n"
+        )
+        + "\nThe slowest requests: "
         + report.listed(f"{_name(each)} {each['seconds']:.0f} s" for each in slowest)
         + "."
     )
@@ -92,7 +101,7 @@ def _items(scale: Scale) -> list[Item]:
 
 
 def _generated_requests(scale: Scale) -> list[tuple[str, int]]:
-    """All of them, or one request each."""
+    """All requests on generated meshes, or one per mesh at the scale of a smoke test."""
     names = [name for name, _ in defective_meshes()]
     if scale is Scale.SMOKE:
         return [(name, place % len(REQUESTS)) for place, name in enumerate(names)]

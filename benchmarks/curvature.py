@@ -1,6 +1,7 @@
-"""Geodesic curvature of the methods' curves (Fig. 7, 8, Eq. 10), and how far from fair they are.
+"""Measures the geodesic curvature of the curves of all methods (Fig. 7, 8, Eq. 10).
 
-The yardstick is a slow explicit curve through the same points, see `elastic_curve`.
+The reference for fairness is an explicit curve through the same points, which takes long to
+compute; see `elastic_curve`.
 """
 
 from __future__ import annotations
@@ -34,21 +35,21 @@ INITIAL, ELASTIC = "initial path", "elastic curve"
 
 BIN_WIDTH = 2.0
 CURVATURE_RANGE = 60.0
-"""Of the histogram, for κ_g times the curve's length; a circle in the plane has 2 π."""
+"""Range of the histogram of κ_g times the length of the curve; a circle in the plane has 2π."""
 
 SAMPLINGS = (SAMPLES, NODES)
-"""Numbers of samples that bending is measured with.
+"""Numbers of samples at which bending is measured.
 
-The first is that of all other measurements. Curves round thin limbs turn within a few of its
-steps, so its values are too rough there; the second sees also the corners at the mesh's edges.
+The first number is the default of `bending`. It is too coarse around thin limbs, where curves turn
+within a few samples. The second number also resolves the corners of a curve at mesh edges.
 """
 
 DIGITS = 4
-"""Decimals of bending that results keep."""
+"""Decimals of bending that are kept in results."""
 
 STILLS = "curvature_curves.png"
 PICTURED = 4
-"""Sets that the picture shows."""
+"""Number of sets that the picture shows."""
 
 
 def measure(scale: Scale) -> Results:
@@ -87,10 +88,10 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How much the curves bend, and how that compares with the paper."""
+    """Bending of the curves, and whether it agrees with the paper."""
     sets = results["sets"]
     histogram = report.figure(
-        "curvature.png", "Geodesic curvature of all curves, weighted by length (Fig. 8)"
+        "curvature.png", "Distribution of geodesic curvature, weighted by length (Fig. 8)"
     )
     stills = report.figure(
         results["stills"],
@@ -98,19 +99,24 @@ def section(results: Results) -> str:
         "curve (white) through the same points (Fig. 7)",
     )
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(sets)} meshes ({results['collection']}: "
-        f"{report.listed(each['mesh'] for each in sets)}); "
-        f"{results['left_out']} sets where a method did not give one curve are left out.\n\n"
+        "The table compares how much the curves of the methods bend through the same control "
+        "points. Each row is a kind of curve: the initial path along edges, the curve of each "
+        "method, and an explicit elastic curve as the reference. The values are quartiles over "
+        f"{len(sets)} sets of the bending L ∮ κ_g² ds, with κ_g by Eq. 10 at "
+        f"{' or '.join(str(samples) for samples in results['samplings'])} evenly spaced points, "
+        "and of its ratio to the bending of the elastic curve. A set has 3–5 random vertices, one "
+        f"set per mesh, in the shortest order (seed {results['seed']}); {results['left_out']} "
+        "sets for which a method did not give one curve are left out. Meshes "
+        f"({results['collection']}): {report.listed(each['mesh'] for each in sets)}.\n\n"
         f"{_table(results)}\n\n{_findings(results)}\n\n{histogram}\n\n{stills}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw shares of the length by curvature."""
+    """Plot the distribution of curvature, weighted by length."""
     figure, axes = plots.labelled(
         "Geodesic curvature, weighted by length (Fig. 8)",
-        "geodesic curvature times the curve's length",
+        "geodesic curvature times the length of the curve",
         "share of the length",
     )
     bounds = results["histogram"]["bounds"]
@@ -132,7 +138,7 @@ def draw(results: Results, folder: Path) -> None:
 
 
 def _curves(name: str, mesh: Mesh, points: IntArray) -> dict[str, SurfaceCurve] | None:
-    """Initial path, the curve of each method and the elastic curve; None if a method has none."""
+    """Initial path, curve of each method and elastic curve; None if a method gives no curve."""
     try:
         designs = {
             method: nicmm.design_curve(mesh, points, order="shortest", method=method)
@@ -153,12 +159,12 @@ def _curves(name: str, mesh: Mesh, points: IntArray) -> dict[str, SurfaceCurve] 
 
 
 def _bends(mesh: Mesh, curve: SurfaceCurve) -> list[float]:
-    """L ∮ κ_g² ds with each number of samples."""
+    """L ∮ κ_g² ds for each number of samples."""
     return [round(bending(mesh, curve, samples), DIGITS) for samples in SAMPLINGS]
 
 
 def _histogram(curvatures: Mapping[str, Sequence[FloatArray]]) -> Results:
-    """Samples by curvature, of all curves; those of a curve are evenly spaced along it."""
+    """Histogram of curvature at evenly spaced samples of all curves, by kind of curve."""
     bounds = np.arange(-CURVATURE_RANGE, CURVATURE_RANGE + BIN_WIDTH, BIN_WIDTH).tolist()
     counted = {}
     for label, of_curves in curvatures.items():
@@ -182,7 +188,7 @@ def _quartiles(values: Sequence[float], digits: int) -> str:
 
 
 def _ratios(results: Results, label: str, base: str, sampling: int) -> list[float]:
-    """Bending relative to that of another curve, of each set."""
+    """Bending relative to that of another kind of curve, for each set."""
     bends = [each["bending"] for each in results["sets"]]
     return [bend[label][sampling] / bend[base][sampling] for bend in bends]
 
@@ -198,29 +204,32 @@ def _table(results: Results) -> str:
         rows.append(row)
     header = ["curve"]
     for samples in results["samplings"]:
-        header += [f"L ∮ κ_g² ds, {samples} samples", "relative to the elastic curve"]
-    return report.table(header, rows) + "\n\nQuartiles over the sets."
+        header += [
+            f"L ∮ κ_g² ds, {samples} samples",
+            f"relative to the elastic curve, {samples} samples",
+        ]
+    return report.table(header, rows)
 
 
 def _findings(results: Results) -> str:
-    """What the table says, in words."""
+    """What the table shows, in words, and whether it agrees with the paper."""
     samplings = results["samplings"]
     text = (
-        f"The {ELASTIC} is the best of those that start from the initial path and from each "
-        "method's curve. Its topology is free, so it may cross itself, and it is a local optimum. "
-        "A circle in the plane has 4 π² ≈ 39. "
+        f"The {ELASTIC} is the fairest of those that start from the initial path and from the "
+        "curve of each method. It is a local optimum, and it may cross itself. "
     )
     for method in results["methods"]:
         both = " and ".join(
             f"{np.median(_ratios(results, method, ELASTIC, place)):.2f} times ({samples} samples)"
             for place, samples in enumerate(samplings)
         )
-        text += f"`{method}` bends {both} as much as it, by the median. "
+        text += f"By the median, `{method}` bends {both} as much as the elastic curve. "
     if "variational" not in results["methods"]:
-        return text + "The paper's comparison with the variational method is not possible yet."
+        return text + "There are no curves of the variational method to compare with the paper."
     middle = float(np.median(_ratios(results, "nicmm-paper", "variational", 0)))
     verdict = "which agrees with" if 0.8 <= middle <= 1.25 else "which contradicts"
     return text + (
-        f"`nicmm-paper` bends {middle:.2f} times as much as `variational` ({samplings[0]} samples, "
-        f"median), {verdict} the paper's “comparable distributions of geodesic curvature”."
+        f"By the median, `nicmm-paper` bends {middle:.2f} times as much as `variational` "
+        f"({samplings[0]} samples), {verdict} the paper's “comparable distributions of geodesic "
+        "curvature”."
     )

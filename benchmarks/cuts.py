@@ -1,4 +1,4 @@
-"""Cuts along designed curves, judged from outside: the same surface with the curve in its edges."""
+"""Tests cuts along designed curves: the result must be the same surface with the curve as edges."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TITLE = "Cuts along curves"
 SEED = 0
 
 AREA = 1e-9
-"""Most that the total area may change by, relative to itself."""
+"""Greatest relative change of the total area."""
 
 
 def measure(scale: Scale) -> Results:
@@ -49,16 +49,20 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How many cuts are sound."""
+    """Number of sound cuts, and the faults of the others."""
     cuts = [each for each in results["answers"] if "refused" not in each]
     area = np.format_float_scientific(results["area"], trim="-", exp_digits=1)
     return (
-        f"Seed {results['seed']}; on each mesh a closed and an open curve through 3–5 random "
-        "vertices. A cut is sound if Euler characteristic, boundary length and total area (to "
-        f"{area}) are as before, no edge has more than two faces that had not, every part has a "
-        "positive area and turns as its face does, every edge of the chain is there, and the mesh "
-        "falls apart along it exactly where the curve bounds a region. Refused: "
-        f"{len(results['answers']) - len(cuts)}.\n\n{_table(cuts)}\n\n{_faults(cuts)}"
+        "Meshes were cut along a closed and an open curve each, and the table counts the cuts that "
+        "are sound. A cut is sound if Euler characteristic, boundary length and total area (to "
+        f"{area}) are unchanged; no edge gets more than two faces; every part of a face has a "
+        "positive area and the orientation of its face; every edge of the curve is an edge of the "
+        "cut mesh; and the cut separates the mesh exactly if the curve bounds a region. Each row "
+        "is a collection, with the number of curves that bound a region, the smallest part of a "
+        "face relative to that face, and the median and greatest CPU time of a cut. The curves "
+        f"pass 3–5 random vertices (seed {results['seed']}). Cuts that were refused with an error: "
+        f"{len(results['answers']) - len(cuts)}. The paper has no corresponding measurement.\n\n"
+        f"{_table(cuts)}\n\n{_faults(cuts)}"
     )
 
 
@@ -71,7 +75,7 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
 
 
 def _cut(mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve) -> Results:
-    """What came of cutting along one curve; "least" is the smallest part of any face."""
+    """Outcome of a cut along one curve; "least" is the smallest part of a face, relative to it."""
     started = time.process_time()
     cut = nicmm.cut_mesh(mesh, curve)
     milliseconds = 1e3 * (time.process_time() - started)
@@ -120,8 +124,8 @@ def _n_parts(label: IntArray) -> int:
 
 def _table(cuts: Sequence[Results]) -> str:
     header = (
-        "meshes", "cuts", "sound", "that bound a region", "least part of a face",
-        "median ms (CPU)", "most",
+        "meshes", "cuts", "sound", "that bound a region", "smallest part of a face",
+        "median time (ms)", "greatest time (ms)",
     )  # fmt: skip
     rows = []
     for label in dict.fromkeys(cut["meshes"] for cut in cuts):
@@ -143,4 +147,4 @@ def _table(cuts: Sequence[Results]) -> str:
 
 def _faults(cuts: Sequence[Results]) -> str:
     listed = [f"- {cut['mesh']}: {report.listed(cut['faults'])}" for cut in cuts if cut["faults"]]
-    return "\n".join(listed) or "No cut has a fault."
+    return "\n".join(listed) or "All of these cuts are sound."

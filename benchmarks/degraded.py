@@ -1,4 +1,4 @@
-"""Curves on meshes with nearly degenerate faces (section 4.6; Fig. 10, 11, top of Fig. 12)."""
+"""Measures curves on meshes with nearly degenerate faces (section 4.6; Fig. 10, 11, 12 top)."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ WITHOUT = ("outputs",)
 SEED = 11
 
 SEVERITIES = {Scale.FULL: (32, 8, 2, 1), Scale.QUICK: (8, 1), Scale.SMOKE: (8,)}
-"""n of the paper's "one triangle for every n", from mild to severe."""
+"""n in "one triangle for every n triangles" of the paper, from mild to severe."""
 
 THIN = 5.0
-"""Degrees; faces with a smaller angle are counted."""
+"""Angle in degrees; faces with a smaller angle are counted."""
 
 PLOT = "degraded.png"
 
 CURVES = "degraded_curves.png"
-"""The picture of the first mesh."""
+"""File name of the picture of the first mesh."""
 
 
 def measure(scale: Scale) -> Results:
-    """Perturb meshes more and more and compare every method with itself on the clean mesh."""
+    """Perturb meshes increasingly, and compare each method with its own curve on the clean mesh."""
     severities = (0, *SEVERITIES[scale])
     pictures: list[renders.Picture] = []
     names: list[str] = []
@@ -82,27 +82,34 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What every method does at every severity."""
+    """Outcome of each method at each severity, and whether it agrees with the paper."""
     names = results["meshes"]
     least, greatest = results["fractions"]
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(names)} meshes ({results['collection']}: {report.listed(names)}). One face in "
-        "every n is drawn; one of its corners moves across the opposite edge by "
-        f"{least:g} to {greatest:g} of that edge, and back where an angle falls "
-        f"below {results['least_angle']:g}° or another vertex is too near. Control points stay."
+        "Meshes were degraded as in section 4.6 of the paper, to see whether each method still "
+        "gives a curve and how far the curve moves. Each row is a severity and a method. Its "
+        "columns are the smallest angle of the mesh and the share of thin faces; the number of "
+        "meshes with one finite curve through all points; the number on which the method diverged; "
+        "mean and greatest distance to the curve of the same method on the clean mesh, in percent "
+        "of the bounding box diagonal; and the bending. Angles, shares, distances and bending are "
+        f"medians over {len(names)} meshes, with one set of 3–5 random vertices per mesh (shortest "
+        f"order, seed {results['seed']}). For the perturbation, one face in every n is chosen at "
+        f"random, and one of its corners moves perpendicularly to the opposite edge, by {least:g} "
+        f"to {greatest:g} of the length of that edge. A move that causes an angle below "
+        f"{results['least_angle']:g}° or brings the vertex too close to another is discarded. "
+        f"Control points do not move. Meshes ({results['collection']}): {report.listed(names)}."
         f"\n\n{_table(results)}\n\n{_findings(results)}\n\n"
-        + report.figure(PLOT, "Greatest distance to the method's own curve on the clean mesh")
+        + report.figure(PLOT, "Greatest distance to the curve of the same method on the clean mesh")
         + f"\n\n{_shown_picture(results['picture'])}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Distances to the clean mesh's curves."""
+    """Plot the distances to the curves on the clean meshes."""
     methods = results["methods"]
     figure, axes = plots.labelled(
-        "Distance to the clean mesh's curve",
-        "faces drawn",
+        "Distance to the curve on the clean mesh",
+        "perturbed faces",
         "greatest distance, % of the diagonal",
     )
     perturbations = [n for n in results["severities"] if n]
@@ -135,7 +142,7 @@ def _mesh(clean: Mesh, n: int, number: int, points: IntArray) -> tuple[Mesh, int
 
 
 def _quality(mesh: Mesh) -> Results:
-    """The smallest angle in degrees, and the share of faces with a small one."""
+    """Smallest angle in degrees, and share of faces with an angle below `THIN`."""
     smallest = angles(mesh.vertices[mesh.faces]).min(axis=1)
     return {
         "smallest": round(float(smallest.min()), 4),
@@ -146,7 +153,7 @@ def _quality(mesh: Mesh) -> Results:
 def _asked(
     label: str, mesh: Mesh, points: IntArray, method: str
 ) -> tuple[str, SurfaceCurve | None]:
-    """The status, and the method's curve if it is one, finite and through all points."""
+    """Status of a design, and its curve if it is a single, finite one; otherwise None."""
     try:
         design = nicmm.design_curve(mesh, points, order="shortest", method=method)
     except nicmm.NicmmError as error:
@@ -162,9 +169,9 @@ def _asked(
 def _answer(
     status: str, mesh: Mesh, curve: SurfaceCurve | None, clean: SurfaceCurve | None
 ) -> Results:
-    """What a method did: bending, and how far the curve is from the clean mesh's, in percent.
+    """Outcome of a method: its status, the bending, and the distances to the clean mesh's curve.
 
-    Mean and greatest distance are relative to the diagonal.
+    "offset" is the mean and the greatest distance in percent of the diagonal.
     """
     answer: dict[str, Any] = {"status": status, "bending": None, "offset": None}
     if curve is not None:
@@ -181,12 +188,12 @@ def _name(n: int) -> str:
 
 
 def _answers(results: Results, n: int, method: str) -> list[Results]:
-    """What a method did on all meshes of one severity."""
+    """Outcomes of a method on all meshes of one severity."""
     return [each["answers"][method] for each in results["sets"] if each["n"] == n]
 
 
 def _greatest(answers: Sequence[Results]) -> list[float]:
-    """Greatest distances to the clean curves, in percent."""
+    """Greatest distances to the curves on the clean meshes, in percent of the diagonal."""
     return [each["offset"][1] for each in answers if each["offset"]]
 
 
@@ -217,14 +224,11 @@ def _table(results: Results) -> str:
                 )
             )
     header = (
-        "faces drawn", f"smallest angle, faces below {results['thin']:g}°", "method",
-        "one finite curve through all points", "diverged", "mean distance to the clean curve, %",
-        "greatest distance, %", "L ∮ κ_g² ds",
+        "perturbed faces", f"smallest angle, faces below {results['thin']:g}°", "method",
+        "one finite curve through all points", "diverged",
+        "mean distance to the curve on the clean mesh, %", "greatest distance, %", "L ∮ κ_g² ds",
     )  # fmt: skip
-    return (
-        report.table(header, rows)
-        + "\n\nMedians over the meshes; distances relative to the diagonal of the bounding box."
-    )
+    return report.table(header, rows)
 
 
 def _median(values: Sequence[float], digits: int) -> str:
@@ -232,30 +236,40 @@ def _median(values: Sequence[float], digits: int) -> str:
 
 
 def _findings(results: Results) -> str:
-    """The claims of section 4.6 against what was measured at the worst severity."""
+    """What was measured at the worst severity, and whether it agrees with section 4.6."""
     worst = results["severities"][-1]
     at_worst = {method: _answers(results, worst, method) for method in results["methods"]}
     parts = []
     for method, answers in at_worst.items():
         share = 100 * _succeeded(answers) / len(answers)
         moved = _median(_greatest(answers), 1)
-        parts.append(f"`{method}` succeeds in {share:.0f} % and moves by {moved} %")
-    text = f"At {_name(worst)}: {'; '.join(parts)} of the diagonal (greatest distance, median). "
+        parts.append(
+            f"`{method}` gives a curve on {share:.0f} % of the meshes, and the curve moves by "
+            f"{moved} % of the diagonal"
+        )
+    text = (
+        f"At the worst severity ({_name(worst)}), {'; '.join(parts)} (greatest distance, median). "
+    )
     greatest = _greatest(at_worst["nicmm-paper"])
-    if greatest and np.median(greatest) > 100 * REMARKABLE:
+    if greatest:
+        visible = np.median(greatest) > 100 * REMARKABLE
         text += (
-            f"More than {100 * REMARKABLE:g} % are plain to the eye, which contradicts the “nearly "
-            "identical shapes” of the paper's Fig. 12. "
+            f"For `nicmm-paper` that is {'more' if visible else 'not more'} than the "
+            f"{100 * REMARKABLE:g} % from which a difference is obvious to the eye, which "
+            f"{'contradicts' if visible else 'agrees with'} the “nearly identical shapes” of "
+            "Fig. 12. "
         )
     if "variational" not in at_worst:
-        return text + "The paper's comparison with the variational method is not possible yet."
+        return text + "There are no curves of the variational method to compare with the paper."
     variational, paper = (_succeeded(at_worst[each]) for each in ("variational", "nicmm-paper"))
-    if variational < paper:
-        return text + "The paper's failure of the variational method on such meshes shows here too."
+    verdict = (
+        "agrees with the paper, where the variational method fails on such meshes (Fig. 11)."
+        if variational < paper
+        else "contradicts the paper, where the variational method fails on such meshes (Fig. 11)."
+    )
     return text + (
-        "The paper's failure of the variational method on such meshes (Fig. 11) does not show "
-        f"here, which contradicts it: {variational} of {len(at_worst['variational'])} curves, "
-        f"and {paper} with `nicmm-paper`."
+        f"`variational` succeeds on {variational} of {len(at_worst['variational'])} of these "
+        f"meshes and `nicmm-paper` on {paper}, which {verdict}"
     )
 
 
@@ -273,7 +287,7 @@ def _picture(
 
 
 def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
-    """The same view of every severity, without those that have no curve; the picture's name."""
+    """Render all severities that have a curve, from the same view; return the file name or None."""
     shown = [picture for picture in pictures if picture.curves]
     if not shown:
         return None
@@ -285,9 +299,9 @@ def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
 
 def _shown_picture(name: str | None) -> str:
     if name is None:
-        return "No method gave a curve on the first mesh, so there is no picture of it."
+        return "There is no picture, because no method gave a curve on the first mesh."
     return report.figure(
         name,
-        "nicmm (blue), nicmm-paper (orange) and variational (green) on the first mesh, more and "
-        "more degraded (Fig. 11, top of Fig. 12)",
+        "nicmm (blue), nicmm-paper (orange) and variational (green) on the first mesh at "
+        "increasing severity (Fig. 11, top of Fig. 12)",
     )

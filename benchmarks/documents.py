@@ -1,6 +1,6 @@
-"""Figures in README.md and docs/, generated from the data files.
+"""Generates the measured figures in README.md and docs/ from the data files.
 
-They stand between `<!-- figures: NAME -->` and `<!-- /figures -->`.
+Each block of figures is enclosed by `<!-- figures: NAME -->` and `<!-- /figures -->`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,18 @@ from .evidence import ROOT, Record, Results
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
+METHODS = ("nicmm", "nicmm-paper", "variational")
+
 
 def generated(records: Mapping[str, Record]) -> dict[Path, str]:
-    """The documents with everything in them that data files decide."""
+    """Text of every document, with all parts that depend on data files regenerated, by path."""
+    measured = {
+        name: record["results"] for name, record in records.items() if record["code"] is not None
+    }
     blocks = {
-        name: write(records[name]["results"])
-        for name, write in FIGURES.items()
-        if name in records and records[name]["code"] is not None
+        name: write(*(measured[each] for each in sources))
+        for name, (write, *sources) in FIGURES.items()
+        if all(each in measured for each in sources)
     }
     found = {report.RESULTS: report.results_text(records)}
     for path in DOCUMENTS:
@@ -44,34 +49,91 @@ def _guarantee(results: Results) -> str:
     return report.table(header, rows)
 
 
+def _fairness(results: Results) -> str:
+    """Percentiles of the bending relative to the fairest elastic curve, with most samples."""
+    words = []
+    for closed in (True, False):
+        ratios = [
+            curve["to_best"][-1]
+            for each in results["meshes"]
+            for curve in each["curves"]
+            if curve["closed"] is closed and curve.get("to_best", [None])[-1] is not None
+        ]
+        half, most, nearly_all = np.percentile(ratios, [50, 75, 90])
+        words.append(
+            f"the median over {len(ratios)} {courses.KIND[closed]} curves is {half:.2f}; 75 % are "
+            f"within {most:.2f} and 90 % within {nearly_all:.2f}"
+        )
+    return _paragraph(
+        "The curves pass the control points to the last digit. On every "
+        f"{results['compared_every']}th mesh, the bending L ∫ κ_g² ds (length L, geodesic "
+        "curvature κ_g) was divided by that of the fairest explicit elastic curve known through "
+        "the same points: " + "; ".join(words) + "."
+    )
+
+
+def _methods(curvature: Results, degraded: Results, runtime: Results) -> str:
+    """The three methods beside each other, with the paper's words."""
+    sets = [each["bending"] for each in curvature["sets"]]
+    bends = [
+        f"{np.median([bend[method][-1] / bend['elastic curve'][-1] for bend in sets]):.2g}"
+        for method in METHODS
+    ]
+    worst = [each for each in degraded["sets"] if each["n"] == degraded["severities"][-1]]
+    found = [sum(s["answers"][m]["bending"] is not None for s in worst) for m in METHODS]
+    iterations = [
+        f"{np.median([each['answers'][method]['iterations'] for each in runtime['sets']]):.0f}"
+        for method in METHODS
+    ]
+    rows = [
+        (
+            f"L ∮ κ_g² ds relative to an explicit elastic curve, median of {len(sets)}",
+            *bends,
+            "“comparable distributions”",
+        ),
+        (
+            "one finite curve on a mesh with every face degraded",
+            *(f"{count} of {len(worst)}" for count in found),
+            "yes and no",
+        ),
+        (
+            f"iterations, median of {len(runtime['sets'])}",
+            f"{iterations[0]}, after the search",
+            *iterations[1:],
+            "about 32 and –",
+        ),
+    ]
+    return report.table(("", *(f"`{method}`" for method in METHODS), "in the paper"), rows)
+
+
 def _courses(results: Results) -> str:
     ratios: dict[bool, list[float]] = defaultdict(list)
-    moved: dict[str, list[float]] = defaultdict(list)
+    moved: dict[str, list[bool]] = defaultdict(list)
+    every: list[float] = []
     for request in results["requests"]:
         best = min(min(values) for values in request["energies"].values())
         ratios[request["closed"]].append(min(request["energies"][courses.DEFAULT]) / best)
-        for change, away in request["moved"].items():
-            moved[change].append(away)
+        for change, several in request["moved"].items():
+            moved[change] += [courses.is_moved(each) for each in several]
+            every += [each["away"] for each in several]
     closed, open_ = (np.exp(np.log(ratios[kind]).mean()) for kind in (True, False))
-    every = [away for several in moved.values() for away in several]
-    far = report.listed(
-        f"{change} {sum(away > courses.MOVED for away in several)} of {len(several)}"
-        for change, several in moved.items()
-    )
+    far = report.listed(f"{name} {sum(each)} of {len(each)}" for name, each in moved.items())
     return (
         _item(
-            "Relative to the least energy of all starts of `python -m benchmarks courses`, the "
+            "Relative to the lowest energy of all starts of `python -m benchmarks courses`, the "
             f"default has {closed:.2f} times as much for closed curves and {open_:.2f} times for "
             f"open ones (geometric means of {len(ratios[True])} each; at most "
-            f"{max(ratios[True]):.2f} and {max(ratios[False]):.2f} times)."
+            f"{max(ratios[True]):.2f} and {max(ratios[False]):.2f} times) "
+            "([measured](benchmarks/RESULTS.md#which-course-a-curve-takes))."
         )
         + "\n"
         + _item(
-            "The surface decides and not its description: the search runs on a copy in the "
-            "surface's own frame. Curves that a change of the description moved by more than "
-            f"{100 * courses.MOVED:g} % of the diagonal: {far}. Within 1e-6 stay "
-            f"{sum(away < 1e-6 for away in every)} of all {len(every)}; rounding decides in the "
-            "others."
+            "The course depends only on the surface, because the search runs on a copy in its "
+            "principal frame. Curves that moved by more than "
+            f"{100 * courses.MOVED:g} % of the diagonal when the mesh was changed, although the "
+            f"energies differ by more than {100 * courses.TIE:g} %: {far}. "
+            f"{100 * np.mean(np.array(every) < 1e-6):.0f} % of all {len(every)} curves stay the "
+            "same within 1e-6; the others differ by rounding."
         )
     )
 
@@ -85,11 +147,65 @@ def _runtime(results: Results) -> str:
     }
     ratio = float(np.median(mean["nicmm"] / mean["variational"]))
     seconds = report.listed(f"`{method}` {mean[method].mean():.2f} s" for method in methods)
-    return textwrap.fill(
+    return _paragraph(
         f"A first curve takes {seconds} on average over {len(sets)} meshes of some 4,000 vertices "
         f"(`python -m benchmarks runtime`); `nicmm` takes {ratio:.2f} of the time of "
-        "`variational`, median of the sets.",
-        118,
+        "`variational`, median of the sets."
+    )
+
+
+def _stages(results: Results) -> str:
+    body = results["bodies"][-1]
+    first, another, dragged = (
+        np.median(body["milliseconds"][kind]["together"]) / 1000.0
+        for kind in ("first", "another", "dragged")
+    )
+    return _item(
+        f"On a mesh of {body['faces'] / 1e6:.1f} million faces the first curve takes {first:.1f} "
+        f"seconds, a further curve {another:.1f} seconds, and an update while a point is dragged "
+        f"{dragged:.2f} seconds ([by stage](benchmarks/RESULTS.md#where-the-time-goes))."
+    )
+
+
+def _lanes(results: Results) -> str:
+    led = [each["led"] for each in results["sets"] if each["led"] is not None]
+    half, nearly_all = np.percentile([each["distance"] for each in led], [50, 90])
+    return _item(
+        f"A curve follows a painted lane that is {100 * results['offset']:g} % of the diagonal "
+        "away from it: the median distance of the lane to the curve falls to "
+        f"{half:.2f} of the distance without the lane, and to {nearly_all:.2f} or less for nine "
+        "curves of ten. A curve goes around an obstacle wherever a path exists."
+    )
+
+
+SOUP = "the same, a soup of triangles"
+
+
+def _cancellation(results: Results) -> str:
+    designs = results["designs"]
+    small = max(each["longest"] for each in designs if each["faces"] <= 100_000)
+    large = max(each["faces"] for each in designs)
+    longest = max(d["longest"] for d in designs if d["faces"] == large and d["mesh"] != SOUP)
+    soup = next(each["longest"] for each in designs if each["mesh"] == SOUP)
+    return _item(
+        f"A design checks for cancellation at least every {small:.2f} seconds of processor time on "
+        f"meshes of up to 100,000 faces, every {longest:.2f} seconds at {large / 1e6:.1f} million "
+        f"faces, and every {soup:.2f} seconds on a soup of as many triangles "
+        "([measured](benchmarks/RESULTS.md#cancelling))."
+    )
+
+
+def _degraded(results: Results) -> str:
+    means = [
+        np.median([s["answers"]["nicmm"]["offset"][0] for s in results["sets"] if s["n"] == n])
+        for n in results["severities"]
+        if n
+    ]
+    return _item(
+        "The curve on a degraded mesh is smooth too, but not always the same: by severity, the "
+        f"median of its mean distance from the clean mesh's curve is {min(means):.1f} to "
+        f"{max(means):.1f} % of the diagonal "
+        "([measured](benchmarks/RESULTS.md#what-moves-a-curve-on-degraded-meshes))."
     )
 
 
@@ -106,11 +222,11 @@ def _corpus(results: Results) -> str:
     counts = Counter(each["verdict"] for each in answers)
     slowest = max(each["seconds"] for each in answers if each["faces"] < SMALL)
     return _item(
-        "`python -m benchmarks corpus`, every kind of broken mesh (self-crossing, branching, "
-        "flipped, degenerate, in pieces, huge): "
+        "`python -m benchmarks corpus`, every kind of broken mesh (self-crossing, non-manifold, "
+        "with reversed faces, degenerate, in pieces, huge): "
         f"of {len(answers):,} requests on {meshes} meshes {counts[GOOD]:,} curves are good, "
-        f"{counts[DUE]} are impossible and answered with an error that says why, "
-        f"{_no(counts[DECLINED])} declined though possible, {_no(counts[WRONG])} wrong. Below "
+        f"{counts[DUE]} are impossible and refused with an error that says why, "
+        f"{_no(counts[DECLINED])} declined although possible, {_no(counts[WRONG])} wrong. Below "
         f"{SMALL:,} faces the slowest takes {slowest:.1f} seconds."
     )
 
@@ -120,7 +236,7 @@ def _messes(results: Results) -> str:
     counted = ", ".join(f"{count:,} times {outcome}" for outcome, count in outcomes.items())
     return _item(
         "`python -m benchmarks messes`, surfaces whose vertices are welded at random, with faces "
-        f"added, doubled, turned and dropped: of {len(seconds):,} requests {counted}; "
+        f"added, duplicated, reversed and removed: of {len(seconds):,} requests {counted}; "
         f"{_no(len(results['findings']))} wrong. The slowest takes {max(seconds):.1f} seconds."
     )
 
@@ -133,23 +249,35 @@ def _fuzz(results: Results) -> str:
     )
 
 
-def _no(count: int, be: str = " is") -> str:
-    return f"{count or 'none'}{be if count < 2 else be.replace('is', 'are')}"
+def _no(count: int, be: str = " was") -> str:
+    return f"{count or 'none'}{be if count < 2 else be.replace('was', 'were')}"
 
 
 def _item(text: str) -> str:
-    return textwrap.fill(text, 118, initial_indent="- ", subsequent_indent="  ")
+    return textwrap.fill(
+        text, 118, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False
+    )
+
+
+def _paragraph(text: str) -> str:
+    return textwrap.fill(text, 118, break_on_hyphens=False)
 
 
 SMALL = 20_000
-"""Faces of a mesh on which no curve takes long."""
+"""Number of faces below which the slowest request is reported."""
 
-FIGURES: dict[str, Callable[[Results], str]] = {
-    "guarantee": _guarantee,
-    "courses": _courses,
-    "runtime": _runtime,
-    "corpus": _corpus,
-    "messes": _messes,
-    "fuzz": _fuzz,
+FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
+    "guarantee": (_guarantee, "guarantee"),
+    "fairness": (_fairness, "guarantee"),
+    "methods": (_methods, "curvature", "degraded", "runtime"),
+    "courses": (_courses, "courses"),
+    "runtime": (_runtime, "runtime"),
+    "stages": (_stages, "stages"),
+    "lanes": (_lanes, "lanes"),
+    "cancellation": (_cancellation, "cancellation"),
+    "degraded": (_degraded, "degraded"),
+    "corpus": (_corpus, "corpus"),
+    "messes": (_messes, "messes"),
+    "fuzz": (_fuzz, "fuzz"),
 }
-"""The part of a document that a measurement decides, by the name of the measurement."""
+"""Function that writes each block of figures, and the measurements whose results it takes."""

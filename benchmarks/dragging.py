@@ -1,4 +1,4 @@
-"""A control point is dragged: what going on from the last curve costs, and what it is worth."""
+"""Measures the time and the quality of curves that start from the last one, as in dragging."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ WITHOUT = ("outputs",)
 
 SEED = 0
 DRAGS = 5
-"""Times that the first control point moves on to a neighbouring vertex."""
+"""Number of times that the first control point moves to a neighbouring vertex."""
 
 FINE_SUBDIVISIONS = 4
 SAMPLES = 240
 PEER_BODY = (812, 2)
-"""Faces and subdivisions of the body on which signed heat is compared with: 13,000 faces."""
+"""Faces and subdivisions of the body for the comparison with signed heat: 13,000 faces."""
 
 PEER_SETS = 10
 PEER_POINTS = 4
 
 
 def measure(scale: Scale) -> Results:
-    """Drag on the paper's resolution and on one with sixteen times as many faces."""
+    """Drag on meshes of the resolution in the paper, and with sixteen times as many faces."""
     coarse = _measured(collections.surfaces(scale, scale.choose(40, 4)), rival=True)
     if scale is Scale.SMOKE:
         fine = coarse
@@ -58,34 +58,42 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What a dragged curve takes, beside a first one and beside other methods."""
+    """Times of a dragged curve, of a first one, and of other methods."""
     coarse, fine = results["coarse"], results["fine"]
     header = (
-        "meshes", "vertices", "first curve (ms)", "another on the same Designer", "dragged",
-        "iterations", "variational", "bending, dragged / anew", "refused", "faults",
+        "meshes", "vertices", "first curve (ms)", "another curve (ms)", "dragged curve (ms)",
+        "iterations, dragged", "variational (ms)", "bending, dragged / from scratch", "refused",
+        "faults",
     )  # fmt: skip
     rows = [
-        _row(f"{results['collection']}, {len(coarse)}", coarse),
-        _row(f"{len(fine)}, {results['fine_subdivisions']} subdivisions", fine),
+        _row(f"{len(coarse)} meshes: {results['collection']}", coarse),
+        _row(f"{len(fine)} meshes: {results['fine_subdivisions']} Loop subdivisions", fine),
     ]
     ratio = _median(coarse, "dragged") / _median(coarse, "rival")
     first = _median(coarse, "first") / _median(coarse, "rival")
     growth = _median(fine, "dragged") / _median(coarse, "dragged")
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order; the first "
-        f"point then moves to a neighbouring vertex {results['drags']} times. One process, medians "
-        "over the meshes. *Refused* are moves after which the curve would cross itself; a curve is "
-        "then designed anew.\n\n"
+        "The table shows how long a curve takes while a control point is dragged, that is, when "
+        "it starts from the curve before. On each mesh a first curve is designed through 3–5 "
+        "random vertices (shortest order, seed "
+        f"{results['seed']}); then its first point moves to a neighbouring vertex "
+        f"{results['drags']} times. Each row is a group of meshes with medians over them, measured "
+        "in one process. *Another curve* is one through other points on the same Designer. "
+        "*Bending* compares the last dragged curve with a new design through the same points. "
+        "*Refused* counts moves after which the start could not be used, for example because the "
+        "curve would cross itself; the curve is then designed from scratch. *Faults* are those "
+        "that the independent checker finds in the first and the dragged curves. The paper has no "
+        "corresponding measurement.\n\n"
         + report.table(header, rows)
-        + f"\n\nA dragged curve takes {ratio:.3f} times as long as the variational method (goal "
-        f"0.10) and a first one {first:.2f} times (goal 0.25). With sixteen times as many faces a "
-        f"dragged curve takes {growth:.1f} times as long (goal 4).\n\n"
-        + _signed_heat_words(results["signed_heat"])
+        + f"\n\nA dragged curve takes {ratio:.3f} times as long as a curve of the variational "
+        f"method (goal: 0.10), and a first curve {first:.2f} times as long (goal: 0.25). With "
+        f"sixteen times as many faces a dragged curve takes {growth:.1f} times as long (goal: "
+        "4).\n\n" + _signed_heat_words(results["signed_heat"])
     )
 
 
 def _beside_signed_heat(scale: Scale) -> Results | None:
-    """A dragged curve beside a later solve of potpourri3d's signed heat, on the same mesh."""
+    """Times of dragged curves and of later solves of potpourri3d's signed heat on one mesh."""
     if importlib.util.find_spec("potpourri3d") is None:
         return None
     faces, subdivisions = (200, 1) if scale is Scale.SMOKE else PEER_BODY
@@ -101,13 +109,13 @@ def _beside_signed_heat(scale: Scale) -> Results | None:
 
 def _signed_heat_words(beside: Results | None) -> str:
     if beside is None:
-        return "potpourri3d is not installed, so its signed heat method is not measured."
+        return "potpourri3d is not installed, so its signed heat method was not measured."
     ours, theirs = np.median(beside["ours"]), np.median(beside["theirs"])
     return (
-        f"On a generated body of {beside['faces']:,} faces, {len(beside['ours'])} sets of "
-        f"{beside['points']} points, a dragged curve takes {1000 * ours:.0f} ms and a later solve "
-        "of potpourri3d's signed heat method, whose factorisations are kept, "
-        f"{1000 * theirs:.0f} ms by the median: {ours / theirs:.2f} (goal 1.0)."
+        f"On a generated body with {beside['faces']:,} faces and {len(beside['ours'])} sets of "
+        f"{beside['points']} points, a dragged curve takes {1000 * ours:.0f} ms by the median. A "
+        "later solve of potpourri3d's signed heat method, which reuses its factorisations, takes "
+        f"{1000 * theirs:.0f} ms, so the ratio is {ours / theirs:.2f} (goal: 1.0)."
     )
 
 
@@ -124,13 +132,14 @@ def _measured(meshes: Iterable[tuple[str, Mesh]], rival: bool) -> list[Results]:
 
 
 def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
-    """Seconds, iterations, bending and faults on one mesh.
+    """Times in seconds, iterations, bending and faults on one mesh.
 
-    "First" is the first curve on a mesh, "another" one through other points on the same Designer,
-    "dragged" the median of those after small moves, "rival" the variational method's.
+    "first" is the first curve on the mesh, "another" a curve through other points on the same
+    Designer, "dragged" the median of the curves after small moves, and "rival" the curve of the
+    variational method.
     """
     neighbours = igl.adjacency_list(mesh.faces)
-    mesh = Mesh(mesh.vertices, mesh.faces)  # without anything cached
+    mesh = Mesh(mesh.vertices, mesh.faces)  # a copy without cached values
     designer = nicmm.Designer(mesh)
     designs = [designer.design(points, order="shortest")]
     faults = len(judge(mesh, designs[0], points, True, "shortest").faults)
@@ -141,7 +150,7 @@ def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
         try:
             designs.append(designer.design(points, order="shortest", start=designs[-1]))
             dragged.append(designs[-1])
-        except nicmm.CurveError:  # the caller then designs anew
+        except nicmm.CurveError:  # as a caller would, design from scratch
             designs.append(designer.design(points, order="shortest"))
             refused += 1
         faults += len(judge(mesh, designs[-1], points, True, "shortest").faults)

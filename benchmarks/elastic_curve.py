@@ -1,9 +1,8 @@
-"""A discrete elastic curve on a surface: the yardstick of how fair a curve could be.
+"""Computes a discrete elastic curve on a surface: the reference for how fair a curve could be.
 
-Nodes move along their conormals by Gauss-Newton steps on L ∫ κ_g² ds, are projected
-to the mesh and respaced between the control points, which stay where they are. An open curve has
-no curvature at its ends. Nothing keeps the curve from crossing itself, and what it finds is a local
-optimum near its start.
+Nodes move along their conormals by Gauss-Newton steps on L ∫ κ_g² ds, are projected to the mesh and
+spaced evenly between the control points, which stay fixed. An open curve has no curvature at its
+ends. The curve may cross itself, and the iteration converges to a local optimum near its start.
 """
 
 from __future__ import annotations
@@ -25,32 +24,36 @@ REFINEMENT = 8
 
 MOST_STEPS = 100
 LEAST_DECREASE = 1e-4
-"""Relative decrease of the energy that ends the iteration."""
+"""Relative decrease of the energy below which the iteration ends."""
 
 LONGEST_MOVE = 1.0
-"""Farthest that a node moves in one step, in spacings: projection then stays on its sheet."""
+"""Longest move of a node in one step, in node spacings.
+
+The limit keeps the projection on the same sheet of the surface.
+"""
 
 DIFFERENCE = 1e-2
-"""Of a node's position, in spacings, for the derivatives."""
+"""Displacement of a node, in node spacings, for finite differences."""
 
 FIRST_DAMPING, DAMPING_FACTOR, MOST_DAMPING = 1e-8, 10.0, 1e2
-"""Of Levenberg and Marquardt, relative to the greatest diagonal entry.
+"""Levenberg-Marquardt damping, relative to the greatest diagonal entry.
 
-The least is far below 1 because the entries measure the stiffness of zigzags from node to node,
-against which a slow swing of the whole curve has almost none.
+The first value, which is also the least, is far below 1: the diagonal entries measure the stiffness
+against zigzags from node to node, compared with which the stiffness against smooth deformations
+of the whole curve is tiny.
 """
 
 
 @dataclass(frozen=True)
 class ElasticCurve:
-    """Result of the iteration.
+    """Elastic curve and its energies.
 
     Attributes
     ----------
     curve : SurfaceCurve
-        Its points are on the surface, `REFINEMENT` times as many as nodes.
+        Curve with `REFINEMENT` times as many points as nodes, all on the surface.
     energies : list of float
-        L ∫ κ_g² ds at the nodes, before the first step and after each; they only fall.
+        L ∫ κ_g² ds at the nodes, before the first step and after each step; strictly decreasing.
     """
 
     curve: SurfaceCurve
@@ -58,26 +61,33 @@ class ElasticCurve:
 
 
 def elastic_curve(mesh: Mesh, start: SurfaceCurve, nodes: int = NODES) -> ElasticCurve:
-    """Make a curve as fair as it can be through the control points of its start.
+    """Minimise the bending of a curve whose control points stay fixed.
 
     Parameters
     ----------
     mesh : Mesh
+        Surface.
     start : SurfaceCurve
-        Through all of its control points, with one at each end where it is open.
+        Curve that passes its control points in order; an open one starts and ends at one.
     nodes : int
-        Rounded up to a multiple of three.
+        Number of nodes, rounded up to a multiple of three.
 
     Returns
     -------
     ElasticCurve
+        The minimiser and its energies.
+
+    Raises
+    ------
+    ValueError
+        If the control points do not follow one another along ``start``.
     """
     return _Iteration(mesh, start, -(-nodes // 3) * 3).solve()
 
 
 @dataclass(frozen=True)
 class _State:
-    """Nodes on the surface with what the energy needs of them; n is a multiple of three."""
+    """Nodes on the surface and the quantities of the energy; n is a multiple of three."""
 
     points: FloatArray
     normals: FloatArray
@@ -85,7 +95,7 @@ class _State:
 
     @property
     def spacing(self) -> FloatArray:
-        """Half the length of the two segments at each node, of the one at an end, shape (n,)."""
+        """Half the total length of the segments that meet at each node, shape (n,)."""
         lengths = np.linalg.norm(_neighbour(self.points, 1, self.closed) - self.points, axis=1)
         before = np.linalg.norm(_neighbour(self.points, -1, self.closed) - self.points, axis=1)
         return 0.5 * (lengths + before)
@@ -101,14 +111,14 @@ class _State:
 
     @property
     def conormals(self) -> FloatArray:
-        """Unit vectors in the tangent planes, across the curve."""
+        """Unit conormals: tangent vectors of the surface that are perpendicular to the curve."""
         along = _neighbour(self.points, 1, self.closed) - _neighbour(self.points, -1, self.closed)
         across = np.cross(self.normals, along)
         return across / np.linalg.norm(across, axis=1, keepdims=True)
 
 
 def _neighbour(points: FloatArray, step: int, closed: bool) -> FloatArray:
-    """The next node of each (step 1) or the one before (-1); an end is its own."""
+    """Next (step 1) or previous (step -1) node of each node; an end is its own neighbour."""
     moved = np.roll(points, -step, axis=0)
     if not closed:
         end = -1 if step == 1 else 0
@@ -139,7 +149,7 @@ class _Iteration:
                     break
                 damping *= DAMPING_FACTOR
             else:
-                break  # No step lowers the energy any more.
+                break  # no step lowers the energy any further
             self.state = candidate
             energies.append(candidate.energy)
             damping = max(damping / DAMPING_FACTOR, FIRST_DAMPING)
@@ -148,9 +158,10 @@ class _Iteration:
         return ElasticCurve(self.refined(), energies)
 
     def refined(self) -> SurfaceCurve:
-        """A cubic spline through the nodes, projected to the mesh.
+        """Cubic spline through the nodes, projected to the mesh.
 
-        Chords between nodes have corners wherever curvature is sampled at other places.
+        The polygon of the nodes would not do: curvature is sampled at other points, and there
+        its corners would distort the result.
         """
         line = self.line(self.state.points)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -160,16 +171,16 @@ class _Iteration:
         return self.surface.curve(spline(fine), REFINEMENT * self.controls, self.closed)
 
     def line(self, points: FloatArray) -> FloatArray:
-        """Points from the first control point to the last, which is the first again if closed."""
+        """Points with the first one repeated at the end if the curve is closed."""
         return np.concatenate([points, points[:1]]) if self.closed else points
 
     def respaced(self, legs: list[FloatArray]) -> FloatArray:
-        """Evenly spaced nodes on each leg."""
+        """Nodes that are evenly spaced on each leg."""
         nodes = _respaced(legs, self.counts)
         return nodes if self.closed else np.concatenate([nodes, legs[-1][-1:]])
 
     def projected(self, points: FloatArray) -> _State:
-        """Nodes moved to the surface, and the control points exactly to their places."""
+        """State with all nodes projected to the surface and the control points kept fixed."""
         points = points.copy()
         points[self.controls] = self.fixed
         _, faces, barycentric = self.surface.project(points)
@@ -177,10 +188,11 @@ class _Iteration:
         return _State(on_surface, self.surface.normals(faces, barycentric), self.closed)
 
     def normal_equations(self) -> tuple[FloatArray, FloatArray]:
-        """Gauss-Newton matrix and slope of the energy for moves of free nodes along the conormals.
+        """Gauss-Newton matrix and gradient for moves of the free nodes along their conormals.
 
-        Derivatives are differences of the projected curve, so they know how the surface bends.
-        A node acts on itself and its two neighbours only; every third one is moved at a time.
+        Derivatives are finite differences of the projected curve, so they include the curvature
+        of the surface. A node affects only its own residual and those of its two neighbours, so
+        every third node is displaced at the same time.
         """
         state, n = self.state, len(self.state.points)
         step = DIFFERENCE * state.spacing.mean()
@@ -198,8 +210,8 @@ class _Iteration:
                 self.surface.normals(faces, barycentric),
                 self.closed,
             )
-            # The moved one among a node and its two neighbours. An end has one neighbour only:
-            # what it is given for the other falls on a control point, and these do not move.
+            # The displaced node among a node and its two neighbours. An end has only one
+            # neighbour: the wrapped index refers to a control point, whose column is dropped.
             cause = (rows + (first - rows + 1) % 3 - 1) % n
             jacobian[rows, cause] = (changed.roots - roots) / step
             np.add.at(length_slope, cause, (changed.spacing - spacing) / step)
@@ -208,7 +220,7 @@ class _Iteration:
         return jacobian.T @ jacobian, jacobian.T @ (np.sqrt(length) * roots)
 
     def moved(self, matrix: FloatArray, slope: FloatArray, damping: float) -> _State:
-        """The state after a damped step of limited length, projected and respaced."""
+        """State after a damped step of limited length, projected and respaced."""
         diagonal = damping * matrix.diagonal().max() * np.eye(len(matrix))
         step = -np.linalg.solve(matrix + diagonal, slope)
         limit = LONGEST_MOVE * self.state.spacing.mean()
@@ -237,7 +249,7 @@ def _legs(curve: SurfaceCurve) -> list[FloatArray]:
 
 
 def _nodes_of_legs(legs: list[FloatArray], nodes: int) -> IntArray:
-    """Nodes of each leg, its first control point included and not its last, by its length."""
+    """Number of nodes per leg, by its length; the last point of a leg belongs to the next one."""
     lengths = np.array([np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() for leg in legs])
     counts = np.maximum(FEWEST_NODES_OF_A_LEG, np.round(nodes * lengths / lengths.sum()))
     counts[lengths.argmax()] += nodes - counts.sum()
@@ -245,7 +257,7 @@ def _nodes_of_legs(legs: list[FloatArray], nodes: int) -> IntArray:
 
 
 def _respaced(legs: list[FloatArray], counts: IntArray) -> FloatArray:
-    """Evenly spaced nodes on each leg."""
+    """Nodes that are evenly spaced on each leg, without the last point of the leg."""
     nodes = []
     for leg, count in zip(legs, counts, strict=True):
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(leg, axis=0), axis=1))])

@@ -1,8 +1,8 @@
-"""Data files: what a measurement found, on which code, meshes and machine.
+"""Data files: the results of each measurement, and the code, meshes and machine they come from.
 
-`benchmarks/data/NAME.json` holds the results of a measurement and a fingerprint of every statement
-that they depend on. RESULTS.md and the figures in other documents are generated from these files,
-and `python -m benchmarks stale` lists those that other code would have to confirm.
+`benchmarks/data/NAME.json` contains the results of a measurement and a fingerprint of every
+statement that they depend on. RESULTS.md and the figures in other documents are generated from
+these files. `python -m benchmarks stale` lists the measurements whose code has changed since.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from tests.oracles.mesh_files import INDEX
 from .scale import Scale
 
 Results = dict[str, Any]
-"""What a measurement found, in types of JSON."""
+"""Results of a measurement, in JSON types."""
 
 Record = dict[str, Any]
-"""A data file."""
+"""Content of a data file."""
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "benchmarks" / "data"
 QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
-"""Where quick and smoke runs write instead; not under version control."""
+"""Output folder of quick and smoke runs; not under version control."""
 
 WEIGHTS = "nicmm_core/network/weights"
 PRESENTATION = tuple(
     f"benchmarks/{name}.py" for name in ("__init__", "evidence", "report", "scale")
 )
-"""Modules that only write down what was measured."""
+"""Modules that only present results; they are left out of the fingerprints."""
 
 Read = Callable[[Path], bytes]
 
 
 def folder_of(scale: Scale) -> Path:
-    """Where the data of a run are kept."""
+    """Folder of the data files of runs at a scale."""
     return DATA if scale is Scale.FULL else QUICK_OUTPUT / "data"
 
 
 def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
-    """Write the data file of a measurement and return its content."""
+    """Write the data file of a measurement and return its content as read back."""
     record = {
         "command": f"python -m benchmarks {name}"
         + ("" if scale is Scale.FULL else f" --{scale.value}"),
@@ -68,24 +68,24 @@ def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".part")
     unfinished.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    unfinished.replace(path)  # others may be reading
+    unfinished.replace(path)  # other processes may be reading it
     return load(name, scale)
 
 
 def load(name: str, scale: Scale = Scale.FULL) -> Record:
-    """Read the data file of a measurement; FileNotFoundError if it was never made."""
+    """Read the data file of a measurement; raise FileNotFoundError if it was never run."""
     text = (folder_of(scale) / f"{name}.json").read_text(encoding="utf-8")
     record: Record = json.loads(text)
     return record
 
 
 def is_kept(name: str) -> bool:
-    """Whether there is a data file of a full run."""
+    """Whether a full run has left a data file."""
     return (DATA / f"{name}.json").exists()
 
 
 def machine() -> str:
-    """The machine and the libraries, in one line."""
+    """One-line description of the machine and of the library versions."""
     return (
         f"{os.cpu_count()} cores {platform.machine()}, "
         f"Python {platform.python_version()}, NumPy {numpy.__version__}, "
@@ -94,7 +94,7 @@ def machine() -> str:
 
 
 def what_changed(name: str, read: Read = Path.read_bytes) -> list[str]:
-    """What has changed since a measurement: files, or words; empty if it is fresh."""
+    """What has changed since a measurement: file names, or a reason in words; empty if nothing."""
     if not is_kept(name):
         return ["never measured"]
     record = load(name)
@@ -108,11 +108,24 @@ def what_changed(name: str, read: Read = Path.read_bytes) -> list[str]:
 
 
 def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
-    """A digest of each file whose statements decide what a measurement finds.
+    """Digest of each file whose statements determine the results of a measurement.
 
-    Of the measurement's own module only what `measure` reaches counts, so that a new wording does
-    not ask for a new measurement; of other modules all statements, without comments and docstrings.
-    Modules that it imports count, but not rooms of the core in its `WITHOUT`.
+    In the measurement's own module, only the statements that `measure` reaches count, so changing
+    the wording of a section does not make the measurement stale. In the modules imported from
+    there, directly or indirectly, all statements count. Comments and docstrings never do, nor do
+    the folders of the core that the measurement lists in `WITHOUT`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the measurement.
+    read : callable
+        Function that returns the content of a file.
+
+    Returns
+    -------
+    dict of str to str
+        Digest by path relative to the repository.
     """
     own = ROOT / "benchmarks" / f"{name}.py"
     statements, imports = _reached(_parsed(read(own)), "measure")
@@ -135,7 +148,7 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
 
 
 def meshes_behind(name: str) -> str | None:
-    """A digest of the list of third-party meshes; None if a measurement uses none of them."""
+    """Digest of the list of third-party meshes; None if a measurement uses no such mesh."""
     modules = {"tests/oracles/mesh_files.py", "benchmarks/collections.py"}
     if not INDEX.exists() or not modules & set(code_behind(name)):
         return None
@@ -147,13 +160,13 @@ IMPORTS = (ast.Import, ast.ImportFrom)
 
 @cache
 def _whole(content: bytes) -> tuple[str, list[ast.stmt]]:
-    """The digest of all statements of a file, and its imports."""
+    """Digest of all statements of a file, and its import statements."""
     tree = _parsed(content)
     return _digest([tree]), [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
 
 
 def _parsed(content: bytes) -> ast.Module:
-    """The statements of a file, without docstrings; comments are not part of them."""
+    """Syntax tree of a file without docstrings; it has no comments anyway."""
     tree = ast.parse(content)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -176,7 +189,7 @@ def _digest(statements: Sequence[ast.AST]) -> str:
 
 
 def _reached(tree: ast.Module, start: str) -> tuple[list[ast.stmt], list[ast.stmt]]:
-    """Statements of a module that a function of it uses, in their order, and their imports."""
+    """Statements that a function of a module uses, in file order, and the imports they need."""
     defined: dict[str, list[ast.stmt]] = {}
     for statement in tree.body:
         for name in _names_defined(statement):
@@ -200,7 +213,7 @@ def _reached(tree: ast.Module, start: str) -> tuple[list[ast.stmt], list[ast.stm
 
 
 def _only(node: ast.stmt, names: set[str]) -> ast.stmt:
-    """An import of those names only that are used."""
+    """Copy of an import statement with only the names that are used."""
     assert isinstance(node, IMPORTS)
     kept = [each for each in node.names if (each.asname or each.name).split(".")[0] in names]
     if isinstance(node, ast.Import):
@@ -218,7 +231,7 @@ def _names_defined(statement: ast.stmt) -> list[str]:
 
 
 def _files(imports: Iterable[ast.stmt], importer: Path) -> list[Path]:
-    """The project's files that statements import, with the packages that they stand in."""
+    """Files of the project that import statements load, including the enclosing packages."""
     found = []
     package = _relative(importer).split("/")[:-1]
     for node in imports:

@@ -1,7 +1,7 @@
-"""Hostile input for the public interface and the readers; whatever is not typed is a finding.
+"""Tests the public interface and the file readers with hostile input.
 
-A case is a number: `hostile_input.answer` draws it and says what was wrong. It runs in a process
-of its own, so that crashes, hangs and what is printed below Python are found too.
+A case is identified by a number: `hostile_input.answer` generates it and judges the answer. It runs
+in a separate process, so that crashes, hangs and output from below Python are found as well.
 """
 
 from __future__ import annotations
@@ -16,25 +16,28 @@ from .evidence import Results
 from .scale import Scale
 
 SLOW = 10.0
-"""Seconds of CPU time that no case may take."""
+"""Greatest CPU time of a case in seconds; more is a finding."""
 
 PATIENCE = 60.0
-"""Seconds by the wall clock after which a case has hung."""
+"""Wall-clock time in seconds after which a case counts as hanging."""
 
 MEMORY = 8 * 2**30
-"""Bytes of address space; a case that asks for more follows some count that it was told."""
+"""Limit on the address space in bytes.
+
+A case that needs more has trusted a count in its input.
+"""
 
 LISTED = 40
 
 TOLD = 500
-"""Cases after which a run says how far it is."""
+"""Number of cases between two progress messages."""
 
 
 TITLE = "Hostile input"
 
 
 def measure(scale: Scale) -> Results:
-    """Ask, and list what is wrong."""
+    """Run all cases, and list the findings."""
     cases = scale.choose(10_500, 1_050, 42)
     outcomes: Counter[tuple[str, str]] = Counter()
     findings: list[str] = []
@@ -61,16 +64,21 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The outcomes of each kind of input, and what is wrong."""
+    """Outcomes by kind of input, and the findings."""
     rows = [
         (kind, sum(of_kind.values()), report.listed(f"{o} {n}" for o, n in of_kind.items()))
         for kind, of_kind in results["outcomes"].items()
     ]
     return (
-        f"Seed {results['seed']}, {results['cases']} cases of hostile input, see "
-        "`tests/oracles/hostile_input.py`. A finding is an error not the package's own, anything "
-        "printed, a curve that `checker.py` faults, a changed mesh, a crash, or more than "
-        f"{SLOW:g} s of CPU time; the slowest took {results['slowest']:.1f} s.\n\n"
+        f"{results['cases']} cases of hostile input, such as wrong types, extreme numbers and "
+        "corrupt files, were passed to the public interface and to the file readers. Each row is a "
+        "kind of input with the numbers of its outcomes: the status of a design, *read* files, "
+        "*refused* input (an error of the package), the error of the caller's own function, or "
+        "*lost* cases (a crash or a hang). A finding is any other exception, any printed output, a "
+        "curve that the independent checker faults, a modified input mesh, a crash, or more than "
+        f"{SLOW:g} s of CPU time; the slowest case took {results['slowest']:.1f} s "
+        f"(`tests/oracles/hostile_input.py`, seed {results['seed']}). The paper has no "
+        "corresponding measurement.\n\n"
         f"**{len(results['findings'])} findings.**\n\n"
         + "".join(f"- {finding}\n" for finding in results["findings"][:LISTED])
         + "\n"

@@ -1,4 +1,4 @@
-"""Pictures: alignment (Fig. 13), obstacles (Fig. 14) and many meshes (Fig. 15)."""
+"""Renders pictures of alignment (Fig. 13), obstacles (Fig. 14) and many meshes (Fig. 15)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .lanes import lane_beside
 from .methods import METHODS
 from .scale import Scale
 
-TITLE = "Pictures (Fig. 13, 14, 15)"
+TITLE = "Gallery: alignment and obstacles (Fig. 13, 14, 15)"
 WITHOUT = ("outputs", "splines")
 
 SEED = 16
@@ -33,44 +33,45 @@ METHOD = METHODS[0]
 
 POINTS = 5
 RINGS = 5
-"""Places that are tried on a mesh; about a thin limb there is no ring."""
+"""Number of places that are tried per mesh; around a thin limb there is no ring of points."""
 
 RING_RADIUS = 0.22
-"""Distance of the control points from the middle of their ring, in √area."""
+"""Distance of the control points from the centre of their ring, in √area."""
 
 OBSTACLE_RADIUS = 0.08
-"""Of the paint on the free curve, in √area."""
+"""Radius of the obstacle on the free curve, in √area."""
 
 FOLLOWED_WITHIN = 0.015
-"""Distance from the middle of a lane at which a curve is near it, in diagonals."""
+"""Distance from the middle line of a lane up to which a curve counts as near it, in diagonals."""
 
 FEWEST_VERTICES, MOST_VERTICES = 1500, 12000
 
 FOLLOWED = 0.8
-"""Share of an alignment region's middle line that has to have the curve near it."""
+"""Share of the middle line of an alignment region that must be near the curve."""
 
 ALIGNED, AVOIDED, MANY = "gallery_alignment.png", "gallery_obstacles.png", "gallery.png"
-"""Pictures: Fig. 13, 14 and 15."""
+"""File names of the pictures for Fig. 13, 14 and 15."""
 
 OBSTACLE, ALIGNMENT = "obstacle", "alignment"
 GUIDANCE = (OBSTACLE, ALIGNMENT, None)
-"""What the meshes of Fig. 15 get in turn."""
+"""Kinds of guidance, which the meshes of Fig. 15 get in turn."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """A painted part of a mesh.
+    """A painted region of a mesh.
 
     Attributes
     ----------
     kind : {"obstacle", "alignment"}
+        Kind of guidance.
     places : (p, 3) float array
-        Its middle: a point, or a line beside the free curve.
+        Centre of an obstacle, or points of the middle line of a lane.
     radius : float
-        Distance from the middle at which an obstacle's paint has faded, or from which on a curve
-        does not follow a lane.
+        Distance from the centre at which an obstacle ends, or distance from the middle line
+        up to which a curve follows a lane.
     weights : (V,) float array
-        The map.
+        Map with the weights of the region.
     """
 
     kind: str
@@ -79,9 +80,9 @@ class Region:
     weights: FloatArray
 
     def share(self, mesh: Mesh, curve: SurfaceCurve) -> float:
-        """Share of the curve inside an obstacle, or of an alignment line that has the curve near.
+        """Share of the curve inside an obstacle, or share of a middle line that is near the curve.
 
-        Inside is where the paint is stronger than ½.
+        The inside of an obstacle is where its weight is greater than ½.
         """
         even, segment = resample(curve.points, 1024)
         if self.kind == ALIGNMENT:
@@ -92,15 +93,20 @@ class Region:
 
 @dataclass(frozen=True)
 class Example:
-    """A mesh with a curve without guidance and, if there is a region, one with it.
+    """A mesh with a free curve and, if there is a painted region, a guided curve.
 
     Attributes
     ----------
     name : str
+        Name of the mesh.
     mesh : Mesh
+        Surface.
     region : Region or None
-    free, guided : Design
-        ``guided`` is None without a region.
+        Obstacle or lane.
+    free : Design
+        Curve without guidance.
+    guided : Design or None
+        Curve with the region as obstacle or alignment; None without a region.
     """
 
     name: str
@@ -111,7 +117,7 @@ class Example:
 
     @property
     def shares(self) -> tuple[float, float] | None:
-        """`Region.share` of the free and of the guided curve."""
+        """`Region.share` of the free curve and of the guided curve; None without a region."""
         if self.region is None or self.guided is None:
             return None
         return (
@@ -120,7 +126,7 @@ class Example:
         )
 
     def results(self) -> Results:
-        """What results keep; shares and seconds are those without and with guidance."""
+        """Summary of the example; shares and seconds are those without and with guidance."""
         designs = [design for design in (self.free, self.guided) if design is not None]
         shares = self.shares
         return {
@@ -133,7 +139,7 @@ class Example:
         }
 
     def picture(self, title: str, free: bool = True, guided: bool = True) -> renders.Picture:
-        """The painted mesh with its free curve in white and the guided one in blue."""
+        """Painted mesh with the free curve in white and the guided curve in blue."""
         curves = [(self.free.curves[0], renders.WHITE)] if free else []
         if guided and self.guided is not None:
             curves.append((self.guided.curves[0], renders.BLUE))
@@ -148,7 +154,7 @@ class Example:
 
 
 def measure(scale: Scale) -> Results:
-    """Render all three figures."""
+    """Render the counterparts of all three figures."""
     generator = np.random.default_rng(SEED)
     first = _example(*_named_mesh("horse", scale), ALIGNMENT, generator)
     second = _example(*_named_mesh("woman", scale), OBSTACLE, generator)
@@ -173,28 +179,35 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The pictures, and what guidance did in each."""
+    """The pictures, and the effect of guidance in each."""
     pictures, examples = results["pictures"], results["examples"]
     alignment = report.figure(
-        pictures["alignment"], "Alignment (Fig. 13): without and with the blue region"
+        pictures["alignment"],
+        "Alignment (Fig. 13): without guidance, and aligned with the blue region",
     )
     obstacle = report.figure(
-        pictures["obstacle"], "An obstacle (Fig. 14): white without it, blue with it"
+        pictures["obstacle"], "An obstacle (Fig. 14): curve without it (white) and with it (blue)"
     )
     many = report.figure(
         pictures["many"],
-        "Many meshes (Fig. 15): white without guidance, blue with obstacle or alignment",
+        "Many meshes (Fig. 15): curves without guidance (white), and with an obstacle or an "
+        "alignment region (blue)",
     )
     return (
-        f"Seed {results['seed']}, `{results['method']}`, {results['points']} control points on a "
-        "ring about a random vertex of each mesh, obstacles on the free curve and lanes beside it "
-        f"(`lanes`).\n\n{alignment}\n\n{obstacle}\n\n{many}\n\n"
+        f"The pictures show curves of `{results['method']}` without guidance and with painted "
+        "regions, as in Fig. 13, 14 and 15 of the paper. Each row of the table is one mesh. Its "
+        "share is that of the curve inside the obstacle, or that of the middle line of the "
+        "alignment region that is near the curve, without guidance → with guidance; the times are "
+        "those of both curves. On each mesh the curve passes "
+        f"{results['points']} control points on a ring around a random vertex (seed "
+        f"{results['seed']}). Obstacles lie on the free curve; alignment regions are lanes beside "
+        f"it, as in the section on lanes.\n\n{alignment}\n\n{obstacle}\n\n{many}\n\n"
         f"{_table(examples)}\n\n{_findings(examples)}"
     )
 
 
 def _render_alignment(example: Example, scale: Scale) -> None:
-    """Without and with the region, from one side."""
+    """Render the curves without and with the region, from the same view."""
     view = renders.best_view(example.picture(""))
     renders.render_sheet(
         [
@@ -208,7 +221,7 @@ def _render_alignment(example: Example, scale: Scale) -> None:
 
 
 def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
-    """The first mesh of a class of SHREC16, or a disc."""
+    """First mesh of a class of SHREC16, or a disc at the scale of a smoke test."""
     if scale is Scale.SMOKE:
         return "disc", shapes.disc(16)
     for name, mesh in collections.shrec16_class(kind):
@@ -217,7 +230,7 @@ def _named_mesh(kind: str, scale: Scale) -> tuple[str, Mesh]:
 
 
 def _meshes(scale: Scale) -> Iterator[tuple[str, Mesh]]:
-    """Meshes of several collections in turn, of a size that a picture needs."""
+    """Meshes of several collections in turn, with numbers of vertices that suit a picture."""
     if scale is Scale.SMOKE:
         yield "disc", shapes.disc(16)
         return
@@ -252,7 +265,7 @@ def _gallery(scale: Scale, generator: np.random.Generator) -> list[Example]:
 def _example(
     name: str, mesh: Mesh, kind: str | None, generator: np.random.Generator
 ) -> Example | None:
-    """A free and a guided curve through the first ring that has them; None if none has."""
+    """Free and guided curve through the first ring that has both; None if no ring has."""
     for _ in range(RINGS):
         points = _ring(mesh, generator)
         if points is None:
@@ -287,7 +300,7 @@ def _guided(mesh: Mesh, points: IntArray, region: Region) -> nicmm.Design:
 
 
 def _ring(mesh: Mesh, generator: np.random.Generator) -> IntArray | None:
-    """Vertices all round a random one, at about the same distance along edges."""
+    """Ring of vertices around a random one, at about the same distance along edges."""
     component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
     own = mesh.face_component == component
     radius = RING_RADIUS * float(np.sqrt(mesh.face_areas[own].sum()))
@@ -313,9 +326,9 @@ def _ring(mesh: Mesh, generator: np.random.Generator) -> IntArray | None:
 
 
 def _region(mesh: Mesh, curve: SurfaceCurve, kind: str) -> Region | None:
-    """An obstacle on the curve, or a lane beside it to follow; None without room for a lane.
+    """An obstacle on the curve, or a lane beside it; None if there is no room for a lane.
 
-    Both lie in the middle of the longest stretch between two control points.
+    Both lie at the middle of the longest part of the curve between two control points.
     """
     if kind == ALIGNMENT:
         lane = lane_beside(mesh, curve)
@@ -330,7 +343,7 @@ def _region(mesh: Mesh, curve: SurfaceCurve, kind: str) -> Region | None:
 
 
 def _longest_stretch(curve: SurfaceCurve) -> FloatArray:
-    """Evenly spaced points of the longest part between two control points."""
+    """Evenly spaced points of the longest part of a curve between two control points."""
     count = 256
     even, segment = resample(curve.points, count)
     bounds = [int((segment < index).sum()) for index in np.sort(curve.control_index)]
@@ -355,15 +368,11 @@ def _table(examples: Sequence[Results]) -> str:
             )
         )
     header = ("mesh", "vertices", "guidance", "share, without → with", "status", "seconds")
-    return (
-        report.table(header, rows)
-        + "\n\nShare of the curve inside the obstacle, or of the alignment region's middle line "
-        "that has the curve near."
-    )
+    return report.table(header, rows)
 
 
 def _findings(examples: Sequence[Results]) -> str:
-    """Whether guidance moved the curves the way it should."""
+    """Whether guidance had the intended effect, which is the paper's claim."""
     text = ""
     for kind, claim in ((OBSTACLE, "avoids"), (ALIGNMENT, "follows")):
         pairs = [example["shares"] for example in examples if example["guidance"] == kind]
@@ -374,8 +383,17 @@ def _findings(examples: Sequence[Results]) -> str:
         )
         without, guided = 100 * np.mean(pairs, axis=0)
         text += (
-            f"The curve {claim} the {kind} region in {works} of {len(pairs)} pictures (shares "
-            f"{without:.0f} % → {guided:.0f} % on average)"
+            f"The curve {claim} the {kind} region on {works} of {len(pairs)} meshes (average share "
+            f"{without:.0f} % → {guided:.0f} %), which "
         )
-        text += ". " if works == len(pairs) else "; the others contradict the paper. "
-    return text + f"A line is followed if the curve is near {100 * FOLLOWED:g} % of it."
+        text += (
+            "agrees with the paper. "
+            if works == len(pairs)
+            else "agrees with the paper only on those. "
+            if works
+            else "contradicts the paper. "
+        )
+    return text + (
+        f"An alignment region counts as followed if the curve is near at least {100 * FOLLOWED:g} "
+        "% of its middle line."
+    )

@@ -1,7 +1,7 @@
-"""The guarantee from outside: one simple curve through all points in order, and how fair it is.
+"""Tests the guarantee of one simple curve through all points in order, and measures its fairness.
 
-Every design is judged by `checker`, which knows only the public interface. The yardstick of
-fairness is a slow explicit curve through the same points in the same order, see `elastic_curve`.
+Every design is judged by `checker`, which uses only the public interface. The reference for
+fairness is a slow explicit curve through the same points in the same order; see `elastic_curve`.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from .measures import SAMPLES, bending, squared_curvature
 from .samples import point_sets
 from .scale import Scale
 
-TITLE = "The guarantee, and fairness, from outside"
+TITLE = "The guarantee and fairness, checked independently"
 
 METHOD = "nicmm"
 SEED = 0
 SETS = 2
-"""Of random points on each mesh, each asked for as a closed and as an open curve."""
+"""Sets of random points per mesh; each one is requested as a closed and as an open curve."""
 
 WORKERS = 2
-"""Processes; each mesh is measured by one of them, so the result does not depend on them."""
+"""Number of processes; each mesh is measured by one, so results do not depend on the number."""
 
 SAMPLINGS = (SAMPLES, NODES)
-"""Numbers of samples that curvature is measured with, see `curvature.SAMPLINGS`."""
+"""Numbers of samples at which curvature is measured; see `curvature.SAMPLINGS`."""
 
 NEARLY_STRAIGHT = 0.5
-"""Bending of the elastic curve below which ratios to it say nothing; an arc of 40° has it."""
+"""Bending of the elastic curve, that of a 40° arc, below which ratios to it are meaningless."""
 
 SHARES = (0.25, 0.5, 0.75, 0.9)
-"""Of the sets, that the table gives the values of."""
+"""Quantiles over the sets that the table shows."""
 
 LISTED_FAULTS = 20
 
 NAMED = "named curves"
-"""Their points are chosen, so they are left out of the distributions."""
+"""Collection whose points are not random; it is left out of the distributions."""
 
 KIND = {True: "closed", False: "open"}
 
@@ -59,7 +59,7 @@ PLOT = "guarantee.png"
 
 @dataclass(frozen=True)
 class Request:
-    """One curve that is asked for."""
+    """Request for one curve."""
 
     points: IntArray
     closed: bool
@@ -68,7 +68,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Job:
-    """All that is asked for on one mesh, and whether fairness is compared with the yardstick."""
+    """All requests on one mesh, and whether they are compared with the reference of fairness."""
 
     collection: str
     name: str
@@ -78,7 +78,7 @@ class Job:
 
 
 def measure(scale: Scale) -> Results:
-    """Ask for closed and open curves on every collection and judge them."""
+    """Design closed and open curves on every collection, and judge them."""
     meshes = []
     for of_mesh in _measured(_jobs(scale), 1 if scale is Scale.SMOKE else WORKERS):
         meshes.append(of_mesh)
@@ -96,26 +96,40 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How many curves are what was asked for, and how fair they are."""
+    """Number of curves that keep the guarantee, and the distribution of fairness."""
     meshes = results["meshes"]
     return (
-        f"Seed {results['seed']}; {results['sets']} sets of 3–5 random vertices a mesh, each "
-        "closed and open, shortest order; named curves as `named_curves.py` asks for them; "
-        f"`{results['method']}`. The judge is `tests/oracles/checker.py`, which knows only the "
-        f"public interface.\n\n{_table(meshes)}\n\n{_faults(meshes)}\n\n{_fairness(results)}\n\n"
-        + report.figure(PLOT, "Share of the sets at or below each ratio to the elastic curve")
+        f"`{results['method']}` guarantees one simple curve through all control points in order, "
+        "or an error; the first table counts how often an independent checker confirms this. Each "
+        "row is a collection of meshes and a kind of curve. The columns after the number of curves "
+        "are those that keep the guarantee; the largest distance from a control point in bounding "
+        "box diagonals; segments that do not lie in a face; self-crossings; errors; and the "
+        f"statuses of the designs. There are {results['sets']} sets of 3–5 random vertices per "
+        "mesh, each as a closed and as an open curve (shortest order, seed "
+        f"{results['seed']}), and the named curves of `tests/oracles/named_curves.py`. The checker "
+        "is `tests/oracles/checker.py`, which uses only the public interface. The paper has no "
+        "corresponding table; it reports curves with several loops as a limitation (Fig. 16)."
+        f"\n\n{_table(meshes)}\n\n{_faults(meshes)}\n\n{_fairness(results)}\n\n"
+        + report.figure(
+            PLOT,
+            "Share of the sets whose bending is at most the given multiple of that of the elastic "
+            "curve",
+        )
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Share of the sets whose curve is at most so many times as far from fair."""
+    """Plot the distribution of the bending relative to elastic curves."""
     samplings = results["samplings"]
     figure, axes = plots.labelled(
         f"Fairness of {results['method']}",
         f"L ∫ κ_g² ds relative to the elastic curve ({samplings[-1]} samples)",
         "share of the sets",
     )
-    lines = {"the fairest known": ("to_best", "-"), "from its own start": ("to_own", ":")}
+    lines = {
+        "relative to the fairest elastic curve": ("to_best", "-"),
+        "relative to the elastic curve started from it": ("to_own", ":"),
+    }
     for closed, colour in ((True, "tab:blue"), (False, "tab:orange")):
         for label, (name, style) in lines.items():
             values = _values(results["meshes"], closed, len(samplings) - 1, name)
@@ -134,7 +148,7 @@ def draw(results: Results, folder: Path) -> None:
 
 
 def _jobs(scale: Scale) -> Iterator[Job]:
-    """Meshes with their points, which depend on the seed and the mesh's name alone."""
+    """Meshes with their requests; the points depend only on the seed and the name of the mesh."""
     every = _compared_every(scale)
     for label, meshes in _collections(scale):
         for number, (name, mesh) in enumerate(meshes):
@@ -160,33 +174,33 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
 
 
 def _compared_every(scale: Scale) -> int:
-    """Every how many meshes of a collection the yardstick is computed."""
+    """Interval of the meshes of a collection on which the reference of fairness is computed."""
     return scale.choose(8, 4)
 
 
 def _measured(jobs: Iterable[Job], workers: int) -> Iterator[Results]:
-    """What came on every mesh, in the order of the jobs."""
+    """Results on every mesh, in the order of the jobs."""
     if workers == 1:
         yield from map(_judged, jobs)
         return
-    # A forked process would inherit the locks of PyTorch's threads.
+    # A forked process would inherit locks that threads of PyTorch hold.
     with get_context("spawn").Pool(workers) as pool:
         yield from pool.imap(_judged, jobs)
 
 
 def _judged(job: Job) -> Results:
-    """All curves on one mesh."""
+    """Judge all curves on one mesh."""
     designer = nicmm.Designer(job.mesh)
     curves = [_outcome(job, designer, request) for request in job.requests]
     return {"collection": job.collection, "mesh": job.name, "curves": curves}
 
 
 def _outcome(job: Job, designer: nicmm.Designer, request: Request) -> Results:
-    """What came of one request; what is as it should be is left out."""
+    """Outcome of one request; values that are as they should be are left out."""
     points, closed, order = request.points, request.closed, request.order
     try:
         design = designer.design(points, closed=closed, order=order, method=METHOD)
-    # An error that is not the package's own is a finding, and must not end a long measurement.
+    # Any other exception is a finding as well, and must not end a long measurement.
     except Exception as error:
         words = f"{type(error).__name__}: {error}"
         return {"closed": closed, "error": words, "typed": isinstance(error, nicmm.NicmmError)}
@@ -206,16 +220,17 @@ def _outcome(job: Job, designer: nicmm.Designer, request: Request) -> Results:
 
 
 def _alone(designer: nicmm.Designer, curve: nicmm.SurfaceCurve, _: IntArray) -> Results:
-    """L ∫ κ_g² ds with every number of samples."""
+    """L ∫ κ_g² ds for every number of samples."""
     return {"bending": [_rounded(bending(designer.mesh, curve, each)) for each in SAMPLINGS]}
 
 
 def _compared(designer: nicmm.Designer, curve: nicmm.SurfaceCurve, points: IntArray) -> Results:
-    """Fairness with every number of samples, also relative to elastic curves.
+    """Fairness for every number of samples, absolute and relative to elastic curves.
 
-    "Own" is the elastic curve that starts from the curve itself, "best" the fairest one known: the
-    other one starts from the variational method's curve. "Squared" is ∫ κ_g² ds alone. There are
-    no ratios where the elastic curve is nearly straight.
+    "own" refers to the elastic curve that starts from the curve itself. "best" refers to the
+    fairer one of this and the elastic curve that starts from the curve of the variational method.
+    "squared" is ∫ κ_g² ds without the factor L. Ratios are left out where the elastic curve is
+    nearly straight.
     """
     mesh = designer.mesh
     fair = [elastic_curve(mesh, curve)]
@@ -241,30 +256,30 @@ def _compared(designer: nicmm.Designer, curve: nicmm.SurfaceCurve, points: IntAr
 
 
 def _rounded(value: float) -> float | None:
-    """Six digits; None where it is not finite."""
+    """Number rounded to six significant digits; None if it is not finite."""
     return float(f"{value:.6g}") if np.isfinite(value) else None
 
 
 def _visiting_order(curve: nicmm.SurfaceCurve, positions: FloatArray) -> IntArray:
-    """Which control point each one on the curve is."""
+    """Indices of the control points in the order in which the curve visits them."""
     offset = curve.points[curve.control_index][:, None] - positions[None]
     return np.linalg.norm(offset, axis=2).argmin(axis=1)
 
 
 def _words(curve: Results) -> str:
-    """The outcome in a few words."""
+    """Outcome in a few words."""
     return str(curve.get("error") or "; ".join(curve.get("faults", ())) or "kept")
 
 
 def _is_kept(curve: Results) -> bool:
-    """Whether it is what was asked for."""
+    """Whether a curve keeps the guarantee."""
     return "error" not in curve and "faults" not in curve
 
 
 def _table(meshes: Sequence[Results]) -> str:
     header = (
-        "meshes", "curves", "sets", "one simple curve through all points, in order",
-        "largest interpolation error, diagonals", "chords off a face", "self-crossings",
+        "meshes", "kind", "curves", "one simple curve through all points, in order",
+        "largest distance from a point, diagonals", "segments off a face", "self-crossings",
         "errors", "statuses",
     )  # fmt: skip
     rows = []
@@ -284,7 +299,7 @@ def _curves(meshes: Iterable[Results]) -> list[Results]:
 def _counted(curves: Sequence[Results]) -> tuple[object, ...]:
     judged = [curve for curve in curves if "error" not in curve]
     kept = sum(_is_kept(curve) for curve in curves)
-    # A typed error is named; any other is a fault of the package.
+    # Errors of the package are counted by type; any other exception is a fault of the package.
     errors = Counter(
         curve["error"].split(":")[0] + ("" if curve["typed"] else " (untyped)")
         for curve in curves
@@ -314,22 +329,23 @@ def _faults(meshes: Sequence[Results]) -> str:
         if not _is_kept(curve)
     ]
     if not wrong:
-        return "Every curve is what was asked for."
+        return "Every curve keeps the guarantee."
     more = f"\n\nand {len(wrong) - LISTED_FAULTS} more." if len(wrong) > LISTED_FAULTS else ""
-    return "Not what was asked for:\n\n" + "\n".join(wrong[:LISTED_FAULTS]) + more
+    return "These curves do not keep the guarantee:\n\n" + "\n".join(wrong[:LISTED_FAULTS]) + more
 
 
 COLUMNS = {
     "L ∫ κ_g² ds": ("bending", 0),
-    "to the elastic curve from its own start": ("to_own", 2),
-    "to the fairest one known": ("to_best", 2),
-    "∫ κ_g² ds alone, own start": ("squared_to_own", 2),
-    "∫ κ_g² ds alone, fairest": ("squared_to_best", 2),
+    "relative to the elastic curve started from it": ("to_own", 2),
+    "relative to the fairest elastic curve": ("to_best", 2),
+    "∫ κ_g² ds, relative to the elastic curve started from it": ("squared_to_own", 2),
+    "∫ κ_g² ds, relative to the fairest elastic curve": ("squared_to_best", 2),
 }
-"""Of the table of fairness: what is shown, with how many digits."""
+"""Columns of the table of fairness: measure and number of decimals, by header."""
 
 
 def _fairness(results: Results) -> str:
+    """Table of fairness, with an explanation."""
     meshes = results["meshes"]
     rows = []
     for closed in (True, False):
@@ -342,19 +358,23 @@ def _fairness(results: Results) -> str:
     every = results["compared_every"]
     which = "every mesh" if every == 1 else f"every {every}th mesh of each collection"
     return (
-        f"{report.table(('curves', 'samples', *COLUMNS), rows)}\n\n"
-        f"Values at {', '.join(f'{100 * share:.0f}' for share in SHARES)} % of the sets, then "
-        f"their number. Ratios are taken on {which}, to explicit elastic curves through the same "
-        "points in the same order: the one that starts from the curve itself, and the fairest of "
-        "it and the one that starts from the curve of `variational`. Their topology is free and "
-        f"each is a local optimum. {straight} of {straight + compared} sets are left out of the "
-        f"ratios because the elastic curve is nearly straight (L ∫ κ_g² ds below "
-        f"{results['nearly_straight']})."
+        "The second table shows how fair the curves are: their bending L ∫ κ_g² ds, its ratio to "
+        "that of explicit elastic curves through the same points in the same order, and the same "
+        "ratio without the factor L. Each row is a kind of curve and the number of samples at "
+        "which curvature is measured. Each cell has the "
+        f"{', '.join(f'{100 * share:.0f}' for share in SHARES)} % quantiles over the sets and, in "
+        "parentheses, the number of sets; named curves are left out. One elastic curve starts from "
+        "the curve itself, and another one from the curve of `variational`; the fairest is the "
+        "better of the two. Both are local optima, and they may cross themselves. The ratios are "
+        f"measured on {which}; {straight} of {straight + compared} sets are left out of them "
+        "because the elastic curve is nearly straight (L ∫ κ_g² ds below "
+        f"{results['nearly_straight']}).\n\n"
+        f"{report.table(('curves', 'samples', *COLUMNS), rows)}"
     )
 
 
 def _values(meshes: Sequence[Results], closed: bool, sampling: int, name: str) -> list[float]:
-    """A measure of all curves of a kind where it is known, sorted."""
+    """Sorted values of a measure, of all curves of a kind for which it is known."""
     curves = _curves(each for each in meshes if each["collection"] != NAMED)
     values = [
         curve[name][sampling] for curve in curves if curve["closed"] == closed and name in curve

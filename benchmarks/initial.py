@@ -1,4 +1,4 @@
-"""What the initial loop changes in the curve (Fig. 6)."""
+"""Measures how the curve depends on the initial loop (Fig. 6)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .solving import (
     significant,
 )
 
-TITLE = "Initial loops (Fig. 6)"
+TITLE = "Sensitivity to the initial loop (Fig. 6)"
 WITHOUT = PARTS_WITHOUT
 
 SEED = 6
@@ -48,16 +48,16 @@ LOOPS = (SHORTEST, OUTWARDS, INWARDS, WAVY)
 UNSIGNED, RANDOM = "distance to the points, without sign", "random smooth field"
 
 PUSH = 0.05
-"""How far a loop is pushed aside, in √area."""
+"""Distance by which a loop is displaced, in √area."""
 
 WIDTH = 0.15
-"""How far the obstacle reaches on the side that the loop is pushed from, in √area."""
+"""Extent of the obstacle on the side from which the loop is displaced, in √area."""
 
 CLEARANCE = 0.06
-"""Distance from the control points within which nothing is pushed, in √area."""
+"""Distance from the control points within which there is no obstacle, in √area."""
 
 WAVES = 3
-"""Times that the wavy loop swings out to both sides."""
+"""Number of waves of the wavy loop, each to both sides."""
 
 STILLS = "initial_curves.png"
 PICTURED = 2
@@ -65,16 +65,18 @@ PICTURED = 2
 
 @dataclass(frozen=True)
 class Outcome:
-    """A curve from one initial loop.
+    """Result of fine-tuning from one initial loop.
 
     Attributes
     ----------
     start, curve : SurfaceCurve
-        The loop and what became of it.
+        Initial loop, and the resulting curve.
     by_itself : bool
-        Whether that was one loop before the topology was held.
+        Whether the level set was one loop without a repair of its topology.
     iterations : int
+        Iterations up to the early stop.
     loss : float
+        Lowest loss.
     """
 
     start: SurfaceCurve
@@ -85,7 +87,7 @@ class Outcome:
 
 
 def measure(scale: Scale) -> Results:
-    """Compare curves through the same points from several initial loops, and from none."""
+    """Compare curves through the same points from several initial loops and without a loop."""
     network = load_network()
     meshes = collections.surfaces(scale, scale.choose(12, 1))
     compared: list[Results] = []
@@ -119,38 +121,47 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How much of the difference between loops remains in the curves."""
+    """How much of the difference between the loops remains in the curves."""
     compared, loops = results["compared"], results["loops"]
     plot = report.figure(
-        "initial.png", "Each dot is a mesh: distance to the shortest loop and its curve"
+        "initial.png",
+        "Distance of the curves against the distance of the loops they start from, both to the "
+        "shortest loop and its curve; each dot is a mesh",
     )
     stills = report.figure(
         results["stills"], "Initial loops (white) and the curves from them (blue) (Fig. 6)"
     )
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, on {len(compared)} meshes "
-        f"({results['collection']}: {report.listed(one['mesh'] for one in compared)}), shipped "
-        "weights, early stop, the same λ for all loops of a set. The other loops pass the same "
-        f"points in the same order and are pushed aside between them by {results['push']:g} √area "
-        "or more, by an obstacle that only the initial loop sees. Distances are to the shortest "
-        "loop and to the curve from it, in percent of the bounding box's diagonal; medians over "
-        f"the meshes.\n\n{_loop_table(compared, loops)}\n\n{_loop_findings(compared, loops)}\n\n"
+        "Curves through the same control points were computed by `nicmm-paper` from different "
+        "initial loops, to see how much the curve depends on the loop, as in Fig. 6 of the paper. "
+        "Each row is a kind of loop: the shortest one, and loops through the same points in the "
+        f"same order that are displaced between them by {results['push']:g} √area or more, by an "
+        "obstacle that affects only the initial loop. Distances are mean and greatest distances "
+        "from the loop to the shortest loop, and from the curve to the curve of the shortest loop, "
+        "in percent of the bounding box diagonal. Distances, iterations and losses are medians "
+        f"over {len(compared)} meshes, with one set of 3–5 random vertices per mesh (seed "
+        f"{results['seed']}). Fine-tuning starts from the shipped weights and ends at the early "
+        "stop; λ is the same for all loops of a set. Meshes "
+        f"({results['collection']}): {report.listed(one['mesh'] for one in compared)}.\n\n"
+        f"{_loop_table(compared, loops)}\n\n{_loop_findings(compared, loops)}\n\n"
         f"{plot}\n\n{stills}\n\n"
-        "### Without an initial loop\n\nFig. 6 has one curve from a distance to the control "
-        "points alone. It does not say how that has a sign, so two fields stand in for φ₀, in "
-        "the input and under the network's correction: that distance, positive everywhere, and a "
-        f"random smooth field that is zero at the points (seed {results['random_seed']}). What is "
-        "looked at is the level set itself, since there is no loop whose topology could be held."
-        f"\n\n{_none_table(compared)}\n\n{_none_findings(compared)}"
+        "### Without an initial loop\n\nOne curve of Fig. 6 starts from the distance to the "
+        "control points alone. The paper does not say how this distance gets a sign, so the table "
+        "shows two replacements for φ₀: the distance, positive everywhere, and a random smooth "
+        f"field that is zero at the points (seed {results['random_seed']}). The replacement is "
+        "both an input of the network and the field that its output is added to. The level set is "
+        "evaluated as it is, because there is no loop whose topology it could be given. Distances "
+        "are to the curve of the shortest loop, in percent of the diagonal.\n\n"
+        f"{_none_table(compared)}\n\n{_none_findings(compared)}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the distances of the curves against those of the loops."""
+    """Plot the distances of the curves against the distances of the loops."""
     figure, axes = plots.labelled(
         "Curves from different initial loops (Fig. 6)",
-        "mean distance of the loops (% of the diagonal)",
-        "mean distance of the curves (% of the diagonal)",
+        "mean distance of the loop to the shortest loop (% of the diagonal)",
+        "mean distance of their curves (% of the diagonal)",
     )
     farthest = 0.0
     for label in results["loops"][1:]:
@@ -158,13 +169,13 @@ def draw(results: Results, folder: Path) -> None:
         axes.plot(pairs[:, 0], pairs[:, 1], "o", label=label)
         farthest = max(farthest, float(pairs.max(initial=0.0)))
     ends = [0.0, farthest]
-    axes.plot(ends, ends, "--", color="0.5", linewidth=1, label="no nearer than the loops")
+    axes.plot(ends, ends, "--", color="0.5", linewidth=1, label="curves as far apart as the loops")
     axes.legend()
     plots.save(figure, folder / "initial.png")
 
 
 def _with_loops(network: CurveNetwork, sample: Sample) -> dict[str, Outcome]:
-    """What comes of each initial loop; one that cannot be made is named and left out."""
+    """Outcome of each initial loop; loops that cannot be made are reported and left out."""
     outcomes = {SHORTEST: _outcome(network, sample)}
     for label, obstacle in _obstacles(sample).items():
         try:
@@ -189,7 +200,7 @@ def _outcome(network: CurveNetwork, sample: Sample) -> Outcome:
 
 
 def _compared(sample: Sample, outcome: Outcome, base: Outcome) -> Results:
-    """What results keep of an outcome; distances are those of the loop and of the curve."""
+    """Summary of an outcome; the distances are those of the loop and of the curve."""
     loops = relative_distances(sample, outcome.start, base.start)
     curves = relative_distances(sample, outcome.curve, base.curve)
     return {
@@ -201,7 +212,7 @@ def _compared(sample: Sample, outcome: Outcome, base: Outcome) -> Results:
 
 
 def _obstacles(sample: Sample) -> dict[str, FloatArray]:
-    """Regions on one side of the shortest loop, which drive it to the other."""
+    """Obstacles on one side of the shortest loop, which displace it to the other side."""
     mesh, problem = sample.mesh, sample.problem
     side_distance = _at_vertices(mesh, problem)
     from_points, _ = cKDTree(mesh.vertices[sample.points]).query(mesh.vertices)
@@ -221,7 +232,7 @@ def _obstacles(sample: Sample) -> dict[str, FloatArray]:
 
 
 def _at_vertices(mesh: Mesh, problem: Problem) -> FloatArray:
-    """Signed distance to the initial loop at the mesh's vertices, infinite off its component."""
+    """Signed distance to the initial loop at the vertices; infinite on other components."""
     inputs = problem.working.input_vertex
     values = np.full(len(mesh.vertices), np.inf)
     values[inputs[inputs >= 0]] = problem.distance[inputs >= 0]
@@ -229,7 +240,7 @@ def _at_vertices(mesh: Mesh, problem: Problem) -> FloatArray:
 
 
 def _problem_round(sample: Sample, obstacle: FloatArray) -> Problem:
-    """The problem with a loop that goes round an obstacle of which nothing else knows."""
+    """Problem whose initial loop avoids an obstacle that affects neither features nor energy."""
     points = locate_control_points(sample.mesh, sample.points, True)
     problem = build_problem(sample.mesh, points, "shortest", obstacles=obstacle)
     return replace(problem, feature_map=None, features=problem.features[:, :BASE_CHANNELS])
@@ -238,9 +249,9 @@ def _problem_round(sample: Sample, obstacle: FloatArray) -> Problem:
 def _without_loops(
     network: CurveNetwork, sample: Sample, reference: SurfaceCurve
 ) -> dict[str, Results]:
-    """The level sets when φ₀ does not come from a loop.
+    """Level sets for fields in place of φ₀ that do not come from a loop.
 
-    One that is a single closed curve through all control points is compared with the reference.
+    A level set that is one closed curve through all control points is compared with the reference.
     """
     problem = sample.problem
     fields = {
@@ -268,15 +279,15 @@ def _without_loops(
 
 
 def _render(shown: Sequence[tuple[Sample, dict[str, Outcome]]], scale: Scale) -> None:
-    """Pictures of some meshes, each mesh from one side."""
+    """Render some meshes, with the same view for all curves on a mesh."""
     pictures: list[renders.Picture] = []
     views: list[FloatArray] = []
-    # Where the topology was held everywhere there is less to see of the method.
+    # Where the topology had to be repaired, the pictures show less of the method itself.
     telling = sorted(shown, key=lambda one: -sum(o.by_itself for o in one[1].values()))
     for sample, outcomes in telling[:PICTURED]:
         row = [_picture(sample, label, outcome) for label, outcome in outcomes.items()]
         pictures += row
-        # One camera for all, so that the curves can be compared.
+        # The same camera for the whole row, so that the curves can be compared.
         views += [renders.best_view(row[0])] * len(row)
     path = report.figures_folder(scale) / STILLS
     renders.render_sheet(pictures, path, scale, columns=len(LOOPS), views=views)
@@ -288,12 +299,12 @@ def _picture(sample: Sample, label: str, outcome: Outcome) -> renders.Picture:
 
 
 def _pairs(compared: Sequence[Results], label: str) -> list[list[list[float]]]:
-    """Distances of the loop and of the curve to those of the shortest loop, on every mesh."""
+    """Distances of loop and curve to the shortest loop and its curve, on each mesh."""
     return [one["with_loop"][label]["distances"] for one in compared if label in one["with_loop"]]
 
 
 def _both_by_themselves(compared: Sequence[Results], label: str) -> list[bool]:
-    """For each of `_pairs`, whether neither topology had to be held."""
+    """For each of `_pairs`, whether both level sets were one loop without a repair."""
     return [
         one["with_loop"][label]["by_itself"] and one["with_loop"][SHORTEST]["by_itself"]
         for one in compared
@@ -321,14 +332,15 @@ def _loop_table(compared: Sequence[Results], labels: Sequence[str]) -> str:
             )
         )
     header = (
-        "initial loop", "meshes", "loop: mean distance", "greatest", "curve: mean distance",
-        "greatest", "one loop by itself", "iterations", "loss",
+        "initial loop", "meshes", "loop: mean distance, %", "loop: greatest distance, %",
+        "curve: mean distance, %", "curve: greatest distance, %", "level set one loop by itself",
+        "iterations", "loss",
     )  # fmt: skip
     return report.table(header, rows)
 
 
 def _loop_findings(compared: Sequence[Results], labels: Sequence[str]) -> str:
-    """What the table says, in words."""
+    """What the table shows, in words, and whether it agrees with the paper."""
     pairs = [pair for label in labels[1:] for pair in _pairs(compared, label)]
     if not pairs:
         return "No other loop could be made, so there is nothing to compare."
@@ -338,30 +350,29 @@ def _loop_findings(compared: Sequence[Results], labels: Sequence[str]) -> str:
     )
     kept = float(np.median(curves / loops))
     text = (
-        "The paper says of Fig. 6, without numbers, that different loops give curves that differ "
-        "“mainly in local geometric details”. The loops here lie "
-        f"{np.median(loops):.2f} % of the diagonal apart on average and the curves from them "
-        f"{np.median(curves):.2f} %: {100 * kept:.0f} % of the difference remains (medians). "
-    )
-    text += (
-        f"On {int(whole.sum())} of these {len(whole)} pairs both level sets were one loop by "
-        "themselves and nothing held them near φ₀"
-    )
-    text += (
-        f"; there {100 * np.median((curves / loops)[whole]):.0f} % remains. "
-        if whole.any()
-        else ". "
+        "The paper states for Fig. 6, without numbers, that different loops give curves that "
+        "differ “mainly in local geometric details”. Here the mean distance of the loops is "
+        f"{np.median(loops):.2f} % of the diagonal and that of the curves "
+        f"{np.median(curves):.2f} %, so {100 * kept:.0f} % of the difference remains (medians), "
     )
     if kept < 0.25:
-        return text + "That agrees with the paper."
-    if kept < 0.75:
-        return text + (
-            "The curves come closer to one another, but no common curve is reached: the result "
-            "depends on the loop more than the paper's words suggest."
+        text += "which agrees with the paper. "
+    elif kept < 0.75:
+        text += (
+            "which agrees with the paper only in part: the curves come closer to one another, but "
+            "they do not reach a common curve. "
         )
+    else:
+        text += (
+            "which contradicts the paper's “strong convergence robustness”: the curves stay near "
+            "their initial loops. "
+        )
+    text += (
+        f"On {int(whole.sum())} of the {len(whole)} pairs both level sets were one loop by "
+        "themselves, so the repair of the topology did not hold them near φ₀"
+    )
     return text + (
-        "The curves stay near the loop that they started from, which contradicts the paper's "
-        "“strong convergence robustness”."
+        f"; there {100 * np.median((curves / loops)[whole]):.0f} % remains." if whole.any() else "."
     )
 
 
@@ -380,21 +391,25 @@ def _none_table(compared: Sequence[Results]) -> str:
             )
         )
     header = (
-        "in place of φ₀", "one loop through all points", "curves in the level set (median)",
-        "mean distance of those that are", "greatest",
+        "in place of φ₀", "one loop through all points", "curves in the level set, median",
+        "mean distance of single loops, %", "greatest distance of single loops, %",
     )  # fmt: skip
     return report.table(header, rows)
 
 
 def _none_findings(compared: Sequence[Results]) -> str:
-    """What the table says, in words."""
-    text = ""
-    for label in (UNSIGNED, RANDOM):
-        share = float(np.mean([one["without_loop"][label]["one_loop"] for one in compared]))
-        text += f"From the {label}, {100 * share:.0f} % of the sets give a usable curve"
-        text += (
-            ", which contradicts Fig. 6, where a distance to the points alone gives a curve. "
-            if label == UNSIGNED and share < 0.5
-            else ". "
-        )
-    return text + "The shipped weights have seen φ₀ from loops only."
+    """What the table shows, in words, and whether it agrees with the paper."""
+    share = {
+        label: float(np.mean([one["without_loop"][label]["one_loop"] for one in compared]))
+        for label in (UNSIGNED, RANDOM)
+    }
+    text = (
+        "With the distance to the points in place of φ₀, "
+        f"{100 * share[UNSIGNED]:.0f} % of the sets give one loop through all points, which "
+    )
+    text += "contradicts" if share[UNSIGNED] < 0.5 else "agrees with"
+    return text + (
+        " Fig. 6, where that distance alone gives a curve. With a random smooth field, "
+        f"{100 * share[RANDOM]:.0f} % do. The shipped weights were pretrained only with φ₀ from "
+        "loops."
+    )

@@ -1,4 +1,7 @@
-"""Lanes painted beside the free curve: how much nearer the curve comes to them, at what price."""
+"""Alignment: how much closer a curve runs to a painted lane, and what that costs.
+
+A lane is a painted strip beside the free curve, that is, beside the curve without maps.
+"""
 
 from __future__ import annotations
 
@@ -32,45 +35,49 @@ WITHOUT = ("outputs",)
 SEED = 4
 
 OFFSET = 0.045
-"""How far beside the free curve a lane is laid on the surface, in diagonals."""
+"""Distance of a lane from the free curve along the surface, in diagonals."""
 
 LEAST_OFFSET = 0.03
-"""Mean distance in space that it has to keep, in diagonals; one round a limb comes back."""
+"""Least mean distance of a lane from the free curve in space, in diagonals.
+
+A lane that leads round a limb may come back to the curve.
+"""
 
 WIDTH = 0.01
-"""Distance in space from its line up to which a lane is painted, in diagonals, or"""
+"""Half the width of a lane, as a distance in space from its line, in diagonals."""
 
 LEAST_WIDTH = 0.75
-"""in mean edge lengths, where that is more: fewer vertices would be a row of spots."""
+"""Least half-width in mean edge lengths; a narrower lane would be a row of separate spots."""
 
 STRETCH = (0.25, 0.75)
-"""The part of the longest stretch between two control points that has a lane beside it."""
+"""Part of the longest leg of the free curve that has a lane beside it, as fractions."""
 
 SAMPLES = 256
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A painted line.
+    """A painted lane.
 
     Attributes
     ----------
     line : (n, 3) float array
-        Points of the surface, evenly along the free curve.
+        Surface points of the middle line, at even steps along the free curve.
     weights : (V,) float array
+        Alignment map: 1 in the lane, 0 elsewhere.
     """
 
     line: FloatArray
     weights: FloatArray
 
     def distance(self, curve: SurfaceCurve) -> float:
-        """Mean distance of the line to a curve."""
+        """Mean distance from the middle line to a curve."""
         even, _ = resample(curve.points, 2048, curve.closed)
         return float(cKDTree(even).query(self.line)[0].mean())
 
 
 def measure(scale: Scale) -> Results:
-    """Lanes of weight 1 on closed meshes and on people and animals."""
+    """Compare curves with and without a lane of weight 1, on closed meshes, people and animals."""
     if scale is Scale.SMOKE:
         meshes = collections.creatures(2)
     else:
@@ -89,7 +96,7 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The curve that is led, relative to the free one."""
+    """The aligned curve relative to the free one."""
     sets = results["sets"]
     led = [each["led"] for each in sets if each["led"] is not None]
     kept = sum(not each["faults"] for each in led)
@@ -113,7 +120,7 @@ def section(results: Results) -> str:
 
 
 def _led(name: str, mesh: Mesh, points: IntArray) -> Results | None:
-    """A curve with a lane relative to the free one; None where there is no room for a lane."""
+    """The aligned curve relative to the free one; None if there is no room for a lane."""
     free, _ = _timed(mesh, points, None)
     lane = lane_beside(mesh, free.curves[0])
     if lane is None:
@@ -138,14 +145,14 @@ def _led(name: str, mesh: Mesh, points: IntArray) -> Results | None:
 
 
 def _timed(mesh: Mesh, points: IntArray, weights: FloatArray | None) -> tuple[nicmm.Design, float]:
-    """A design and the seconds of processor time that it took."""
+    """A design and its CPU time in seconds."""
     started = time.process_time()
     design = nicmm.design_curve(mesh, points, order="shortest", alignment=weights)
     return design, time.process_time() - started
 
 
 def lane_beside(mesh: Mesh, curve: SurfaceCurve) -> Lane | None:
-    """A lane on either side of a closed curve; None where both are too near in space."""
+    """A lane on one side of a closed curve; None if it is too close in space on either side."""
     even, segment = resample(curve.points, 4 * SAMPLES, True)
     bounds = np.sort([int((segment < index).sum()) for index in curve.control_index])
     counts = np.diff([*bounds, bounds[0] + len(even)])
@@ -169,7 +176,7 @@ def lane_beside(mesh: Mesh, curve: SurfaceCurve) -> Lane | None:
 
 
 def _painted(mesh: Mesh, line: FloatArray, normals: FloatArray) -> FloatArray:
-    """1 at vertices near a line, on the side of the surface that it is on."""
+    """Map that is 1 at vertices near a line, but not on an opposite side of a thin part."""
     width = max(WIDTH * mesh.diagonal, LEAST_WIDTH * mesh.mean_edge_length)
     distance, nearest = cKDTree(line).query(mesh.vertices)
     facing = (vertex_normals(mesh.vertices, mesh.faces) * normals[nearest]).sum(axis=1) > 0.0

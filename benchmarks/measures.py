@@ -1,4 +1,4 @@
-"""What is measured of curves: bending and geodesic curvature."""
+"""Quality measures of curves: geodesic curvature and bending."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.normals import vertex_normals
 
 SAMPLES = 128
-"""Evenly spaced points of a curve that curvature is taken at.
+"""Number of evenly spaced points of a curve at which curvature is measured.
 
-Polylines have short segments wherever they pass near a vertex, whose angles say nothing.
+The vertices of the polyline itself are unsuitable: it has short segments wherever it passes near a
+mesh vertex, and the turning angles between them are meaningless.
 """
 
 
@@ -24,7 +25,7 @@ def diagonal(mesh: Mesh) -> float:
 def curvature_along(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> FloatArray:
     """Geodesic curvature (Eq. 10) at evenly spaced points of a curve, in 1/length.
 
-    The ends of an open curve are among the points and have none.
+    For an open curve the points include both ends, where the curvature is zero.
     """
     points, segment = resample(curve.points, samples, curve.closed)
     at_corners = vertex_normals(mesh.vertices, mesh.faces)[mesh.faces[curve.faces[segment]]]
@@ -40,5 +41,5 @@ def squared_curvature(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -
 
 
 def bending(mesh: Mesh, curve: SurfaceCurve, samples: int = SAMPLES) -> float:
-    """Scale-free bending L ∫ κ_g² ds; a circle in the plane has 4 π²."""
+    """Scale-free bending L ∫ κ_g² ds; a circle in the plane has 4π²."""
     return curve.length * squared_curvature(mesh, curve, samples)

@@ -1,10 +1,11 @@
-"""Non-manifold messes: surfaces whose vertices have been welded, and worse, and curves on them.
+"""Tests requests on random non-manifold meshes ("messes"), made by welding vertices and worse.
 
-A mess is a number: `tests.oracles.messes` draws it and says what was wrong with what came.
+A mess is identified by a number: `tests.oracles.messes` generates it and judges the answer.
 """
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 
 import numpy as np
@@ -17,21 +18,22 @@ from .evidence import Results
 from .scale import Scale
 
 PATIENCE = 60.0
-"""Seconds by the wall clock after which a mess hangs."""
+"""Wall-clock time in seconds after which a request counts as hanging."""
 
-WORKERS = 2
+WORKERS = max(1, (os.cpu_count() or 1) - 1)
+"""Number of processes; a mess is measured by one of them, so results do not depend on it."""
 
 TOLD = 500
-"""Messes after which a run says how far it is."""
+"""Number of messes between two progress messages."""
 
 LISTED = 40
 
 
-TITLE = "Non-manifold messes"
+TITLE = "Random non-manifold meshes"
 
 
 def measure(scale: Scale) -> Results:
-    """Ask for curves on many messes, and list what is wrong."""
+    """Request curves on many messes, and list the findings."""
     count = scale.choose(10_000, 500, 6)
     outcomes: Counter[str] = Counter()
     findings: list[str] = []
@@ -60,22 +62,28 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The outcomes, and what is wrong."""
+    """Counts of the outcomes, and the findings."""
     outcomes, seconds = results["outcomes"], results["seconds"]
     count = len(seconds)
     rows = [(outcome, n, f"{100 * n / count:.2f} %") for outcome, n in outcomes.items()]
     return (
-        f"Seed {results['seed']}, {count} meshes of up to {results['most_faces']} faces, closed "
-        f"and open, on which up to {results['most_welded']} pairs of vertices were welded, faces "
-        "added, doubled, turned and dropped, in chains of these; closed and open curves, "
-        f"2–{results['most_points']} points, both orders, a quarter with obstacles "
-        "(`tests/oracles/messes.py`). A good curve is one simple curve through all points by "
-        "`checker.py`; whether an error is due is decided from the arrays alone "
-        "(`feasibility.py`). Where more than three points lie on boundaries or non-manifold "
-        "places an order may be impossible; then the error has to name another one, and that one "
-        f"has to give a good curve.\n\n**{len(results['findings'])} findings.** CPU seconds a "
-        f"mess: median {np.median(seconds):.1f}, 99 % {np.percentile(seconds, 99):.1f}, slowest "
-        f"{max(seconds):.1f}.\n\n"
+        f"One curve was requested on each of {count} random non-manifold meshes, and the table "
+        "counts the outcomes. A *good curve* is one simple curve through all points according to "
+        "the independent checker. An *error where due* is an error on a request for which no curve "
+        "exists, which is decided from the arrays of the mesh alone (`feasibility.py`). If more "
+        "than three points lie on boundaries or at non-manifold vertices or edges, an order of the "
+        "points may be impossible; then the error must name another order, which must give a good "
+        "curve (*another order named*). *Work limit* counts errors because a path winds round "
+        "itself too often. All other answers are findings. The meshes are made from "
+        f"closed and open surfaces of up to {results['most_faces']} faces: up to "
+        f"{results['most_welded']} pairs of vertices are welded, and faces are added, duplicated, "
+        "reversed and removed, in chains of these operations (`tests/oracles/messes.py`, seed "
+        f"{results['seed']}). The curves are closed and open, through 2–{results['most_points']} "
+        "points in both kinds of order, a quarter of them with obstacles. The paper has no "
+        f"corresponding measurement.\n\n**{len(results['findings'])} findings.** CPU time per "
+        f"mesh: median {np.median(seconds):.1f} s, 99 % quantile "
+        f"{np.percentile(seconds, 99):.1f} s, slowest {max(seconds):.1f} s.\n\n"
         + "".join(f"- {finding}\n" for finding in results["findings"][:LISTED])
-        + report.table(("outcome", "messes", "share"), rows)
+        + "\n"
+        + report.table(("outcome", "meshes", "share"), rows)
     )

@@ -1,4 +1,4 @@
-"""The methods that are compared."""
+"""Names of the methods that the benchmarks compare."""
 
 from nicmm_core.options import option
 

@@ -1,4 +1,4 @@
-"""Discs painted on the free curve: whether the next one stays out of them, and at what price."""
+"""Measures whether a curve avoids an obstacle on its free course, and what the detour costs."""
 
 from __future__ import annotations
 
@@ -20,19 +20,21 @@ from .measures import bending
 from .samples import random_sets
 from .scale import Scale
 
-TITLE = "Obstacles"
+TITLE = "Obstacles (Fig. 14)"
 TIMED = True
 WITHOUT = ("outputs",)
 
 SEED = 3
 RADIUS = 0.04
-"""Of the discs, in diagonals."""
+"""Radius of the discs, in diagonals."""
 
 SAMPLES = 128
 
+AVOIDS = "avoids the obstacle"
+
 
 def measure(scale: Scale) -> Results:
-    """Obstacles of weight 1 on closed meshes and on people and animals."""
+    """Design curves with an obstacle of weight 1, on closed meshes, people and animals."""
     if scale is Scale.SMOKE:
         meshes = collections.creatures(2)
     else:
@@ -49,23 +51,27 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How many curves go round their disc, and at what price."""
+    """Number of curves that avoid their obstacle, and the costs."""
     outcomes = Counter(_outcome(each["round"]) for each in results["sets"])
     found = [each["round"] for each in results["sets"] if each["round"] is not None]
     bends, times = (_quartiles([each[name] for each in found]) for name in ("bending", "time"))
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order; discs of "
-        f"weight 1, {2 * results['radius']:.0%} of the diagonal across, round the point of the "
-        "free curve that is farthest from its control points. A curve has entered if it has any "
-        "length in faces whose three corners are painted; faults are those of the guarantee's "
-        "judge.\n\n"
+        "A disc was painted as an obstacle on each free curve, and the table counts whether a new "
+        "curve through the same points avoids it. The disc has weight 1 and a diameter of "
+        f"{200 * results['radius']:g} % of the bounding box diagonal, around the point of the free "
+        "curve that is farthest from its control points. A curve *enters* it if any part of the "
+        "curve lies in faces with three painted corners; it is *faulty* if the independent checker "
+        "finds that it is not one simple curve through its points in order. There are "
+        f"{len(results['sets'])} sets of 3–5 random vertices, one per mesh (shortest order, seed "
+        f"{results['seed']}).\n\n"
         + report.table(("outcome", "sets"), sorted(outcomes.items()))
-        + f"\n\nRelative to the free curve, quartiles: bending {bends}, time {times}."
+        + f"\n\n{_finding(results['sets'])} Relative to the free curve, the quartiles of bending "
+        f"are {bends}, and those of time {times}."
     )
 
 
 def _gone_round(name: str, mesh: Mesh, points: IntArray) -> Results | None:
-    """The curve with a disc on the free one's way; None where it is said to leave no way."""
+    """Curve with a disc on the free one, relative to it; None if an error says there is none."""
     free = nicmm.design_curve(mesh, points, order="shortest")
     weights = _disc(mesh, free.curves[0])
     try:
@@ -88,8 +94,25 @@ def _gone_round(name: str, mesh: Mesh, points: IntArray) -> Results | None:
 
 def _outcome(found: Results | None) -> str:
     if found is None:
-        return "said to leave no way"
-    return "entered or at fault" if found["entered"] or found["faults"] else "gone round"
+        return "error: no way round"
+    return "enters or is faulty" if found["entered"] or found["faults"] else AVOIDS
+
+
+def _finding(sets: Sequence[Results]) -> str:
+    """Whether the curves avoid their obstacles, as in Fig. 14."""
+    found = [each["round"] for each in sets if each["round"] is not None]
+    avoiding = sum(_outcome(each) == AVOIDS for each in found)
+    verdict = (
+        "agrees with the paper"
+        if avoiding == len(found)
+        else "agrees with the paper only on those"
+        if avoiding
+        else "contradicts the paper"
+    )
+    return (
+        f"{avoiding} of the {len(found)} curves avoid their obstacle, which {verdict} (Fig. 14 "
+        "shows one curve, without numbers)."
+    )
 
 
 def _disc(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What the weights of the energy's terms change (Fig. 5)."""
+"""Measures how the weights of the energy terms affect the curve (Fig. 5)."""
 
 from __future__ import annotations
 
@@ -33,30 +33,30 @@ WITHOUT = PARTS_WITHOUT
 SEED = 4
 
 FACTORS = (0.01, 0.1, 1.0, 10.0, 100.0)
-"""Of each weight, relative to what a design takes."""
+"""Factors of each weight, relative to the value that a design uses."""
 
 NAMES = {"sdf": "λ_sdf", "smooth": "λ_smooth"}
 
 MEASURED = ("mean", "greatest", "bending", "slope")
-"""Of each curve: distances to the default one, L ∮ κ_g² ds, and the median of |∇φ| beside it."""
+"""Values per curve: distances to the default one, bending, and the median of |∇φ| near it."""
 
 SIMILAR = 1.0
-"""Mean distance in percent of the diagonal up to which curves count as quite similar."""
+"""Mean distance, in percent of the diagonal, up to which curves count as quite similar."""
 
 REASONABLE = (0.1, 10.0)
-"""Factors that the paper's "reasonable range" is taken to mean."""
+"""Factors that are taken as the bounds of the paper's "reasonable range"."""
 
 STILLS = "parameters_curves.png"
 SHOWN = {0.01: renders.WHITE, 1.0: renders.BLUE, 100.0: renders.GREEN}
-"""As in Fig. 5: white, blue and green while the weight grows."""
+"""Colours as in Fig. 5: white, blue and green for increasing weight."""
 
 
 Key = tuple[str, float]
-"""A weight and its factor."""
+"""Name of a weight, and its factor."""
 
 
 def measure(scale: Scale) -> Results:
-    """Vary one weight at a time over decades."""
+    """Vary one weight at a time over several decades."""
     network = load_network()
     iterations = scale.choose(200, 40, 20)
     meshes = collections.surfaces(scale, scale.choose(6, 1))
@@ -90,39 +90,42 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What each factor changes, and whether that agrees with the paper."""
+    """Effect of each factor, and whether it agrees with the paper."""
     varied, weights = results["varied"], results["weights"]
     lowered = [of_mesh["smooth"] for of_mesh in varied]
     plot = report.figure(
-        "parameters.png", "Medians over the meshes, against the factor of each weight"
+        "parameters.png", "Medians over the meshes against the factor of each weight"
     )
     stills = report.figure(
         results["stills"],
-        "Curves with 0.01 (white), 1 (blue) and 100 times (green) each weight (Fig. 5)",
+        "Curves with 0.01 (white), 1 (blue) and 100 (green) times each weight (Fig. 5)",
     )
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order, on "
-        f"{len(varied)} meshes ({results['collection']}: "
-        f"{report.listed(of_mesh['mesh'] for of_mesh in varied)}), shipped weights, "
-        f"{results['iterations']} "
-        "iterations without early stop, since its thresholds carry the weights' unit. The factors "
-        f"are of the λ that a design takes: λ_sdf = {weights['sdf']:g}, λ_smooth = "
-        f"{weights['smooth']:g} or, where bending would outweigh the slope, less "
-        f"({min(lowered):.2g} to {max(lowered):.2g} here). A design never takes the larger "
-        "λ_smooth below, which is what that limit is for. Distances are to the curve of factor 1, "
-        "in percent of the bounding box's diagonal; medians over the meshes.\n\n"
+        "The weights λ_sdf and λ_smooth of the energy were multiplied by factors, one weight at a "
+        "time, to see how much the curve of `nicmm-paper` depends on them, as in Fig. 5 of the "
+        "paper. Each row is a factor and a weight. Distances are mean and greatest distances to "
+        "the curve with factor 1, in percent of the bounding box diagonal; all values are medians "
+        f"over {len(varied)} meshes, with one set of 3–5 random vertices per mesh (seed "
+        f"{results['seed']}, shortest order). The factors multiply the weights that a design uses: "
+        f"λ_sdf = {weights['sdf']:g}, and λ_smooth = {weights['smooth']:g} or less, where bending "
+        "would otherwise dominate the energy "
+        f"({min(lowered):.2g} to {max(lowered):.2g} on these meshes). So a design never uses the "
+        f"larger values of λ_smooth in the table. All runs have {results['iterations']} iterations "
+        "from the shipped weights, without early stop, because its thresholds depend on the "
+        f"weights. Meshes ({results['collection']}): "
+        f"{report.listed(of_mesh['mesh'] for of_mesh in varied)}.\n\n"
         f"{_table(results)}\n\n{_findings(results)}\n\n{plot}\n\n{stills}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the medians against the factors."""
+    """Plot the medians against the factors."""
     figure, axes = plots.labelled_row(
         "factor of the weight",
         {
-            "Distance to the default": "mean distance (% of the diagonal)",
-            "Bending": "L ∮ κ_g² ds",
-            "Slope": "|∇φ| near the curve",
+            "Distance to the curve with factor 1": "mean distance (% of the diagonal)",
+            "Bending of the curve": "L ∮ κ_g² ds",
+            "Slope of φ": "|∇φ| near the curve",
         },
     )
     factors = results["factors"]
@@ -139,7 +142,7 @@ def draw(results: Results, folder: Path) -> None:
 
 
 def _fields(network: CurveNetwork, sample: Sample, iterations: int) -> dict[Key, FloatArray]:
-    """φ for each weight and factor; both have factor 1 in common."""
+    """φ for each weight and factor; the run with factor 1 is the same for both weights."""
     fields: dict[Key, FloatArray] = {}
     config = without_early_stop(iterations)
     default = finetune(network, sample.problem, sample.weights, config).field
@@ -156,7 +159,7 @@ def _fields(network: CurveNetwork, sample: Sample, iterations: int) -> dict[Key,
 def _outcomes(
     sample: Sample, fields: dict[Key, FloatArray], curves: dict[Key, tuple[SurfaceCurve, bool]]
 ) -> list[Results]:
-    """What results keep of the curves, with the distance to that of the default weights."""
+    """Summary of the curves, with their distances to the curve of the default weights."""
     outcomes = []
     for (weight, factor), (curve, by_itself) in curves.items():
         reference, _ = curves[weight, 1.0]
@@ -187,10 +190,10 @@ def _pictures(sample: Sample, curves: dict[Key, SurfaceCurve]) -> list[renders.P
 
 
 def _slope(sample: Sample, field: FloatArray) -> float:
-    """Median of |∇φ|, by area, over the faces that the zero set passes at close range.
+    """Median of |∇φ| over the faces near the zero set.
 
-    The band is measured in steps along the surface and not by |φ|, which a flat φ has small
-    everywhere.
+    The band is measured in steps along the surface, because |φ| is no measure of distance where φ
+    is flat.
     """
     elements = sample.problem.elements
     slope = np.linalg.norm((elements.gradient @ field).reshape(3, -1), axis=0)
@@ -206,7 +209,7 @@ def _slope(sample: Sample, field: FloatArray) -> float:
 
 
 def _found(results: Results, weight: str, factor: float) -> list[Results]:
-    """The outcomes with one choice of weights, one for each mesh."""
+    """Outcomes for one weight and factor, one per mesh."""
     return [
         outcome
         for of_mesh in results["varied"]
@@ -216,7 +219,7 @@ def _found(results: Results, weight: str, factor: float) -> list[Results]:
 
 
 def _median(results: Results, weight: str, factor: float, name: str) -> float:
-    """Over the meshes where there is a value."""
+    """Median over the meshes that have a value."""
     values = [outcome[name] for outcome in _found(results, weight, factor)]
     return float(np.nanmedian(np.array(values, dtype=np.float64)))
 
@@ -238,50 +241,51 @@ def _table(results: Results) -> str:
                 )
             )
     header = (
-        "weight", "mean distance", "greatest distance", "L ∮ κ_g² ds", "\\|∇φ\\| near the curve",
-        "one loop by itself",
+        "weight", "mean distance, %", "greatest distance, %", "L ∮ κ_g² ds",
+        "\\|∇φ\\| near the curve", "level set one loop by itself",
     )  # fmt: skip
     return report.table(header, rows)
 
 
 def _findings(results: Results) -> str:
-    """What the table says, in words."""
+    """What the table shows, in words, and whether it agrees with the paper."""
     factors = results["factors"]
     text = (
-        "The paper says of Fig. 5, without numbers, that the curves “remain quite similar” within "
-        "a reasonable range. "
+        "The paper states for Fig. 5, without numbers, that the curves “remain quite similar” "
+        "within a reasonable range of the weights. "
     )
     for weight, name in NAMES.items():
         means = {f: _median(results, weight, f, "mean") for f in factors if f != 1.0}
         inner = max(means[factor] for factor in REASONABLE)
         outer = max(means.values())
-        verdict = "which agrees" if inner <= SIMILAR else "which contradicts the paper"
+        verdict = "agrees with" if inner <= SIMILAR else "contradicts"
         text += (
-            f"A factor of 10 on {name} either way moves the curve by at most {inner:.2f} % on "
-            f"average (median over the meshes), {verdict}; a factor of 100 by up to {outer:.2f} %. "
+            f"Multiplying or dividing {name} by 10 moves the curve by a mean distance of at most "
+            f"{inner:.2f} %, which {verdict} the paper; a factor of 100 moves it by up to "
+            f"{outer:.2f} %. "
         )
     pairs = [
         abs(_median(results, "sdf", f, "mean") - _median(results, "smooth", inverse, "mean"))
         for f, inverse in zip(factors, factors[::-1], strict=True)
     ]
     text += (
-        "\n\nOnly the ratio of both weights counts, since φ is exactly zero at the points and "
-        "AdamW does not see a common factor: a factor on λ_sdf and its inverse on λ_smooth give "
-        f"mean distances that differ by at most {max(pairs):.2f} % here."
+        "\n\nOnly the ratio of the two weights matters, because φ is exactly zero at the points "
+        "and AdamW is invariant under a common factor: a factor of λ_sdf and its inverse as factor "
+        f"of λ_smooth give mean distances that differ by at most {max(pairs):.2f} %."
     )
     low, high = (_median(results, "smooth", f, "bending") for f in (factors[0], factors[-1]))
     slope = _median(results, "smooth", factors[-1], "slope")
-    change = "less" if high < low else "no less"
+    change = "decreases" if high < low else "does not decrease"
     text += (
-        f" From {factors[0]:g} to {factors[-1]:g} times λ_smooth the curve bends {change} "
-        f"({low:.0f} to {high:.0f}), and |∇φ| beside it ends at {slope:.2f} instead of 1"
+        f" From {factors[0]:g} to {factors[-1]:g} times λ_smooth the bending of the curve {change} "
+        f"({low:.0f} to {high:.0f}), and |∇φ| near the curve ends at {slope:.2f} instead of 1"
     )
     if slope < 0.5:
         text += (
-            ": φ flattens rather than giving a fairer curve, since a smaller slope lowers (Δφ)² too"
+            ": φ flattens instead of giving a fairer curve, since a smaller slope lowers (Δφ)² too"
         )
     kept = [not outcome["by_itself"] for each in results["varied"] for outcome in each["outcomes"]]
     return text + (
-        f". In {100 * np.mean(kept):.0f} % of all runs the level set was not one loop by itself "
-        "and follows φ₀ where it would split; such parts are alike whatever the weights are."
+        f". In {100 * np.mean(kept):.0f} % of all runs the level set was not one loop by itself; "
+        "where it would split, the curve follows φ₀, whatever the weights are."
     )

@@ -1,4 +1,4 @@
-"""Seconds of ours and other systems on one surface at several sizes; a part of `peers`."""
+"""Times of this package and of other systems at several mesh sizes; a part of `peers`."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ SUBDIVISIONS = (2, 3, 4)
 """Loop subdivisions of meshes of SHREC16: 4,000, 16,000 and 64,000 vertices."""
 
 PATIENCE = 120.0
-"""Seconds that a system may take."""
+"""Time limit of a system in seconds."""
 
 FIRST, ANOTHER = "nicmm, first curve", "nicmm, another on the same Designer"
 RIVAL = "potpourri3d, signed heat"
 
 
 def measured_sizes(scale: Scale, systems: Sequence[str]) -> list[Results]:
-    """Seconds of each system on each mesh, one size after the other; None where one failed."""
+    """Times of each system on each mesh in seconds, by increasing size; None where one failed."""
     process = SystemsProcess()
     asked = [*systems, LATER] if RIVAL in systems else list(systems)
     found = []
@@ -59,7 +59,7 @@ def measured_sizes(scale: Scale, systems: Sequence[str]) -> list[Results]:
 
 
 def sizes_section(measured: Sequence[Results]) -> str:
-    """A table of medians, and how the first and another curve compare with signed heat."""
+    """Table of medians, and a comparison of a first and of a further curve with signed heat."""
     sizes: dict[int, list[Results]] = {}
     for each in measured:
         sizes.setdefault(round(each["vertices"], -3), []).append(each)
@@ -92,7 +92,7 @@ def _median(measured: Sequence[Results], name: str) -> float | None:
 
 
 def _ratio(measured: Sequence[Results], ours: str, theirs: str) -> float | None:
-    """The median of the ratios of each mesh, since a busy machine slows both."""
+    """Median of the per-mesh ratios, which are not affected by other load on the machine."""
     pairs = [(each["seconds"].get(ours), each["seconds"].get(theirs)) for each in measured]
     ratios = [one / other for one, other in pairs if one is not None and other is not None]
     return float(np.median(ratios)) if ratios else None

@@ -1,8 +1,9 @@
-"""Closed curves by other systems; runs in a process of its own, since some of them can crash it.
+"""Computes closed curves with other systems, in a separate process because some of them can crash.
 
-Each function takes the surface, the control points in the order of the visit and a path of edges
-through them, and gives polylines and the seconds that the system took, its preparation included.
-None of the packages belongs to the project; where one is missing its systems are left out.
+Each function takes a task, which contains the surface, the control points in visiting order and a
+path of edges through them. It returns polylines and the time of the system in seconds, including
+its preparation. None of these packages is a dependency of the project; systems whose package is
+not installed are left out.
 """
 
 from __future__ import annotations
@@ -26,18 +27,20 @@ from nicmm_core.level_set.problem import build_problem
 
 @dataclass(frozen=True)
 class Task:
-    """What a system is asked for.
+    """Input of a system: a surface, and control points on it.
 
     Attributes
     ----------
     vertices : (n, 3) float array
+        Vertex positions.
     faces : (m, 3) int array
+        Vertex indices of the triangles.
     path : (l,) int array
         Vertices of a closed path of edges through the control points.
     controls : (k,) int array
-        Vertices of the control points, in the order of the visit.
+        Vertices of the control points, in visiting order.
     spacing : float
-        Mean edge length of the mesh, for systems that ask for a step.
+        Mean edge length of the mesh, for systems that need a sampling step.
     """
 
     vertices: FloatArray
@@ -48,7 +51,7 @@ class Task:
 
 
 def task_on(mesh: Mesh, points: IntArray) -> Task:
-    """What other systems are asked for through some vertices in the shortest order."""
+    """Task for other systems: a closed curve through vertices, in the shortest order."""
     problem = build_problem(mesh, locate_control_points(mesh, points, True), "shortest")
     working, loop = problem.working, problem.loop
     return Task(
@@ -61,11 +64,11 @@ def task_on(mesh: Mesh, points: IntArray) -> Task:
 
 
 Answer = tuple[list[FloatArray], float]
-"""Polylines, closed ones without their first point repeated, and seconds."""
+"""Polylines, without a repeated first point where they are closed, and the time in seconds."""
 
 
 def meshlib_spline(task: Task) -> Answer:
-    """MeshLib: a spline in space through the points, then projected to the mesh."""
+    """MeshLib: a spline through the points in space, projected to the mesh."""
     mrmeshpy = importlib.import_module("meshlib.mrmeshpy")
     mrmeshnumpy = importlib.import_module("meshlib.mrmeshnumpy")
     started = time.perf_counter()
@@ -82,7 +85,7 @@ def meshlib_spline(task: Task) -> Answer:
 
 
 def flip_loop(task: Task) -> Answer:
-    """potpourri3d: the shortest loop that edge flips reach from the path."""
+    """potpourri3d: the geodesic loop that edge flips reach from the path."""
     potpourri3d = importlib.import_module("potpourri3d")
     started = time.perf_counter()
     solver = potpourri3d.EdgeFlipGeodesicSolver(task.vertices, task.faces)
@@ -91,12 +94,12 @@ def flip_loop(task: Task) -> Answer:
 
 
 def signed_heat(task: Task) -> Answer:
-    """potpourri3d: zero set of the signed distance to the path, free to leave it."""
+    """potpourri3d: zero set of the signed distance to the path; it may deviate from the path."""
     return _signed_heat(task, "None")
 
 
 def signed_heat_fixed(task: Task) -> Answer:
-    """potpourri3d: the same with the distance forced to zero on the path, its default."""
+    """potpourri3d: the same with the distance forced to zero on the path, its default setting."""
     return _signed_heat(task, "ZeroSet")
 
 
@@ -106,7 +109,7 @@ SYSTEMS: dict[str, tuple[str, Callable[[Task], Answer]]] = {
     "potpourri3d, signed heat": ("potpourri3d", signed_heat),
     "potpourri3d, signed heat, zero on the path": ("potpourri3d", signed_heat_fixed),
 }
-"""Package and function of each system."""
+"""Package and function of each system, by name."""
 
 LATER = "potpourri3d, signed heat, later"
 
@@ -118,7 +121,7 @@ def missing_packages() -> list[str]:
 
 
 class SystemsProcess:
-    """A process that asks the systems, started again after a crash or a hang."""
+    """A process that runs the systems; it is restarted after a crash or a hang."""
 
     def __init__(self) -> None:
         # Forking a process that has started threads, as PyTorch has, can hang.
@@ -126,15 +129,21 @@ class SystemsProcess:
         self._start()
 
     def ask(self, name: str, task: Task, patience: float) -> Answer | str:
-        """A system's answer, or the reason why it gives no curve.
+        """Answer of a system, or the reason why there is none.
 
         Parameters
         ----------
         name : str
             Key of `SYSTEMS`, or `LATER`.
         task : Task
+            Surface and control points.
         patience : float
-            Seconds that it may take.
+            Time limit in seconds.
+
+        Returns
+        -------
+        Answer or str
+            Polylines and time, or the reason why there are none.
         """
         try:
             self._connection.send((name, task))
@@ -149,7 +158,7 @@ class SystemsProcess:
         return reason
 
     def end(self) -> None:
-        """Stop the process, busy or not."""
+        """Terminate the process, even if it is busy."""
         self._process.terminate()
         self._process.join()
         self._connection.close()
@@ -167,7 +176,7 @@ def _serve(connection: Connection) -> None:
         try:
             system = later_signed_heat if name == LATER else SYSTEMS[name][1]
             connection.send(system(task))
-        except Exception as error:  # whatever a foreign package raises is its answer
+        except Exception as error:  # any exception of a third-party package is its answer
             connection.send(f"{type(error).__name__}: {error}")
 
 
@@ -187,7 +196,7 @@ def _signed_heat(task: Task, constraint: str) -> Answer:
 
 
 def later_signed_heat(task: Task) -> Answer:
-    """potpourri3d: a later signed distance, the factorisations being kept, without its zero set."""
+    """potpourri3d: a second signed distance with stored factorisations, without its zero set."""
     potpourri3d = importlib.import_module("potpourri3d")
     solver = potpourri3d.MeshSignedHeatSolver(task.vertices, task.faces)
     path: list[tuple[int, list[float]]] = [
@@ -202,7 +211,7 @@ def later_signed_heat(task: Task) -> Answer:
 def _positions(
     vertices: FloatArray, edges: IntArray, piece: list[tuple[int, list[float]]]
 ) -> FloatArray:
-    """Places that a contour names as vertices, or as edges with the share of the way."""
+    """Positions of contour points, which are given as vertices or as fractions of edges."""
     places = []
     for index, share in piece:
         if share:
@@ -214,7 +223,7 @@ def _positions(
 
 
 def _without_repetition(points: FloatArray) -> FloatArray:
-    """Points without those that repeat the one before, or at the end the first."""
+    """Points of a closed polyline without those that repeat their predecessor."""
     size = np.abs(points).max()
     steps = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
     return points[steps > 1e-7 * size] if len(points) > 1 else points

@@ -1,4 +1,4 @@
-"""Other systems and ours through the same points (Fig. 9)."""
+"""Compares this package with other systems: curves through the same points (Fig. 9)."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ WITHOUT = ("outputs",)
 SEED = 7
 
 PASSES = 1e-3
-"""Distance, relative to the diagonal, at which a curve still counts as through a point."""
+"""Distance, relative to the diagonal, up to which a curve counts as passing a point."""
 
 ON_SURFACE = 1e-4
-"""Distance of a polyline, relative to the diagonal, at which it still counts as on the surface."""
+"""Distance, relative to the diagonal, up to which a polyline counts as lying on the surface."""
 
 PATIENCE = 120.0
-"""Seconds that a system may take."""
+"""Time limit of a system in seconds."""
 
 PEER_COLOURS = dict(
     zip(SYSTEMS, (renders.YELLOW, renders.BLACK, renders.OBSTACLE, renders.WHITE), strict=True)
 )
 
 CURVES = "peers.png"
-"""The picture of the first meshes."""
+"""File name of the picture of the first meshes."""
 
 ONE_CURVE = "one curve"
-"""What a system is asked for; other outcomes are in words too."""
+"""Outcome that every system is asked for; the other outcomes are words as well."""
 
 
 def measure(scale: Scale) -> Results:
-    """Ask every system for a curve through the same points in the same order."""
+    """Compute a curve through the same points in the same order with every system."""
     missing = missing_packages()
     systems = [name for name, (package, _) in SYSTEMS.items() if package not in missing]
     sets: list[Results] = []
@@ -88,26 +88,40 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What every system gave."""
+    """Quality and time of the curves of every system."""
     names = [each["mesh"] for each in results["sets"]]
     missing = ""
     if results["missing"]:
-        missing = f" Not installed, so left out: {report.listed(results['missing'])}."
+        missing = f" Left out, because not installed: {report.listed(results['missing'])}."
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh on {len(names)} meshes "
-        f"({results['collection']}: {report.listed(names)}), visited by all in the same order. "
-        "Systems that start from a path of edges get ours, on our split mesh. Seconds include "
-        f"every system's preparation of the mesh.{missing}\n\n"
-        f"{_table(results)}\n\n{_findings(results)}\n\n{sizes_section(results['sizes'])}\n\n"
+        "The table compares closed curves of this package with those of other systems through the "
+        "same control points in the same order. Each row is a method or system. Its columns are "
+        "the number of sets on which it gives exactly one curve, and what it gives otherwise; the "
+        f"number on which it passes all points (within {100 * PASSES:g} % of the diagonal), and "
+        "its greatest distance from a point; the number on which the curve lies on the surface "
+        f"(within {100 * ON_SURFACE:g} %), and its greatest distance from the surface; its "
+        "bending; and its time, which includes the preparation of the mesh. Distances, bending and "
+        "times "
+        "are medians over the sets; distance to the surface and bending are those of single "
+        f"curves. There are {len(names)} sets of 3–5 random vertices, one per mesh (seed "
+        f"{results['seed']}). Systems that start from a path of edges get the initial path of this "
+        "package, on a mesh with the same virtual splits. Meshes "
+        f"({results['collection']}): {report.listed(names)}.{missing}\n\n"
+        f"{_table(results)}\n\n{_findings(results)}\n\n"
+        "The second table shows how the times grow with the mesh; each row is a number of "
+        "vertices. *Another* is a further curve on the same Designer, and *later* is a further "
+        "signed distance with stored factorisations.\n\n"
+        f"{sizes_section(results['sizes'])}\n\n"
         f"{_shown_picture(results['picture'])}"
     )
 
 
 def _ours(mesh: Mesh, points: IntArray, method: str, curves: dict[str, SurfaceCurve]) -> Results:
-    """What one of our methods drew; its curve is added where it is a single one.
+    """Answer of one of our methods; if it is a single curve, it is added to ``curves``.
 
-    "miss" is the greatest distance of a control point to all that was drawn, "off" that of a single
-    curve to the surface, both relative to the diagonal; "bending" is L ∮ κ_g² ds of that.
+    "miss" is the greatest distance from a control point to the curves, and "off" the greatest
+    distance from a single curve to the surface, both relative to the diagonal. "bending" is
+    L ∮ κ_g² ds of a single curve.
     """
     design = nicmm.design_curve(mesh, points, order="shortest", method=method)
     one = len(design.curves) == 1
@@ -128,7 +142,7 @@ def _ours(mesh: Mesh, points: IntArray, method: str, curves: dict[str, SurfaceCu
 def _theirs(
     mesh: Mesh, task: Task, system: str, reply: Answer, curves: dict[str, SurfaceCurve]
 ) -> Results:
-    """The same of another system."""
+    """Answer of another system, in the form of `_ours`."""
     polylines = [line for line in reply[0] if len(line)]
     answer: Results = {"outcome": "nothing", "seconds": round(reply[1], 6)}
     if not polylines:
@@ -155,7 +169,7 @@ def _greatest_miss(polylines: Sequence[FloatArray], places: FloatArray) -> float
 
 
 def _values(results: Results, system: str, name: str) -> list[float]:
-    """What is known of one system, over the sets."""
+    """Known values of one measure for one system, over the sets."""
     answers = [each["answers"][system] for each in results["sets"]]
     return [answer[name] for answer in answers if name in answer]
 
@@ -183,14 +197,10 @@ def _table(results: Results) -> str:
             )
         )
     header = (
-        "system", "one curve", "otherwise", "through all points", "misses by, %",
-        "on the surface", "leaves it by, %", "L ∮ κ_g² ds", "seconds",
+        "system", "one curve", "otherwise", "through all points", "distance to a point, %",
+        "on the surface", "distance to the surface, %", "L ∮ κ_g² ds", "seconds",
     )  # fmt: skip
-    return report.table(header, rows) + (
-        f"\n\nMedians over the sets; lengths relative to the diagonal. Through a point means "
-        f"within {100 * PASSES:g} %, on the surface within {100 * ON_SURFACE:g} %. Bending and "
-        "distance to the surface are those of single curves."
-    )
+    return report.table(header, rows)
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -198,30 +208,29 @@ def _percent(values: Sequence[float]) -> str:
 
 
 def _findings(results: Results) -> str:
-    """Who bends less and who is faster, as measured."""
+    """Comparison of passing the points, bending and time, in words."""
     ours = results["methods"][0]
     text = (
-        "B/surf, which the paper compares with, is an interactive program whose segments are "
-        "joined by hand, and is not measured here. "
+        "The paper compares with B/surf in Fig. 9, by eye. B/surf is an interactive program whose "
+        "segments are joined by hand and was not measured here, so Fig. 9 is neither confirmed nor "
+        "contradicted. "
     )
     if not _values(results, ours, "bending"):
-        return text + f"`{ours}` gave no single curve to compare with."
+        return text + f"`{ours}` gave no single curve to compare the others with."
     for system in results["systems"]:
         complete = sum(value <= PASSES for value in _values(results, system, "miss"))
-        text += f"{system} passes all points in {complete} of {len(results['sets'])} sets"
+        text += f"“{system}” passes all points on {complete} of {len(results['sets'])} sets"
         ratios = _bending_ratios(results, system, ours)
         if ratios:
-            text += f", bends {np.median(ratios):.2f} times as much as `{ours}`"
-            if np.median(ratios) < 1.0:
-                text += " (less than ours)"
+            text += f", bends {np.median(ratios):.2f} times as much as `{ours}` by the median"
         seconds = _values(results, system, "seconds")
         faster = np.median(_values(results, ours, "seconds")) / np.median(seconds) if seconds else 0
-        text += f" and takes 1/{faster:.0f} of its time. " if faster > 1.0 else ". "
+        text += f", and takes 1/{faster:.0f} of its time. " if faster > 1.0 else ". "
     return text.strip()
 
 
 def _bending_ratios(results: Results, system: str, ours: str) -> list[float]:
-    """How much more a system's curve bends, on the sets where both have one."""
+    """Bending of a system's curve relative to ours, on the sets where both have a single curve."""
     pairs = [(each["answers"][system], each["answers"][ours]) for each in results["sets"]]
     return [
         theirs["bending"] / own["bending"]
@@ -232,13 +241,13 @@ def _bending_ratios(results: Results, system: str, ours: str) -> list[float]:
 
 def _picture(name: str, mesh: Mesh, curves: Mapping[str, SurfaceCurve]) -> renders.Picture:
     colours = {**PEER_COLOURS, **renders.METHOD_COLOURS}
-    # Ours is first, since its control points are those that are shown.
+    # Our curve is first, because a picture shows the control points of its first curve.
     shown = [(curves[label], colours[label]) for label in curves]
     return renders.Picture(name, mesh, shown)
 
 
 def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
-    """The picture's name; None where there is no curve."""
+    """Render the picture and return its file name; None if there is no curve."""
     shown = [picture for picture in pictures if picture.curves]
     if not shown:
         return None
@@ -248,7 +257,7 @@ def _rendered(pictures: Sequence[renders.Picture], scale: Scale) -> str | None:
 
 def _shown_picture(name: str | None) -> str:
     if name is None:
-        return "No system gave a single curve, so there is no picture."
+        return "There is no picture, because no system gave a single curve."
     return report.figure(
         name,
         "nicmm (blue), nicmm-paper (orange), variational (green), MeshLib's projected spline "

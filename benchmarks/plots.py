@@ -1,4 +1,4 @@
-"""Plots: one look for all figures, written as PNG."""
+"""Plots in a common style, written as PNG files."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ METHOD_COLOURS = {
     "initial path": "0.55",
     "elastic curve": "black",
 }
-"""Of methods, in every plot the same."""
+"""Colour of each method, the same in all plots."""
 
 LEAST_LOSSES = "Least loss so far against the iteration, mean of the sets"
-"""Caption of `least_losses`."""
+"""Caption of the plots that `least_losses` draws."""
 
 
 def labelled(
     title: str, x: str, y: str, width: float = 7.0, height: float = 4.2
 ) -> tuple[Figure, Axes]:
-    """A new figure and its axes, with title and labels."""
+    """Create a figure with one pair of axes, titled and labelled."""
     figure, axes = pyplot.subplots(figsize=(width, height))
     axes.set_title(title)
     axes.set_xlabel(x)
@@ -43,7 +43,7 @@ def labelled(
 def labelled_pair(
     titles: tuple[str, str], x: str, y: tuple[str, str]
 ) -> tuple[Figure, tuple[Axes, Axes]]:
-    """A new figure with two axes side by side that share the meaning of x."""
+    """Create a figure with two plots side by side that have the same quantity as x."""
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 4.2))
     for axes, title, label in zip((left, right), titles, y, strict=True):
         axes.set_title(title)
@@ -54,7 +54,10 @@ def labelled_pair(
 
 
 def labelled_row(x: str, labels: Mapping[str, str]) -> tuple[Figure, list[Axes]]:
-    """A new figure with a row of axes that share the meaning of x; y labels by title."""
+    """Create a figure with a row of plots that have the same quantity as x.
+
+    ``labels`` maps the title of each plot to its y label.
+    """
     figure, row = pyplot.subplots(1, len(labels), figsize=(4.0 * len(labels), 3.8))
     for axes, (title, y) in zip(row, labels.items(), strict=True):
         axes.set_title(title)
@@ -65,19 +68,19 @@ def labelled_row(x: str, labels: Mapping[str, str]) -> tuple[Figure, list[Axes]]
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Write the ticks of a logarithmic axis as plain numbers."""
+    """Label the ticks of a logarithmic axis with plain numbers."""
     for set_formatter in (axis.set_major_formatter, axis.set_minor_formatter):
         set_formatter(FuncFormatter(lambda value, _: _plain(value)))
 
 
 def _plain(value: float) -> str:
-    """1, 2 and 5 of each decade; labels of the ticks between them would overlap."""
+    """Label of a tick at 1, 2 or 5 in a decade; other labels would overlap and are left empty."""
     text = f"{value:g}"
     return text if text.strip("0.") in {"1", "2", "5"} else ""
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure and close it."""
+    """Write a figure to a file and close it."""
     figure.tight_layout()
     figure.savefig(path, dpi=130)
     pyplot.close(figure)
@@ -85,12 +88,12 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def least_losses(runs: Mapping[str, Sequence[float]], title: str, path: Path) -> Path:
-    """The mean of the least loss so far, against the iteration, on a log axis, for each network."""
+    """Plot, for each network, the mean of the lowest loss so far against the iteration."""
     figure, axes = labelled(title, "iteration", "least loss so far, mean of the sets")
     for label, losses in runs.items():
         axes.plot(losses, label=label, linewidth=1.6)
     axes.set_yscale("log")
-    # The losses often stay within one decade, where a logarithmic locator finds hardly any tick.
+    # The losses often stay within one decade, where a logarithmic locator finds hardly any ticks.
     axes.yaxis.set_major_locator(MaxNLocator(7))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.minorticks_off()

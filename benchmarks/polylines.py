@@ -1,4 +1,4 @@
-"""Polylines near a surface, brought to the form of our own curves so that they can be measured."""
+"""Converts polylines near a surface to `SurfaceCurve`, so that they can be measured."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.level_set.problem import Problem
 
 PARTS_OF_A_SEGMENT = 16
-"""Places on each segment that its distance to the surface is taken at."""
+"""Points on each segment at which distances are measured."""
 
 
 class NearestPoints:
-    """Nearest points of one mesh, with the search tree kept.
+    """Nearest-point queries on one mesh, with a search tree that is built once.
 
     Parameters
     ----------
     mesh : Mesh
+        Triangle mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -33,7 +34,7 @@ class NearestPoints:
         self._vertex_normals = vertex_normals(mesh.vertices, mesh.faces)
 
     def project(self, positions: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Distance, face and barycentric coordinates of the nearest point to each position."""
+        """Distance, face and barycentric coordinates of each position's nearest surface point."""
         squared, faces, nearest = self._tree.squared_distance(
             self._vertices, self._faces, np.ascontiguousarray(positions)
         )
@@ -45,7 +46,7 @@ class NearestPoints:
         return np.sqrt(np.atleast_1d(squared)), faces, barycentric
 
     def normals(self, faces: IntArray, barycentric: FloatArray) -> FloatArray:
-        """Unit normals, interpolated between those of the vertices."""
+        """Unit normals, interpolated from the vertex normals."""
         corners = self._vertex_normals[self._faces[faces]]
         normals = (barycentric[:, :, None] * corners).sum(axis=1)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -53,15 +54,15 @@ class NearestPoints:
     def curve(
         self, positions: FloatArray, control_index: IntArray, closed: bool = True
     ) -> SurfaceCurve:
-        """A curve whose points are the nearest ones of the mesh.
+        """Curve through the surface points nearest to the given positions.
 
-        Its points lie on the surface, while the segments between them may leave it.
+        The points lie on the surface; the segments between them may leave it.
         """
         _, faces, barycentric = self.project(positions)
         return curve_on_mesh(self.mesh, closed, faces, barycentric, control_index)
 
     def greatest_distance(self, positions: FloatArray) -> float:
-        """Greatest distance of the segments of a closed polyline to the mesh."""
+        """Greatest distance from the segments of a closed polyline to the mesh."""
         along = np.linspace(0.0, 1.0, PARTS_OF_A_SEGMENT, endpoint=False)[:, None, None]
         following = np.roll(positions, -1, axis=0)
         places = (1.0 - along) * positions + along * following
@@ -69,7 +70,7 @@ class NearestPoints:
 
 
 def initial_path(mesh: Mesh, problem: Problem) -> SurfaceCurve:
-    """The path of edges that a design starts from."""
+    """Initial path along edges that a design starts from."""
     loop, working = problem.loop, problem.working
     control_index = np.searchsorted(
         loop.vertices, loop.control_vertices, sorter=np.argsort(loop.vertices)
@@ -79,7 +80,7 @@ def initial_path(mesh: Mesh, problem: Problem) -> SurfaceCurve:
 
 
 def misses(positions: FloatArray, control_positions: FloatArray) -> float:
-    """Greatest distance of a control point to the nearest point of a closed polyline."""
+    """Greatest distance from a control point to a closed polyline."""
     along = np.linspace(0.0, 1.0, PARTS_OF_A_SEGMENT, endpoint=False)[:, None, None]
     places = (1.0 - along) * positions + along * np.roll(positions, -1, axis=0)
     return float(cKDTree(places.reshape(-1, 3)).query(control_positions)[0].max())

@@ -1,9 +1,9 @@
-"""What the network is worth as the start of a relaxation: ``method="nicmm"`` from other starts.
+"""Measures the value of the network as the start of the relaxation in ``method="nicmm"``.
 
-The curve that is relaxed decides what there is to do and in which local optimum it ends. Designs
-are made as always, but with another φ in the network's place. A random change of φ₀ is among the
-starts, because another start is now and then a better one by chance; what pretraining is worth is
-what it does beyond that.
+The start determines how much work the relaxation has and to which local optimum it converges. Each
+design is computed without the search for courses and with another φ in place of the output of the
+network. Any other start is sometimes better by chance, so a random change of φ₀ is among the
+starts: the value of pretraining is what it achieves beyond that.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from .samples import random_sets
 from .scale import Scale
 from .solving import random_field, significant, untrained
 
-TITLE = "Starts of the relaxation"
+TITLE = "The network as the start of the relaxation"
 TIMED = True
 WITHOUT = ("outputs", "splines")
 
@@ -48,10 +48,13 @@ SEED = 21
 DISTURBANCE_SEED = 22
 
 FIRST_UNSEEN_BODY = 1000
-"""Seed of the first generated body; pretraining has those from 0."""
+"""Seed of the first generated body; pretraining uses the bodies with seeds from 0."""
 
 DISTURBANCE = 0.1
-"""Mean slope of what is added to φ₀, whose own is 1: it moves the curve by about an edge length."""
+"""Mean slope of the function that is added to φ₀; it moves the curve by about an edge length.
+
+The mean slope of φ₀ itself is 1.
+"""
 
 NO_NETWORK, UNTRAINED = "φ₀, without a network", "network before training"
 SHIPPED, DISTURBED = "shipped weights", "φ₀ with random waves"
@@ -63,25 +66,25 @@ KINDS = {
 }
 
 CLEARLY = 0.02
-"""Relative difference of bending from which a curve counts as fairer than another."""
+"""Relative difference of bending above which one curve counts as fairer than another."""
 
 FAR = 1.2
-"""Bending relative to the fairest curve known from which a curve counts as far from it."""
+"""Bending relative to the best known curve above which a curve counts as far from it."""
 
 SHARES = (0.5, 0.75, 0.9)
-"""Of the sets, that the table gives the values of."""
+"""Quantiles over the sets that the table shows."""
 
 
 Field = Callable[[Problem], FloatArray]
-"""What stands in the network's place."""
+"""Function that gives φ in place of the network."""
 
 
 Rests = dict[str, list[Results]]
-"""By start, what came of it, one entry a set."""
+"""Outcomes by start, one entry per set."""
 
 
 def measure(scale: Scale) -> Results:
-    """Relax from every start on meshes that the weights were not trained on."""
+    """Relax from every start, on meshes outside the training set of the weights."""
     meshes = [*_meshes(scale)]
     return {
         "seed": SEED,
@@ -94,34 +97,43 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """What each start costs and where it ends."""
+    """Cost of each start, and bending of the relaxed curves."""
     by_kind = {
         kind: _rests([each for each in results["sets"] if each["curve"] == kind])
         for kind in dict.fromkeys(each["curve"] for each in results["sets"])
     }
     pooled = _rests(results["sets"])
     figure = report.figure(
-        "pretrained_start.png", "Share of the sets at or below each ratio to the best known"
+        "pretrained_start.png",
+        "Share of the sets whose final bending is at most the given multiple of the best known",
     )
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, asked for as three "
-        f"curves, on {results['meshes']} meshes that the shipped weights have not seen: "
-        f"{results['collection']}. Designs by "
-        "`nicmm`, with another φ in the network's place, by a Designer that knows the mesh. "
-        f"“{DISTURBED}” adds a random smooth function of mean slope {results['disturbance']:g} to "
-        f"φ₀ (seed {results['disturbance_seed']}). Time is the CPU time of the whole design.\n\n"
-        f"{_table(by_kind)}\n\nBending is L ∫ κ_g² ds; what is "
-        f"below {NEARLY_STRAIGHT} counts as that. The best known is the least of these "
-        f"{len(pooled)} ends. “To φ₀” is the geometric mean of the ratio of the ends, with its "
-        f"standard error; fairer and less fair by more than {100 * CLEARLY:.0f} %.\n\n"
+        "Designs by `nicmm` were started from different level-set functions in place of the "
+        "output of the network, to see whether the network leads to fairer curves after "
+        "relaxation; the search for courses was switched off. The table has one row per kind of "
+        f"curve and start, for one set of 3–5 random vertices on each of {results['meshes']} "
+        "meshes outside the training set of the shipped weights "
+        f"({results['collection']}; seed {results['seed']}). “{DISTURBED}” adds a random smooth "
+        f"function of mean slope {results['disturbance']:g} to φ₀ (seed "
+        f"{results['disturbance_seed']}). Bending is L ∫ κ_g² ds, and time is the CPU time of a "
+        "design on a Designer that has computed everything that depends only on the mesh. The "
+        "paper has no corresponding experiment.\n\n"
+        f"{_table(by_kind)}\n\n*Topology repaired*: share of the sets on which the topology of φ₀ "
+        "had to be restored somewhere. *Failed*: designs without a relaxed curve. *At the cap*: "
+        "designs that reached the iteration limit. *Relative to the best known*: quantiles of the "
+        f"final bending, divided by the least of the {len(pooled)} starts, and the share of the "
+        f"sets above {FAR:g}. *Relative to φ₀*: geometric mean of the final bending divided by "
+        "that from φ₀, and its standard error. *Fairer* and *less fair* mean by more than "
+        f"{100 * CLEARLY:.0f} %. In all ratios a bending below {NEARLY_STRAIGHT} counts as "
+        f"{NEARLY_STRAIGHT}.\n\n"
         f"{_findings(pooled)}\n\n{figure}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw how far from the best known the curves of each start end."""
+    """Plot the distribution of the final bending relative to the best known, by start."""
     figure, axes = plots.labelled(
-        "Converged curves from several starts",
+        "Relaxed curves from several starts",
         "L ∫ κ_g² ds relative to the best known",
         "share of the sets",
     )
@@ -160,18 +172,18 @@ STARTS: dict[str, Callable[[], Field]] = {
     SHIPPED: lambda: _network(shipped_weights(BASE_CHANNELS)),
     DISTURBED: lambda: _disturbed,
 }
-"""What makes a start, for a run."""
+"""Functions that create the start fields, by label; they load networks only when run."""
 
 
 def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> list[Results]:
-    """What came of every set and kind of curve; what cannot be asked for is named and left out."""
+    """Outcomes of every set and kind of curve; impossible requests are reported and left out."""
     fields = {label: make() for label, make in STARTS.items()}
     found: list[Results] = []
     for name, mesh, points in sets:
         designer = nicmm.Designer(mesh)
         for kind, (order, closed) in KINDS.items():
             try:
-                # What depends on the mesh alone is found here and not measured.
+                # This computes what depends only on the mesh, so that it is not measured.
                 designer.design(points, closed=closed, order=order)
             except nicmm.UnreachableError as error:
                 print(f"  {name}, {kind}: {error}", flush=True)
@@ -191,16 +203,16 @@ def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> list[Results]:
 def _rest(
     designer: nicmm.Designer, points: IntArray, closed: bool, order: str, field: Field
 ) -> Results:
-    """What came of one start.
+    """Outcome of one start.
 
-    It is repaired if the topology of φ₀ had to be restored somewhere. Start and end are the bending
-    L ∫ κ_g² ds before and after relaxation, and seconds the CPU time of the design.
+    "repaired" says whether the topology of φ₀ had to be restored somewhere, "start" and "end" are
+    the bending L ∫ κ_g² ds before and after relaxation, and "seconds" is the CPU time.
     """
     with _instead_of_the_network(field) as level_sets:
         began = time.process_time()
         design = designer.design(points, closed=closed, order=order)
         seconds = time.process_time() - began
-    # The last of them is the one that gave a curve.
+    # The last level set is the one that gave a curve.
     mesh, zeros = level_sets[-1]
     return {
         "repaired": bool(zeros.breaking_vertices > 0),
@@ -214,7 +226,7 @@ def _rest(
 
 @contextmanager
 def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]]:
-    """Let designs start from a field; collects the level sets that they make of it."""
+    """Make designs start from a given field, without a course search; collect their level sets."""
     level_sets: list[tuple[Mesh, ZeroSet]] = []
 
     def solution(weights: NetworkWeights, problem: Problem) -> Solution:
@@ -242,7 +254,11 @@ def _failed(rest: Results) -> bool:
 
 
 def _ends(rests: Rests) -> dict[str, FloatArray]:
-    """Bending of the ends, by start; ratios between nearly straight curves say nothing."""
+    """Bending of the relaxed curves, by start.
+
+    Values are raised to `NEARLY_STRAIGHT`, since ratios between nearly straight curves are
+    meaningless.
+    """
     return {
         label: np.maximum([one["end"] for one in of_start], NEARLY_STRAIGHT)
         for label, of_start in rests.items()
@@ -250,14 +266,14 @@ def _ends(rests: Rests) -> dict[str, FloatArray]:
 
 
 def _to_best(rests: Rests) -> dict[str, FloatArray]:
-    """Bending relative to the best known of each set, by start."""
+    """Bending relative to the least bending known for each set, by start."""
     ends = _ends(rests)
     best = np.min(list(ends.values()), axis=0)
     return {label: values / best for label, values in ends.items()}
 
 
 def _gain(rests: Rests, label: str) -> tuple[float, float]:
-    """Mean of the logarithm of the ratio to the ends from φ₀, and its standard error."""
+    """Mean log ratio of the final bending to that from φ₀, and its standard error."""
     ends = _ends(rests)
     logarithm = np.log(ends[label] / ends[NO_NETWORK])
     return float(logarithm.mean()), float(logarithm.std() / np.sqrt(len(logarithm)))
@@ -265,10 +281,10 @@ def _gain(rests: Rests, label: str) -> tuple[float, float]:
 
 def _table(by_kind: Mapping[str, Rests]) -> str:
     header = (
-        "curves", "start", "sets", "topology repaired", "failed", "bending of the start",
-        "iterations, median · mean", "at the cap", "design (ms), mean", "bending of the end",
+        "curves", "start", "sets", "topology repaired", "failed", "bending of the start, median",
+        "iterations, median · mean", "at the cap", "design (ms), mean", "final bending, median",
         f"relative to the best known, {' · '.join(f'{100 * share:.0f} %' for share in SHARES)}",
-        f"above {FAR:g}", "to φ₀", "fairer · less fair",
+        f"above {FAR:g}", "relative to φ₀", "fairer · less fair than from φ₀",
     )  # fmt: skip
     rows = []
     for kind, of_kind in by_kind.items():
@@ -305,30 +321,32 @@ def _percent(flags: Sequence[bool] | BoolArray) -> str:
 
 
 def _findings(pooled: Rests) -> str:
-    """What the table says of all kinds together, in words."""
+    """What the table shows for all kinds of curves together, in words."""
     means = {
         label: np.mean([one["iterations"] for one in rests]) for label, rests in pooled.items()
     }
     seconds = {label: np.mean([one["seconds"] for one in rests]) for label, rests in pooled.items()}
     starts = {label: np.median([one["start"] for one in rests]) for label, rests in pooled.items()}
     text = (
-        f"Over all {len(pooled[NO_NETWORK])} sets, the shipped weights start with "
-        f"{starts[SHIPPED] / starts[NO_NETWORK]:.2f} times the bending of φ₀ (medians), take "
-        f"{means[SHIPPED] / means[NO_NETWORK]:.2f} times its iterations and "
+        f"Over all {len(pooled[NO_NETWORK])} curves, the start from the shipped weights has "
+        f"{starts[SHIPPED] / starts[NO_NETWORK]:.2f} times the bending of the start from φ₀ "
+        f"(medians), {means[SHIPPED] / means[NO_NETWORK]:.2f} times its iterations and "
         f"{seconds[SHIPPED] / seconds[NO_NETWORK]:.2f} times its time (means). "
     )
     for label in (SHIPPED, DISTURBED):
         mean, error = _gain(pooled, label)
-        subject = "They end" if label == SHIPPED else f"From “{label}” it ends"
-        text += f"{subject} with {np.exp(mean):.3f} times the bending ({error:.3f} standard error)"
+        text += (
+            f"From “{label}” the final bending is {np.exp(mean):.3f} times that from φ₀ (standard "
+            f"error {error:.3f})"
+        )
         if abs(mean) <= 2.0 * error:
-            text += ", which is no difference"
+            text += ", which is not a significant difference"
         text += ". "
     shipped, error = _gain(pooled, SHIPPED)
     chance, other_error = _gain(pooled, DISTURBED)
     if shipped + 2.0 * np.hypot(error, other_error) < chance:
-        return text + "So pretraining finds fairer courses than chance does."
+        return text + "So pretraining leads to fairer courses than a random change of φ₀ does."
     return text + (
-        "So pretraining does not choose a fairer course than chance does: it is another start, and "
-        "any other start finds another local optimum on some sets."
+        "So pretraining does not lead to fairer courses than a random change of φ₀ does: any "
+        "other start leads to another local optimum on some sets."
     )

@@ -1,4 +1,4 @@
-"""What pretraining is worth on the mesh that it was done on (Table 1)."""
+"""Measures the effect of pretraining on the mesh that was used for it (Table 1)."""
 
 from __future__ import annotations
 
@@ -20,19 +20,22 @@ SEED = 7
 TEST_SEED = 8
 ITERATIONS = 50
 ALSO_AFTER = 30
-"""The paper's text has 30 beside Table 1, and 50 for the tables after it; both are shown."""
+"""Earlier iteration that is shown as well.
+
+The text of the paper says 30 iterations for Table 1 and 50 for the following tables.
+"""
 
 UNTRAINED, SHIPPED = "no pretraining", "shipped weights"
 
 PAPER = {"no pretraining": 57.6, "2 min": 19.9, "10 min": 14.4, "30 min": 13.0, "10 h": 12.5}
-"""Average loss by duration, Table 1."""
+"""Average loss by duration of pretraining, Table 1."""
 
 PAPER_TRAINING = 1000 * 10
-"""Sets that the paper's shortest pretraining sees: 1,000 sets, about 10 epochs."""
+"""Sets in the paper's shortest pretraining, counting repetitions: 1000 sets, about 10 epochs."""
 
 
 def measure(scale: Scale) -> Results:
-    """Pretrain for several durations and fine-tune for sets of the same mesh."""
+    """Pretrain for several durations and fine-tune on other sets of the same mesh."""
     name, mesh = next(iter(collections.surfaces(scale, 1)))
     sets = scale.choose(250, 10, 4)
     trained = {_label(sets, epochs): train(mesh, sets, epochs, SEED) for epochs in _epochs(scale)}
@@ -65,20 +68,26 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """The loss after each duration, and whether it falls as in the paper."""
     return (
-        f"Mesh {results['mesh']} ({results['collection']}), {results['vertices']} vertices; "
-        f"pretraining on {results['sets']} sets (seed {results['seed']}), test on "
-        f"{len(results['runs'][UNTRAINED]['seconds'])} others (seed {results['test_seed']}), 3–5 "
-        "random vertices each, shortest order. Losses are the least so far, averaged over the test "
-        f"sets.\n\n{_table(results)}\n\n{_findings(results)}\n\n"
+        "Networks were pretrained for different durations on random sets of control points of one "
+        "mesh and then fine-tuned on other sets of the same mesh, as in Table 1 of the paper. Each "
+        "row is a network. Its losses are the lowest loss so far, averaged over the test sets, "
+        "before fine-tuning and after the given numbers of iterations; the last column divides the "
+        "last loss by that without pretraining. Only this ratio can be compared with the paper, "
+        "whose losses have other units. The mesh is "
+        f"{results['mesh']} ({results['collection']}; {results['vertices']} vertices), with "
+        f"{results['sets']} sets for pretraining (seed {results['seed']}) and "
+        f"{len(results['runs'][UNTRAINED]['seconds'])} for the test (seed "
+        f"{results['test_seed']}), each of 3–5 random vertices in the shortest order.\n\n"
+        f"{_table(results)}\n\n{_findings(results)}\n\n"
         f"{report.figure('pretraining.png', plots.LEAST_LOSSES)}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the losses by iteration."""
+    """Plot the losses against the iteration."""
     plots.least_losses(
         {label: run["mean_losses"] for label, run in results["runs"].items()},
-        "Prediction after different pretraining (Table 1)",
+        "Loss after different amounts of pretraining (Table 1)",
         folder / "pretraining.png",
     )
 
@@ -102,16 +111,17 @@ def _table(results: Results) -> str:
         rows.append((label, duration, *values, f"{means[-1] / reference:.2f}"))
     for label, loss in PAPER.items():
         share = f"{loss / PAPER[UNTRAINED]:.2f}"
-        rows.append((f"paper, {label}", "–", "", "", f"{loss:.1f}", share))
+        duration = "–" if label == UNTRAINED else label
+        rows.append((f"paper, {label}", duration, "", "", f"{loss:.1f}", share))
     header = (
-        "network", "training", "loss at the start", f"after {ALSO_AFTER} iterations",
+        "network", "time of pretraining", "initial loss", f"after {ALSO_AFTER} iterations",
         f"after {iterations} iterations", "relative to no pretraining",
     )  # fmt: skip
     return report.table(header, rows)
 
 
 def _findings(results: Results) -> str:
-    """What the table says, in words."""
+    """What the table shows, in words, and whether it agrees with the paper."""
     runs, trained, sets = results["runs"], results["trained"], results["sets"]
     last = {label: run["mean_losses"][results["iterations"]] for label, run in runs.items()}
     share = {label: loss / last[UNTRAINED] for label, loss in last.items()}
@@ -120,31 +130,30 @@ def _findings(results: Results) -> str:
     most = max(one["epochs"] for one in trained.values()) * sets
     preparing = float(np.mean([one["preparing_seconds"] for one in trained.values()]))
     text = (
-        "Absolute losses cannot be compared with the paper's, whose λ carry another unit; the "
-        f"last column can. The paper's 2 minutes lower the loss to "
-        f"{PAPER['2 min'] / PAPER[UNTRAINED]:.2f} of that without pretraining; here "
-        f"{durations[-1]} lower it to {values[-1]:.2f}. "
+        "In the paper, 2 minutes of pretraining reduce the loss to "
+        f"{PAPER['2 min'] / PAPER[UNTRAINED]:.2f} of that without pretraining. Here the ratio "
+        f"after the longest pretraining ({durations[-1]}) is {values[-1]:.2f}, "
     )
     text += _verdict_on_gain(values[-1]) + " "
     if all(later <= earlier for earlier, later in zip(values, values[1:], strict=False)):
-        text += "Longer pretraining always gives a lower loss, as in the paper. "
+        text += "Longer pretraining always gives a lower loss, which agrees with the paper. "
     else:
         text += "Longer pretraining does not always give a lower loss, unlike in the paper. "
     text += (
-        "The untrained network here returns φ₀ itself, which is why it starts low.\n\n"
-        f"Preparing {sets} sets takes {preparing:.0f} s, which is not counted above. Pretraining "
-        "and designs take the same λ_smooth of a set. The shipped weights, from other meshes, lead "
-        f"to {share[SHIPPED]:.2f}.\n\nOut of reach: 10 hours on an RTX 4090. The paper's shortest "
-        f"pretraining sees {PAPER_TRAINING:,} sets, repeated ones counted; the longest one here "
-        f"{most:,}, on "
-        "one core."
+        "An untrained network returns φ₀ itself here, so its initial loss is low.\n\n"
+        f"The times do not include the preparation of the {sets} sets, which takes "
+        f"{preparing:.0f} s. Pretraining uses the same λ_smooth for a set as a design does. The "
+        "shipped weights, which were pretrained on other meshes, give a ratio of "
+        f"{share[SHIPPED]:.2f}. The paper pretrains for up to 10 hours on an RTX 4090, which was "
+        f"not repeated: its shortest pretraining visits {PAPER_TRAINING:,} sets, counting "
+        f"repetitions, and the longest one here {most:,}, on one core."
     )
     return text
 
 
 def _verdict_on_gain(share: float) -> str:
     if share >= 1.0:
-        return "This contradicts the paper: pretraining does not help here."
+        return "which contradicts the paper: pretraining does not help here."
     if share > 2.0 * PAPER["2 min"] / PAPER[UNTRAINED]:
-        return "It helps, but far less than in the paper."
-    return "It helps as in the paper."
+        return "so pretraining helps as in the paper, but far less."
+    return "which agrees with the paper: pretraining lowers the loss."

@@ -1,4 +1,4 @@
-"""Stills of curves on meshes, rendered by Blender's Cycles through the bpy module."""
+"""Renders still images of curves on meshes with Blender's Cycles, through the module bpy."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ METHOD_COLOURS = {"nicmm-paper": ORANGE, "nicmm": BLUE, "variational": GREEN}
 
 TUBE = 0.006
 BALL = 0.015
-"""Radii of curves and control points, relative to the width of the picture."""
+"""Radii of curve tubes and control point balls, relative to the width of the picture."""
 
 MARGIN = 1.25
-"""Width of the picture relative to the curve's."""
+"""Width of the picture relative to the width of the curves."""
 
 LEAST_WIDTH = 0.35
-"""Of the picture, relative to the mesh's diagonal: enough of the shape to see what it is."""
+"""Least width of a picture relative to the mesh diagonal, so that the shape is recognisable."""
 
 DIRECTIONS = 200
-"""Views that are tried; the one that shows most of the curve wins."""
+"""Number of candidate views; the one that shows the largest part of the curves is used."""
 
 SAMPLES_PER_PIXEL = {Scale.FULL: 16, Scale.QUICK: 8, Scale.SMOKE: 1}
 PIXELS = {Scale.FULL: 480, Scale.QUICK: 320, Scale.SMOKE: 32}
@@ -58,21 +58,24 @@ PIXELS = {Scale.FULL: 480, Scale.QUICK: 320, Scale.SMOKE: 32}
 
 @dataclass(frozen=True)
 class Picture:
-    """What a still shows.
+    """Content of a still image.
 
     Attributes
     ----------
     title : str
+        Title above the image in a sheet.
     mesh : Mesh
+        Surface.
     curves : list of (SurfaceCurve, colour)
+        Curves to draw; the control points of the first one are shown.
     obstacles, alignment : (V,) float array or None
         Maps to paint on the mesh.
     smooth : bool
-        Shade the mesh smoothly; flat shading shows its faces.
+        Whether to shade the mesh smoothly; flat shading shows its faces.
     edges : bool
-        Draw the mesh's edges as thin dark lines.
+        Whether to draw the edges of the mesh as thin dark lines.
     marks : (m, 3) float array or None
-        Places to show as small balls, such as via points.
+        Positions to show as small balls, such as via points.
     """
 
     title: str
@@ -86,20 +89,22 @@ class Picture:
 
 
 def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None = None) -> None:
-    """Write a still as PNG.
+    """Render a still image to a PNG file.
 
     Parameters
     ----------
     picture : Picture
+        Content of the image.
     path : Path
+        File to write.
     scale : Scale
-        Gives the resolution.
+        Scale of the measurement, which determines the resolution.
     view : (3, 3) float array, optional
-        Axes of the camera (right, up, towards it) as rows; `best_view` by default.
+        Axes of the camera (right, up, towards the camera) as rows; `best_view` by default.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     axes = best_view(picture) if view is None else view
-    # Cycles has lengths built in, so everything is shown at the size of the mesh's diagonal.
+    # Cycles has built-in absolute lengths, so the scene is scaled to a mesh diagonal of 1.
     unit = picture.mesh.diagonal
     placed = picture.mesh.vertices @ axes.T / unit
     marks = np.zeros((0, 3)) if picture.marks is None else picture.marks
@@ -122,9 +127,9 @@ def render(picture: Picture, path: Path, scale: Scale, view: FloatArray | None =
 
 
 def best_view(picture: Picture) -> FloatArray:
-    """Axes of a camera (right, up, towards it) that sees most of curves and painted places.
+    """Camera axes (right, up, towards the camera) that show most of the curves and painted regions.
 
-    A place counts as seen if it faces the camera and nothing of the mesh is in between.
+    A point is visible if its normal faces the camera and the mesh does not occlude it.
     """
     mesh = picture.mesh
     tree = BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.faces.tolist())
@@ -144,7 +149,7 @@ def best_view(picture: Picture) -> FloatArray:
                 score += 0.5 + share
         if score > best_score:
             best, best_score = towards, score
-    # Models stand along y or z; whichever is longer is taken to be up.
+    # Models stand upright along y or z; the longer of the two extents is taken as up.
     extent = np.ptp(mesh.vertices[mesh.referenced], axis=0)
     upright = np.array([0.0, 1.0, 0.0]) if extent[1] >= extent[2] else np.array([0.0, 0.0, 1.0])
     if abs(best @ upright) > 0.95:
@@ -161,18 +166,20 @@ def render_sheet(
     columns: int = 4,
     views: Sequence[FloatArray] | None = None,
 ) -> None:
-    """Render stills and put them with their titles into one picture.
+    """Render still images and arrange them, with their titles, in one picture.
 
     Parameters
     ----------
     pictures : sequence of Picture
+        Contents of the images.
     path : Path
-        PNG to write.
+        PNG file to write.
     scale : Scale
+        Scale of the measurement, which determines the resolution.
     columns : int
-        At most.
+        Greatest number of columns.
     views : sequence of (3, 3) float array, optional
-        The camera of each; `best_view` by default.
+        Camera axes of each image; `best_view` by default.
     """
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
@@ -191,7 +198,7 @@ def render_sheet(
 
 
 def _directions() -> FloatArray:
-    """Evenly spread unit vectors (a Fibonacci lattice)."""
+    """Evenly distributed unit vectors (a Fibonacci lattice)."""
     number = np.arange(DIRECTIONS) + 0.5
     z = 1.0 - 2.0 * number / DIRECTIONS
     angle = np.pi * (1.0 + 5.0**0.5) * number
@@ -200,7 +207,7 @@ def _directions() -> FloatArray:
 
 
 def _painted(picture: Picture) -> FloatArray:
-    """Some vertices of painted regions, as many as a curve has samples at most."""
+    """Sample of the vertices in painted regions, at most as many as a curve has samples."""
     places = [np.zeros((0, 3))]
     for weights in (picture.obstacles, picture.alignment):
         if weights is not None:
@@ -219,7 +226,7 @@ def _add_mesh(picture: Picture, vertices: FloatArray, width: float) -> None:
     data.from_pydata(vertices.tolist(), [], picture.mesh.faces.tolist())
     data.polygons.foreach_set("use_smooth", np.full(len(data.polygons), picture.smooth))
     if picture.smooth:
-        # Normals by angle, as the method uses them; Blender's own smooth slivers less well.
+        # Angle-weighted normals, as the method uses; Blender's normals shade slivers less well.
         normals = vertex_normals(vertices, picture.mesh.faces)
         data.normals_split_custom_set_from_vertices(normals.tolist())
     colours = np.ones((len(vertices), 4), dtype=np.float32)
@@ -289,12 +296,12 @@ def _add_camera(width: float) -> None:
 
 
 def _linked(name: str, data: Any, towards: Colour | None = None, distance: float = 1.0) -> Any:
-    """Put an object into the scene; one that looks does so at the origin, from a direction."""
+    """Add an object to the scene, with ``towards`` in that direction and facing the origin."""
     added = bpy.data.objects.new(name, data)
     if towards is not None:
         direction = Vector(towards).normalized()
         added.location = distance * direction
-        # At straight down Blender's "Y" is up, which is what the axes of the view are made for.
+        # Looking straight down, Blender has Y up, which is what the axes of the view assume.
         added.rotation_euler = (-direction).to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(added)
     return added

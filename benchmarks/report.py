@@ -1,13 +1,13 @@
-"""Documents generated from the data files: RESULTS.md, and figures in other documents.
+"""Generates RESULTS.md, and the figures in other documents, from the data files.
 
-A measurement is a module of this package with
+A measurement is a module of this package that defines
 
-- `TITLE`, with the paper's table or figure,
-- `measure(scale)`, which returns its results in types of JSON,
-- `section(results)`, the Markdown that says them,
-- `draw(results, folder)`, if it has plots: PNG files that `section` shows,
-- `WITHOUT`, rooms of the core that it does not run, if there are any,
-- `TIMED`, true if other work on the machine would change its results.
+- `TITLE`, which names the corresponding table or figure of the paper,
+- `measure(scale)`, which returns the results in JSON types,
+- `section(results)`, which returns them as Markdown,
+- `draw(results, folder)`, if there are plots: it writes the PNG files that `section` shows,
+- `WITHOUT`, the folders of the core that it never runs, if there are any,
+- `TIMED`, true if other work on the machine would change the results.
 """
 
 from __future__ import annotations
@@ -23,32 +23,43 @@ from .scale import Scale
 
 RESULTS = ROOT / "benchmarks" / "RESULTS.md"
 FIGURES = ROOT / "benchmarks" / "figures"
-"""Pictures that RESULTS.md shows."""
+"""Folder of the pictures that RESULTS.md shows."""
 
 INTRODUCTION = """# Results
 
-The paper's tables and figures measured again, and more: one section for each measurement. Only
-ratios can be compared with the paper's times and losses: the machine is another, and so are the
-units of its weights. Where a result contradicts the paper, its section says so. This file is
-generated from `benchmarks/data/` by `python -m benchmarks write`; `python -m benchmarks stale`
-lists what was measured on other code.
+The tables and figures of the paper, measured again with this implementation, and further
+measurements of the package. Each section is one measurement: it says what was measured and on what,
+how to read the table and, where the paper has a corresponding table or figure, whether the result
+agrees with it.
+
+- **Methods.** `nicmm` is the default of this package, `nicmm-paper` trains a network for each curve
+  as the paper does, and `variational` minimises the same energy without a network
+  ([docs/method.md](../docs/method.md)).
+- **Bending.** L ∮ κ_g² ds is the scale-free bending of a curve: its length times the integral of
+  its squared geodesic curvature. A circle in the plane has 4π² ≈ 39; less is fairer.
+- **Times and losses** of the paper were measured on other hardware and with weights in other units,
+  so only ratios can be compared.
+- **The line below each title** gives the command of the measurement and the machine it ran on.
+
+This file is generated from `benchmarks/data/` by `python -m benchmarks write`; do not edit it.
+`python -m benchmarks stale` lists the measurements that were made with other code.
 """
 
 
 def figures_folder(scale: Scale) -> Path:
-    """Folder for the pictures of a run, made when it is missing."""
+    """Folder for the pictures of a run; created if it does not exist."""
     folder = FIGURES if scale is Scale.FULL else QUICK_OUTPUT / "figures"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 def results_text(records: Mapping[str, Record]) -> str:
-    """The content of RESULTS.md."""
+    """Content of RESULTS.md."""
     return "\n".join([INTRODUCTION, *(section_text(name, r) for name, r in records.items())])
 
 
 def section_text(name: str, record: Record) -> str:
-    """The section of a measurement, generated from its data."""
+    """Section of a measurement, generated from its data."""
     module = importlib.import_module(f"benchmarks.{name}")
     results = record["results"]
     body = results["text"] if record["code"] is None else module.section(results)
@@ -64,7 +75,7 @@ def draw(name: str, record: Record, scale: Scale) -> None:
 
 
 def with_figures(document: str, blocks: Mapping[str, str]) -> str:
-    """A document with each part between `<!-- figures: NAME -->` marks generated anew."""
+    """Document in which every part between `<!-- figures: NAME -->` marks is regenerated."""
 
     def generated(found: re.Match[str]) -> str:
         name = found[1]
@@ -77,21 +88,21 @@ def with_figures(document: str, blocks: Mapping[str, str]) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table."""
+    """Markdown table."""
     lines = [list(map(str, header)), ["---"] * len(header), *(list(map(str, r)) for r in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def figure(file_name: str, caption: str) -> str:
-    """A Markdown picture with its caption."""
+    """Markdown picture with its caption."""
     return f"![{caption}](figures/{file_name})\n\n*{caption}*"
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names in one line."""
+    """Names in one line, separated by commas."""
     return ", ".join(names)
 
 
 def kept_records(names: Iterable[str]) -> dict[str, Record]:
-    """Data files of full runs."""
+    """Contents of the data files of full runs, by measurement."""
     return {name: evidence.load(name) for name in names if evidence.is_kept(name)}

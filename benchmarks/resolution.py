@@ -1,4 +1,4 @@
-"""The same points on one shape at several resolutions (bottom of Fig. 12)."""
+"""Measures how the curve through given points depends on the mesh resolution (Fig. 12 bottom)."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ WITHOUT = ("outputs",)
 SEED = 4
 
 REMARKABLE = 0.02
-"""Distance, relative to the diagonal, beyond which curves are plainly different to the eye."""
+"""Distance, relative to the diagonal, above which a difference is obvious to the eye."""
 
 PLOT = "resolution.png"
 
 CURVES = "resolution_curves.png"
-"""The picture of the first mesh."""
+"""File name of the picture of the first mesh."""
 
 
 def measure(scale: Scale) -> Results:
-    """Subdivide meshes, ask for the same points on all, and compare with the finest."""
+    """Design curves through the same points at several subdivisions; compare with the finest."""
     names, answers = [], []
     picture = None
     for number, (name, coarse, points) in enumerate(_sets(scale)):
-        # 64k vertices take minutes, so only one mesh is that fine, as in the paper.
+        # 64,000 vertices take minutes, so only one mesh is that fine, as in the paper.
         levels = scale.choose(4 if number == 0 else 3, 3, 1)
         meshes = [_subdivided(coarse, level) for level in range(levels + 1)]
         names.append(f"{name} (up to {len(meshes[-1].vertices)} vertices)")
@@ -67,23 +67,27 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How far curves on coarser meshes are from those on the finest."""
+    """Distances of curves on coarser meshes to those on the finest, and the paper's claim."""
     return (
-        f"Seed {results['seed']}, one set of 3–5 random vertices of each coarse mesh, shortest "
-        "order; Loop subdivision keeps their numbers and moves them a little. "
-        f"{results['collection']}: {report.listed(results['meshes'])}. Distances are those of the "
-        "curve, projected to the finest mesh, to that mesh's curve, relative to its diagonal.\n\n"
+        "Curves through the same control points were computed on Loop subdivisions of the same "
+        "meshes, to see how much they depend on the resolution, as in the lower row of Fig. 12 of "
+        "the paper. Each row is a number of subdivisions and a method, with medians over the "
+        "meshes. Distances are mean and greatest distances from the curve, projected to the finest "
+        "mesh, to the curve on that mesh, in percent of its diagonal. The control points are 3–5 "
+        "random vertices of each coarse mesh (one set, shortest order, seed "
+        f"{results['seed']}); Loop subdivision keeps their indices but moves them slightly. Meshes "
+        f"({results['collection']}): {report.listed(results['meshes'])}.\n\n"
         f"{_table(results['answers'])}\n\n{_findings(results)}\n\n"
-        + report.figure(PLOT, "Every mesh and method by number of vertices")
+        + report.figure(PLOT, "Distances and times of every mesh and method, by number of vertices")
         + f"\n\n{_shown_picture(results)}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Distances and seconds against the number of vertices."""
+    """Plot distances and times against the number of vertices."""
     answers = results["answers"]
     figure, (left, right) = plots.labelled_pair(
-        ("Distance to the finest mesh's curve", "Time"),
+        ("Distance to the curve on the finest mesh", "Time"),
         "vertices",
         ("greatest distance, % of the diagonal", "seconds"),
     )
@@ -129,7 +133,7 @@ def _subdivided(coarse: Mesh, level: int) -> Mesh:
 def _designs(
     name: str, meshes: Sequence[Mesh], points: IntArray, method: str
 ) -> Iterator[tuple[int, nicmm.Design]]:
-    """Designs by level, finest first, without those levels where there is no single curve."""
+    """Designs by level, finest first; levels without a single curve are left out."""
     for level in range(len(meshes) - 1, -1, -1):
         mesh = meshes[level]
         label = f"{name}, {len(mesh.vertices)} vertices, {method}"
@@ -144,7 +148,7 @@ def _designs(
 
 
 def _compared(meshes: Sequence[Mesh], designs: Mapping[int, nicmm.Design]) -> Iterator[Results]:
-    """What the designs are, coarse to fine, with their distances to the finest one's curve."""
+    """Summaries of the designs, coarse to fine, with distances to the curve on the finest mesh."""
     finest = len(meshes) - 1
     for level, design in sorted(designs.items()):
         curve = design.curves[0]
@@ -162,7 +166,7 @@ def _compared(meshes: Sequence[Mesh], designs: Mapping[int, nicmm.Design]) -> It
 
 
 def _offset(finest: Mesh, curve: SurfaceCurve, reference: SurfaceCurve) -> list[float]:
-    """Mean and greatest distance in percent of the diagonal, projected to the finest mesh."""
+    """Mean and greatest distance, projected to the finest mesh, in percent of its diagonal."""
     projected = NearestPoints(finest).curve(curve.points, curve.control_index)
     return [
         round(100.0 * float(each) / finest.diagonal, 6) for each in distances(projected, reference)
@@ -189,9 +193,9 @@ def _table(answers: Sequence[Results]) -> str:
         )
     header = (
         "subdivisions", "vertices", "method", "curves",
-        "distance to the finest: mean, greatest, %", "L ∮ κ_g² ds", "iterations", "seconds",
+        "distance to the finest curve: mean, greatest, %", "L ∮ κ_g² ds", "iterations", "seconds",
     )  # fmt: skip
-    return report.table(header, rows) + "\n\nMedians over the meshes."
+    return report.table(header, rows)
 
 
 def _level_method(answer: Results) -> tuple[int, str]:
@@ -203,6 +207,7 @@ def _median(answers: Sequence[Results], name: str) -> float:
 
 
 def _findings(results: Results) -> str:
+    """What the table shows, in words, and whether it agrees with the paper."""
     text = ""
     for method in results["methods"]:
         greatest = [
@@ -211,18 +216,19 @@ def _findings(results: Results) -> str:
             if each["method"] == method and each["offset"] is not None
         ]
         if not greatest:
-            text += f"`{method}` has nothing to compare. "
+            text += f"There are no curves of `{method}` to compare. "
             continue
         apart = sum(value > 100 * REMARKABLE for value in greatest)
         text += (
-            f"Of {len(greatest)} curves of `{method}` on coarser meshes, {apart} are somewhere "
-            f"farther than {100 * REMARKABLE:g} % of the diagonal from the finest mesh's"
+            f"Of {len(greatest)} curves of `{method}` on coarser meshes, {apart} differ by more "
+            f"than {100 * REMARKABLE:g} % of the diagonal from the curve on the finest mesh"
         )
         text += (
-            ", so it does depend on the resolution, which contradicts the paper's “remarkable "
-            "insensitivity to mesh vertex density”. "
+            ", so the curve does depend on the resolution, which contradicts the paper's "
+            "“remarkable insensitivity to mesh vertex density”. "
             if apart > 0.25 * len(greatest)
-            else ", which agrees with the paper's figure. "
+            else ", which agrees with the paper's “remarkable insensitivity to mesh vertex "
+            "density”. "
         )
     return text.strip()
 
@@ -230,7 +236,7 @@ def _findings(results: Results) -> str:
 def _rendered(
     meshes: Sequence[Mesh], designs: Mapping[int, nicmm.Design], scale: Scale
 ) -> str | None:
-    """The curves of one method on one mesh, coarse to fine; the picture's name."""
+    """Render one method on one mesh, coarse to fine; return the file name, None without curves."""
     if not designs:
         return None
     pictures = [
@@ -249,8 +255,8 @@ def _rendered(
 
 def _shown_picture(results: Results) -> str:
     if results["picture"] is None:
-        return "The first mesh has no curve, so there is no picture of it."
+        return "There is no picture, because the first mesh has no curve."
     return report.figure(
         results["picture"],
-        f"The first mesh with {results['methods'][0]}, coarse to fine (bottom of Fig. 12)",
+        f"Curves of {results['methods'][0]} on the first mesh, coarse to fine (bottom of Fig. 12)",
     )

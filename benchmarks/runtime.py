@@ -1,4 +1,4 @@
-"""Seconds of the methods on the same sets of points (Table 5)."""
+"""Measures the running time of all methods on the same sets of points (Table 5)."""
 
 from __future__ import annotations
 
@@ -26,23 +26,26 @@ WITHOUT = ("outputs",)
 SEED = 5
 
 REPEATED = tuple(method for method in METHODS if method != "nicmm-paper")
-"""Methods that are quick enough to be run several times."""
+"""Methods that are fast enough to be run several times."""
 
 PAPER = {"nicmm-paper": (398, 62, 262, 697), "variational": (102, 106, 24, 538)}
-"""Average, standard deviation, least and greatest milliseconds of the paper's Table 5."""
+"""Average, standard deviation, least and greatest time in milliseconds, Table 5."""
 
 PLOT = "runtime.png"
 
 
 def measure(scale: Scale) -> Results:
-    """Time every method on every set, in turn, so that a busy machine slows all alike."""
+    """Time every method on every set.
+
+    The methods take turns on each set, so that other load on the machine slows all alike.
+    """
     repetitions = scale.choose(3, 1)
     sets: list[Results] = []
     meshes = collections.surfaces(scale, scale.choose(40, 4))
     for name, mesh, points in random_sets(meshes, 1, SEED):
         try:
             if not sets:
-                _timed(mesh, points)  # Imports, weights and caches of the first solve.
+                _timed(mesh, points)  # warm-up: imports, weights and caches
             runs = [_timed(mesh, points)]
             runs += [_timed(mesh, points, REPEATED) for _ in range(repetitions - 1)]
         except nicmm.UnreachableError as error:
@@ -68,28 +71,32 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """Seconds by method, beside the paper's."""
+    """Times by method, beside those of the paper."""
     sets = results["sets"]
     sizes = [each["vertices"] for each in sets]
     names = report.listed(each["mesh"] for each in sets)
     averages = _averages(results)
     return (
-        f"Seed {results['seed']}, {len(sets)} sets of 3–5 random vertices, shortest order, one a "
-        f"mesh ({results['collection']}: {names}), {min(sizes)} to {max(sizes)} vertices; "
-        f"{results['repetitions']} repetitions, one of `nicmm-paper`, each method in turn in one "
-        "process after one warm-up, everything included from the mesh to the polyline, and each "
-        "with its own stopping criterion, where the paper stops both by the change of the loss. "
-        "Statistics are over the sets, of each set's average.\n\n"
+        "The table shows how long each method takes for a curve, including everything from the "
+        "mesh to the polyline, beside the times in Table 5 of the paper. Each row is a method; the "
+        f"statistics are over {len(sets)} sets of control points, of the average time of each set. "
+        "The last two columns are the median number of iterations, and the number of sets for "
+        "which the result is not exactly one curve. A set has 3–5 random vertices, one set per "
+        f"mesh, in the shortest order (seed {results['seed']}). Each set was repeated "
+        f"{results['repetitions']} times, but only once with `nicmm-paper`; the methods take turns "
+        "in one process, after a warm-up. Each method uses its own stopping criterion, whereas the "
+        "paper stops both of its methods by the change of the loss. Meshes "
+        f"({results['collection']}, {min(sizes)} to {max(sizes)} vertices): {names}.\n\n"
         f"{_table(averages, sets)}\n\n"
         f"{_findings(averages, [each['bending'] for each in sets])}\n\n"
-        + report.figure(PLOT, "Seconds of every set by method; dashed: the paper's averages")
+        + report.figure(PLOT, "Time of every set by method, sorted. Dashed: averages in the paper")
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Every set's time, sorted, with the paper's averages as dashed lines."""
+    """Plot the sorted times of all sets, with the averages of the paper as dashed lines."""
     figure, axes = plots.labelled(
-        "Running time (Table 5)", "share of the sets that take less", "seconds"
+        "Running time (Table 5)", "share of the sets that take less time", "seconds"
     )
     for method, times in _averages(results).items():
         share = (np.arange(len(times)) + 0.5) / len(times)
@@ -97,7 +104,7 @@ def draw(results: Results, folder: Path) -> None:
         axes.plot(share, np.sort(times), ".-", color=colour, label=method)
         if method in PAPER:
             axes.axhline(PAPER[method][0] / 1000, color=colour, linestyle="--", linewidth=1)
-            axes.text(0.0, PAPER[method][0] / 1000, f"{method}, paper's average", va="bottom")
+            axes.text(0.0, PAPER[method][0] / 1000, f"{method}, average in the paper", va="bottom")
     axes.set_yscale("log")
     plots.plain_ticks(axes.yaxis)
     axes.set_xlim(0.0, 1.0)
@@ -108,7 +115,7 @@ def draw(results: Results, folder: Path) -> None:
 def _timed(
     mesh: Mesh, points: IntArray, methods: Iterable[str] = METHODS
 ) -> dict[str, nicmm.Design]:
-    """One design with each method; a copy of the mesh each time, so that no cache is shared."""
+    """One design with each method; each gets a copy of the mesh, so that no cache is shared."""
     return {
         method: nicmm.design_curve(
             Mesh(mesh.vertices, mesh.faces), points, order="shortest", method=method
@@ -118,7 +125,7 @@ def _timed(
 
 
 def _answer(runs: Sequence[Mapping[str, nicmm.Design]], method: str) -> Results:
-    """A method's seconds in all runs, and what it did in the first."""
+    """Times of a method in all runs, and its outcome in the first run."""
     first = runs[0][method]
     return {
         "seconds": [round(designs[method].seconds, 6) for designs in runs if method in designs],
@@ -128,7 +135,7 @@ def _answer(runs: Sequence[Mapping[str, nicmm.Design]], method: str) -> Results:
 
 
 def _averages(results: Results) -> dict[str, FloatArray]:
-    """Mean seconds of every set, by method."""
+    """Mean time of every set in seconds, by method."""
     return {
         method: np.array([np.mean(each["answers"][method]["seconds"]) for each in results["sets"]])
         for method in results["methods"]
@@ -146,7 +153,8 @@ def _table(averages: Mapping[str, FloatArray], sets: Sequence[Results]) -> str:
         if method in PAPER:
             rows.append((f"{method}, paper", *PAPER[method], "", ""))
     header = (
-        "method", "avg (ms)", "std", "min", "max", "iterations (median)", "not one curve"
+        "method", "avg (ms)", "std (ms)", "min (ms)", "max (ms)", "iterations, median",
+        "not one curve",
     )  # fmt: skip
     return report.table(header, rows)
 
@@ -156,15 +164,16 @@ def _statistics(times: FloatArray) -> tuple[float, ...]:
 
 
 def _findings(averages: Mapping[str, FloatArray], bends: Sequence[float]) -> str:
-    """Ratios of the sets and of the averages, beside the paper's."""
+    """Ratios of the times, and whether they agree with the paper."""
     text = (
-        "The paper's numbers are from an i9-14900K and an RTX 4090; only ratios can be compared. "
+        "The times in the paper are from an i9-14900K and an RTX 4090, so only ratios can be "
+        "compared. "
     )
     paired = float(np.median(averages["nicmm"] / averages["variational"]))
     text += (
-        f"`nicmm` takes {paired:.2f} of the time of `variational` and bends "
-        f"{np.median(bends):.2f} times as much (L ∮ κ_g² ds), medians of the sets; it bends more "
-        f"in {sum(ratio > 1.0 for ratio in bends)} of {len(bends)}. "
+        f"By the median of the sets, `nicmm` takes {paired:.2f} times as long as `variational`, "
+        f"and its curve bends {np.median(bends):.2f} times as much (L ∮ κ_g² ds); it bends more on "
+        f"{sum(ratio > 1.0 for ratio in bends)} of {len(bends)} sets. By the averages: "
     )
     methods = list(averages)
     for first, one in enumerate(methods):
@@ -174,12 +183,12 @@ def _findings(averages: Mapping[str, FloatArray], bends: Sequence[float]) -> str
             text += f"`{slow}` takes {ratio:.2f} times as long as `{fast}`"
             if {one, other} == PAPER.keys():
                 text += _against_the_paper(slow, ratio)
-            text += ". "
-    return text.strip()
+            text += "; "
+    return text.removesuffix("; ") + "."
 
 
 def _against_the_paper(slow: str, ratio: float) -> str:
     published = PAPER["nicmm-paper"][0] / PAPER["variational"][0]
     if slow == "variational":
         return f", which contradicts the paper, where it is {published:.2f} times as fast"
-    return f"; in the paper the ratio is {published:.2f}"
+    return f", which agrees with the paper that it is slower ({published:.2f} times)"

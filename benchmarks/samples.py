@@ -1,4 +1,4 @@
-"""Random control points, the same for the same seed."""
+"""Random control points, reproducible by their seed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 
 FEWEST_POINTS, MOST_POINTS = 3, 5
-"""Of a set, as in the paper's section 4.1."""
+"""Bounds on the number of points in a set, as in section 4.1 of the paper."""
 
 
 def random_sets(
     meshes: Iterable[tuple[str, Mesh]], per_mesh: int, seed: int
 ) -> Iterator[tuple[str, Mesh, IntArray]]:
-    """Name, mesh and the vertices of one set of control points, ``per_mesh`` times each mesh.
+    """Name, mesh and vertices of each set of control points, ``per_mesh`` sets on every mesh.
 
-    The points of a mesh depend on the seed and its place in the list alone.
+    The points depend only on the seed and on the position of the mesh in the list.
     """
     for number, (name, mesh) in enumerate(meshes):
         for points in point_sets(mesh, per_mesh, np.random.default_rng([seed, number])):
@@ -26,7 +26,7 @@ def random_sets(
 
 
 def point_sets(mesh: Mesh, count: int, generator: np.random.Generator) -> Iterator[IntArray]:
-    """Sets of random vertices of the component with the largest area."""
+    """Sets of random vertices, all from the connected component with the largest area."""
     component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
     vertices = np.unique(mesh.faces[mesh.face_component == component])
     for _ in range(count):

@@ -1,4 +1,4 @@
-"""How much a measurement does."""
+"""The scales at which a measurement can run."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ import enum
 
 
 class Scale(enum.Enum):
-    """FULL fills RESULTS.md; QUICK takes minutes for all; SMOKE only shows that it runs."""
+    """Extent of a measurement.
+
+    FULL is the scale of RESULTS.md, QUICK runs all measurements within minutes, and SMOKE only
+    tests that they run.
+    """
 
     FULL = "full"
     QUICK = "quick"
     SMOKE = "smoke"
 
     def choose(self, full: int, quick: int, smoke: int = 1) -> int:
-        """The number that belongs to this scale."""
+        """The argument that belongs to this scale."""
         return {Scale.FULL: full, Scale.QUICK: quick, Scale.SMOKE: smoke}[self]

@@ -1,4 +1,4 @@
-"""Curves beside sharp edges with an automatic map: whether they run along the edge."""
+"""Measures whether curves beside sharp edges follow the edge when `sharp_edge_map` is used."""
 
 from __future__ import annotations
 
@@ -27,40 +27,43 @@ TITLE = "Sharp edges to follow"
 WITHOUT = ("outputs",)
 
 SEEDS = (6, 7, 8, 9)
-"""Of generated bodies and their lines; third-party meshes have the first."""
+"""Seeds of the generated bodies and their lines; third-party meshes use the first one."""
 
 OFFSET = 0.02
-"""Distance of the control points from the edge on the surface, in diagonals."""
+"""Distance of the control points from the edge along the surface, in diagonals."""
 
 NEAR = 1.5
-"""Mean distance of the free curve from the edge up to which that counts as close, in offsets."""
+"""Greatest mean distance of the free curve from the line, in units of `OFFSET`."""
 
 LEAST_LENGTH, MOST_LENGTH = 0.25, 0.6
-"""Of a line of sharp edges, in diagonals."""
+"""Bounds on the length of a line of sharp edges, in diagonals."""
 
 STRAIGHT = 0.8
-"""Cosine of the greatest angle between two edges of one line."""
+"""Cosine of the greatest angle between two consecutive edges of a line."""
 
 CLOSE = 0.5
-"""The middle part of a line, along which the curve has had the room to come to it."""
+"""Share of a line, around its middle, on which distances are measured.
+
+Towards its ends the curve still approaches the line.
+"""
 
 WANTED = 0.25
-"""Distance from the edge that counts as on it, in edge lengths."""
+"""Distance up to which a curve counts as being on the line, in edge lengths."""
 
 AS_SHORT = 1.1
-"""Length of another way along sharp edges, relative to a line's, up to which it is as good."""
+"""Relative length up to which another path along sharp edges competes with a line."""
 
 MECHANICAL = (0.02, 0.2)
-"""Shares of vertices on sharp edges between which a third-party mesh is taken as CAD-like."""
+"""Bounds on the share of vertices on sharp edges for a third-party mesh to count as CAD-like."""
 
 FEWEST_VERTICES = 2000
 
 LINES = 3
-"""Lines of a mesh."""
+"""Greatest number of lines per mesh."""
 
 
 def measure(scale: Scale) -> Results:
-    """Open curves beside lines of sharp edges, without and with the map."""
+    """Design open curves beside lines of sharp edges, without and with the map."""
     seeds = SEEDS[: scale.choose(len(SEEDS), 1)]
     groups = {"generated": _generated(seeds, scale.choose(12, 8, 2))}
     if scale is not Scale.SMOKE:
@@ -84,27 +87,33 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """How near the curves come to the edges."""
+    """Distances of the curves to the lines, without and with the map."""
     header = (
-        "meshes", "lines", "free curve", "with the map: median", "75 %", "90 %",
-        f"within {WANTED:g} edges", "simple, through its points",
+        "meshes", "lines", "free curve: median", "with the map: median", "with the map: 75 %",
+        "with the map: 90 %", f"within {WANTED:g} edge lengths", "simple, through its points",
     )  # fmt: skip
     rows = [_row(label, lines) for label, lines in results["lines"].items() if lines]
     least, most = results["lengths"]
     low, high = results["mechanical"]
     return (
-        f"Seeds {report.listed(map(str, results['seeds']))}; up to {results['most_lines']} lines "
-        f"of sharp edges a mesh, {least:g} to {most:g} diagonals long. An open curve joins two "
-        f"points beside the ends of a line, {results['offset']:.0%} of the diagonal away from it "
-        "on one side; lines count where the free curve is no more than "
-        f"{results['near']:g} times as far away by the mean. Left out are lines that are not the "
-        "only ones to follow: another is nearer than the points, or another way along sharp edges "
-        f"between the ends is at most {results['as_short']:g} times as long, as round a circle, or "
-        "a face beside the line has its third corner on another line, so that the map makes one "
-        "of both. The map is `sharp_edge_map(mesh)`. Mean distance of the middle half of the line "
-        "to the curve, in mean edge lengths of the line. Third-party meshes are those of which "
-        f"{100 * low:g} to {100 * high:g} % of the vertices are on sharp edges.\n\n"
+        "Open curves were designed beside lines of sharp edges, without a map and with "
+        "`sharp_edge_map(mesh)` as alignment, to see whether they then follow the line. Each row "
+        "is a group of meshes. The distances are mean distances from the middle half of a line to "
+        "the curve, in mean edge lengths of the line: median of the free curves, and median, 75 % "
+        "and 90 % quantiles with the map. The last columns are the share of curves within "
+        f"{WANTED:g} edge lengths, and the number that are simple and pass their points. The paper "
+        "proposes such maps (section 3.3) but does not measure them.\n\n"
         + report.table(header, rows)
+        + f"\n\nThere are up to {results['most_lines']} lines per mesh, {least:g} to {most:g} "
+        f"diagonals long (seeds {report.listed(map(str, results['seeds']))}). A curve joins two "
+        f"points beside the ends of a line, {100 * results['offset']:g} % of the diagonal away "
+        "from it on one side. A line counts if the mean distance of the free curve is at most "
+        f"{results['near']:g} times that. Lines are left out if it is ambiguous which one the "
+        "curve should follow: if another line is closer than the points; if another path along "
+        f"sharp edges joins the ends and is at most {results['as_short']:g} times as long, as on "
+        "the other half of a circle; or if a face beside the line has its third corner on another "
+        "line, so that the map joins both. The third-party meshes are those with "
+        f"{100 * low:g} to {100 * high:g} % of their vertices on sharp edges."
     )
 
 
@@ -115,13 +124,13 @@ def _row(label: str, lines: Sequence[Results]) -> tuple[object, ...]:
         len(lines),
         f"{np.median([line['free'] for line in lines]):.2f}",
         *(f"{value:.2f}" for value in np.quantile(after, [0.5, 0.75, 0.9])),
-        f"{np.mean(np.array(after) <= WANTED):.0%}",
+        f"{100 * np.mean(np.array(after) <= WANTED):.0f} %",
         f"{sum(not line['faults'] for line in lines)} of {len(lines)}",
     )
 
 
 def _beside_lines(name: str, mesh: Mesh, generator: np.random.Generator) -> Iterator[Results]:
-    """Distances of the free curve and of the one with the map, beside lines of a mesh."""
+    """Distances from the lines of a mesh to the free curve and to the curve with the map."""
     weights = nicmm.sharp_edge_map(mesh)
     for line, points, free in itertools.islice(_close(name, mesh, generator), LINES):
         try:
@@ -144,7 +153,7 @@ def _beside_lines(name: str, mesh: Mesh, generator: np.random.Generator) -> Iter
 def _generated(
     seeds: tuple[int, ...], count: int
 ) -> Iterator[tuple[str, Mesh, np.random.Generator]]:
-    """Bodies of every seed, with what draws their lines."""
+    """Bodies of every seed, each with the generator that chooses its lines."""
     for seed in seeds:
         generator = np.random.default_rng(seed)
         for name, mesh in cad_shapes(generator, count):
@@ -152,7 +161,7 @@ def _generated(
 
 
 def _mechanical(count: int) -> Iterator[tuple[str, Mesh, np.random.Generator]]:
-    """Closed third-party meshes with some sharp edges and many others."""
+    """Closed third-party meshes on which some edges, but not too many, are sharp."""
     low, high = MECHANICAL
     generator = np.random.default_rng(SEEDS[0])
     for name, mesh in collections.clean(count):
@@ -164,7 +173,7 @@ def _mechanical(count: int) -> Iterator[tuple[str, Mesh, np.random.Generator]]:
 def _close(
     name: str, mesh: Mesh, generator: np.random.Generator
 ) -> Iterator[tuple[FloatArray, SurfacePoints, SurfaceCurve]]:
-    """Lines of sharp edges, points beside their ends and the free curve, where that is close."""
+    """Lines of sharp edges, points beside their ends and the free curve, if that is close."""
     for line, points in _lines(mesh, generator):
         try:
             free = nicmm.design_curve(mesh, points, closed=False).curves[0]
@@ -178,7 +187,7 @@ def _close(
 def _lines(
     mesh: Mesh, generator: np.random.Generator
 ) -> Iterator[tuple[FloatArray, SurfacePoints]]:
-    """Lines of sharp edges, (n, 3), each with a point beside either end, on the left of it."""
+    """Lines of sharp edges, (n, 3), each with a point to its left beside either end."""
     edges = nicmm.sharp_edges(mesh)
     if not len(edges):
         return
@@ -203,7 +212,7 @@ def _lines(
         points = _beside(mesh, left, np.array(line))
         if points is None or _as_short(mesh, edges, line) or _merged(mesh, edges, line):
             continue
-        # Another edge may be nearer: then it is not clear which one is to be followed.
+        # If another edge is closer, it is ambiguous which one the curve should follow.
         others = everything[~np.isin(edges, line).all(axis=1)]
         if len(others):
             start, end = others.transpose(1, 0, 2)
@@ -217,7 +226,7 @@ def _lines(
 
 
 def _followed(mesh: Mesh, around: dict[int, list[int]], a: int, b: int) -> list[int]:
-    """The line that an edge is part of, as far as it is smooth and not longer than allowed."""
+    """Line that contains an edge, as far as it is smooth and not too long."""
     line = [a, b]
     for _ in range(2):
         while len(around[line[-1]]) == 2:
@@ -234,7 +243,7 @@ def _followed(mesh: Mesh, around: dict[int, list[int]], a: int, b: int) -> list[
 
 
 def _as_short(mesh: Mesh, edges: IntArray, line: list[int]) -> bool:
-    """Whether another way along sharp edges joins the ends of a line and is hardly longer."""
+    """Whether another path along sharp edges joins the ends of a line and is hardly longer."""
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
     own = np.isin(edges, line).all(axis=1)
     size = len(mesh.vertices)
@@ -245,14 +254,14 @@ def _as_short(mesh: Mesh, edges: IntArray, line: list[int]) -> bool:
 
 
 def _merged(mesh: Mesh, edges: IntArray, line: list[int]) -> bool:
-    """Whether a face beside the inner part of a line has all corners on sharp edges."""
+    """Whether a face beside the inner part of a line has its third corner on another line."""
     inner = np.isin(mesh.faces, line[2:-2]).sum(axis=1) == 2
     sharp = np.isin(mesh.faces, edges).all(axis=1)
     return bool((inner & sharp & ~np.isin(mesh.faces, line).all(axis=1)).any())
 
 
 def _beside(mesh: Mesh, left: dict[tuple[int, int], int], line: IntArray) -> SurfacePoints | None:
-    """Points on the left of the line's ends; None where the surface ends before."""
+    """Points to the left of the ends of a line; None if the boundary is closer than that."""
     faces, barycentric, across = [], [], []
     for a, b in (line[1:3], line[-3:-1]):
         face = left.get((int(a), int(b)))
@@ -270,7 +279,7 @@ def _beside(mesh: Mesh, left: dict[tuple[int, int], int], line: IntArray) -> Sur
 
 
 def _away(line: FloatArray, curve: SurfaceCurve) -> float:
-    """Mean distance of the middle of a line to a curve."""
+    """Mean distance from the middle part of a line to a curve."""
     lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
     arc = np.concatenate([[0.0], np.cumsum(lengths)])
     share = np.linspace(0.5 - 0.5 * CLOSE, 0.5 + 0.5 * CLOSE, 64) * arc[-1]

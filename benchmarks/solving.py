@@ -1,4 +1,8 @@
-"""Parts of the method one by one: problems of random points, pretraining, losses, curves."""
+"""Runs single parts of the method for the benchmarks.
+
+It builds problems from random control points, pretrains networks, records losses and extracts
+curves.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ from nicmm_core.network.finetuning import FinetuningConfig, finetune
 from nicmm_core.network.forward_pass import NetworkConfig
 from nicmm_core.network.pretraining import PretrainingConfig, pretrain
 from nicmm_core.network.trainable_network import CurveNetwork, load_network
-from nicmm_core.path.band_refinement import PIECES
+from nicmm_core.path.band_refinement import RESOLUTION
 from tests.oracles.distances import distances
 
 from .evidence import Results
@@ -32,13 +36,13 @@ from .measures import diagonal
 from .samples import random_sets
 
 PARTS_WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "repair", "splines")
-"""Rooms of the core of which nothing here uses anything, for the `WITHOUT` of a measurement."""
+"""Folders of the core that nothing in this module runs, for the `WITHOUT` of a measurement."""
 
 DIGITS = 6
-"""Significant ones that results keep."""
+"""Significant digits that are kept in results."""
 
 FREQUENCY = 4.0
-"""Of a random field: standard deviation of its wave numbers, in 1/√area."""
+"""Standard deviation of the wave numbers of a random field, in 1/√area."""
 
 HARMONICS = 20
 
@@ -50,13 +54,15 @@ class Sample:
     Attributes
     ----------
     name : str
-        Of the mesh.
+        Name of the mesh.
     mesh : Mesh
+        Input mesh.
     points : (k,) int array
-        Vertices that are the control points.
+        Vertices that serve as control points.
     problem : Problem
+        Discretised problem.
     weights : LossWeights
-        Those that a design takes for this problem.
+        Weights that a design uses for this problem.
     """
 
     name: str
@@ -72,13 +78,16 @@ def random_samples(
     seed: int,
     order: str = "shortest",
     closed: bool = True,
-    pieces: int = PIECES,
+    resolution: int = RESOLUTION,
 ) -> Iterator[Sample]:
-    """Problems of `random_sets`; a set without a simple path is named and skipped."""
+    """Problems for the point sets of `random_sets`.
+
+    A set without a simple path through its points is reported and skipped.
+    """
     for name, mesh, points in random_sets(meshes, per_mesh, seed):
         located = locate_control_points(mesh, points, closed)
         try:
-            problem = build_problem(mesh, located, order, closed=closed, pieces=pieces)
+            problem = build_problem(mesh, located, order, closed=closed, resolution=resolution)
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue
@@ -86,7 +95,7 @@ def random_samples(
 
 
 def untrained(config: NetworkConfig | None = None, seed: int = 0) -> CurveNetwork:
-    """The network as pretraining starts with it."""
+    """Network with the weights that pretraining starts from."""
     torch.manual_seed(seed)
     return CurveNetwork(config or NetworkConfig())
 
@@ -98,10 +107,13 @@ class Trained:
     Attributes
     ----------
     network : CurveNetwork
+        Pretrained network.
     losses : list of float
         Mean loss of every epoch.
-    preparing_seconds, training_seconds : float
-        For initial loops, distances and features of all sets, and for the steps themselves.
+    preparing_seconds : float
+        Time for the initial loops, distances and features of all sets.
+    training_seconds : float
+        Time for the optimiser steps.
     """
 
     network: CurveNetwork
@@ -142,22 +154,33 @@ def train(
 
 
 def without_early_stop(iterations: int) -> FinetuningConfig:
-    """Settings that stop after a number of steps of the optimiser and never before."""
-    # The loss is taken before each step, so the last one needs a further evaluation.
+    """Settings that stop after exactly the given number of optimiser steps."""
+    # The loss is evaluated before each step, so the loss after the last step needs one more.
     return FinetuningConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
 
 
 def run_networks(
     networks: Mapping[str, CurveNetwork], samples: Iterable[Sample], iterations: int
 ) -> Results:
-    """Predict every sample with every network, in turn, so that a busy machine slows all alike.
+    """Fine-tune every network on every sample.
+
+    The networks take turns on each sample, so that other load on the machine slows all alike.
+
+    Parameters
+    ----------
+    networks : mapping of str to CurveNetwork
+        Networks to compare, by label.
+    samples : iterable of Sample
+        Problems to solve.
+    iterations : int
+        Optimiser steps per sample.
 
     Returns
     -------
     Results
-        By network: for each sample its mesh, the seconds of all fine-tuning, and the least loss
-        before the first step and after the last one; for all samples together the mean of the least
-        loss so far, by iteration.
+        By network. For each sample: its mesh, the duration of the fine-tuning in seconds, the loss
+        before the first step and the lowest loss up to the last one. Over all samples: the mean
+        of the lowest loss so far, by iteration.
     """
     meshes: list[str] = []
     losses: dict[str, list[FloatArray]] = {label: [] for label in networks}
@@ -181,7 +204,7 @@ def run_networks(
 
 
 def _run(meshes: list[str], least_losses: FloatArray, seconds: list[float]) -> Results:
-    """What results keep of (samples, iterations + 1) losses: all of them would be too many."""
+    """Summary of one network's losses, (samples, iterations + 1), which are too many to keep."""
     return {
         "meshes": meshes,
         "seconds": [significant(value) for value in seconds],
@@ -192,18 +215,21 @@ def _run(meshes: list[str], least_losses: FloatArray, seconds: list[float]) -> R
 
 
 def significant(value: float, digits: int = DIGITS) -> float | None:
-    """A number with so many digits; None if it is not finite."""
+    """Number rounded to a number of significant digits; None if it is not finite."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def _least_so_far(losses: list[float], length: int) -> FloatArray:
-    """Running minimum; after a divergence it stays, as the field that is returned does."""
+    """Running minimum of the losses, padded to a length.
+
+    After a divergence it is constant, as is the field that is returned.
+    """
     least = np.fmin.accumulate(np.array(losses))
     return np.pad(least, (0, length - len(least)), mode="edge")
 
 
 def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
-    """The zero level set of φ as it is, zero at the control points."""
+    """Zero level set of φ, which is made zero at the control points; no topology is repaired."""
     problem = sample.problem
     return extract_curves(
         sample.mesh,
@@ -215,13 +241,13 @@ def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
 
 
 def designed_curve(sample: Sample, field: FloatArray) -> tuple[SurfaceCurve, bool]:
-    """The curve that a design makes of φ, and whether it was one curve by itself."""
+    """Curve that a design extracts from φ, and whether its topology needed no repair."""
     zeros = zero_set(sample.mesh, sample.problem, field)
     return zeros.curves[0], not zeros.breaking_vertices
 
 
 def random_field(problem: Problem, seed: int) -> FloatArray:
-    """A sum of waves in space with random directions, lengths and phases, of mean slope 1."""
+    """Sum of plane waves with random directions, lengths and phases, scaled to mean slope 1."""
     generator = np.random.default_rng(seed)
     positions = problem.features[:, :3]
     waves = generator.normal(scale=FREQUENCY, size=(3, HARMONICS))
@@ -236,6 +262,6 @@ def random_field(problem: Problem, seed: int) -> FloatArray:
 def relative_distances(
     sample: Sample, first: SurfaceCurve, second: SurfaceCurve
 ) -> tuple[float, float]:
-    """Mean and greatest distance of two curves in percent of the bounding box's diagonal."""
+    """Mean and greatest distance of two curves, in percent of the bounding box diagonal."""
     mean, greatest = distances(first, second)
     return 100 * mean / diagonal(sample.mesh), 100 * greatest / diagonal(sample.mesh)

@@ -1,4 +1,4 @@
-"""Where the time and the calls of a design go, by stage, and how they grow with the mesh."""
+"""Measures the time and the function calls of each stage of a design, by mesh size."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WITHOUT = ("outputs",)
 
 SEED = 0
 SIZES = ((500, 2), (1000, 3), (1500, 5))
-"""Faces and subdivisions of the bodies: 8,000, 64,000 and 1,536,000 faces."""
+"""Faces before subdivision, and subdivisions: 8,000, 64,000 and 1,536,000 faces in the end."""
 
 SETS = 5
 DRAGS = 5
@@ -58,11 +58,11 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
         (course_search, "routes_of_legs"),
     ],
     "combinations": [
-        (course_search, "laid_routes"),
+        (course_search, "nodes_on_routes"),
         (course_search, "traces_between_nodes"),
         (course_search, "crossing_routes"),
-        (course_search, "combined"),
-        (course_search, "different"),
+        (course_search, "cheapest_combinations"),
+        (course_search, "distinct_combinations"),
         (course_search, "course_nodes"),
     ],
     "crossings removed": [(course_search, "uncrossed")],
@@ -84,17 +84,17 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "start from the last curve": [(surface_designer, "moved_start")],
     "relaxation": [(surface_designer, "relax")],
 }
-"""Functions that make up a design, each where its caller finds it; none calls another."""
+"""Functions of each stage, each in the namespace of its caller; none of them calls another."""
 
 REST = "rest"
 TOTAL = "together"
 
 Times = dict[str, float]
-"""Milliseconds, or calls, by stage."""
+"""Time in milliseconds, or number of calls, by stage."""
 
 
 def measure(scale: Scale) -> Results:
-    """Measure generated bodies of three sizes."""
+    """Measure designs on generated bodies of three sizes."""
     sizes = ((200, 1),) if scale is Scale.SMOKE else SIZES[: scale.choose(3, 2)]
     bodies = []
     for faces, subdivisions in sizes:
@@ -112,29 +112,35 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """Medians and calls of every stage, and the memory."""
+    """Median time and calls of every stage, and the memory."""
     bodies = results["bodies"]
     medians, calls = {}, {}
     for body in bodies:
         for kind, stages in body["milliseconds"].items():
-            label = f"{body['faces']:,}, {kind}"
+            label = f"{body['faces']:,} faces, {kind}"
             medians[label] = {stage: float(np.median(each)) for stage, each in stages.items()}
         for kind, counts in body["calls"].items():
-            calls[f"{body['faces']:,}, {kind}"] = counts
+            calls[f"{body['faces']:,} faces, {kind}"] = counts
     bytes_each = report.listed(
         f"{body['bytes_a_vertex']:,.0f} with {body['faces']:,} faces" for body in bodies
     )
     return (
-        f"Seed {results['seed']}, {results['sets']} sets of {results['points']} random vertices on "
-        "a generated body of each size, shortest order; medians in milliseconds. *First*: the "
-        "first curve on a mesh, whose arrays have been checked and no more. *Another*: through "
-        "other points on the same Designer. *Dragged*: after a point has moved to a neighbouring "
-        f"vertex, {results['drags']} times a set.\n\n"
+        "The tables show how the time and the function calls of a design by `nicmm` are "
+        "distributed over its stages, on a generated body of each size. Each row is a stage and "
+        "each column a mesh size and a kind of design. *First* is the first curve on a mesh, of "
+        "which only the arrays have been checked; *another* is a curve through other points on the "
+        "same Designer; *dragged* is a curve after one point has moved to a neighbouring vertex, "
+        f"{results['drags']} times per set, which starts from the curve before. The row "
+        f"*{REST}* is all that belongs to no stage, and *{TOTAL}* is the whole design; a dash "
+        "means that the stage did not run. The first table has medians in milliseconds over "
+        f"{results['sets']} sets of {results['points']} random vertices (shortest order, seed "
+        f"{results['seed']}). The paper has no corresponding measurement.\n\n"
         + _table(medians, 1)
-        + "\n\nCalls of functions in Python and C (`sys.setprofile`), of one set.\n\n"
+        + "\n\nThe second table has the numbers of calls of functions in Python and C for one "
+        "set, counted by `sys.setprofile`.\n\n"
         + _table(calls, 0)
-        + "\n\nGreatest memory that a first curve takes beyond what the process had with the "
-        f"mesh's arrays, in bytes a vertex: {bytes_each}."
+        + "\n\nThe greatest memory that a first curve takes, in addition to that of the process "
+        f"with the arrays of the mesh, in bytes per vertex: {bytes_each}."
     )
 
 
@@ -154,7 +160,7 @@ def _table(columns: dict[str, Times], digits: int) -> str:
 
 
 def _counted(mesh: Mesh) -> dict[str, Times]:
-    """Calls of a first curve and of another one on the same Designer."""
+    """Function calls of a first curve, and of another one on the same Designer."""
     generator = np.random.default_rng(SEED)
     designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))
     calls = 0
@@ -175,11 +181,11 @@ def _counted(mesh: Mesh) -> dict[str, Times]:
 
 
 def _measured(mesh: Mesh) -> dict[str, dict[str, list[float]]]:
-    """Milliseconds of all runs, by kind of run and stage."""
+    """Times of all runs in milliseconds, by kind of run and stage."""
     generator = np.random.default_rng(SEED)
     runs: dict[str, list[Times]] = {"first": [], "another": [], "dragged": []}
     for _ in range(SETS):
-        designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))  # without anything cached
+        designer = nicmm.Designer(Mesh(mesh.vertices, mesh.faces))  # without cached values
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
         runs["first"].append(_timed(designer, points)[0])
         points = generator.choice(len(mesh.vertices), POINTS, replace=False)
@@ -215,7 +221,7 @@ def _measured_by(
     points: IntArray,
     start: nicmm.Design | None = None,
 ) -> tuple[Times, nicmm.Design]:
-    """By how much a clock moves on in every stage of a design."""
+    """Increase of a clock in every stage of a design, and the design."""
     with _stopwatches(clock) as spent:
         started = clock()
         found = designer.design(points, order="shortest", start=start)
@@ -227,7 +233,7 @@ def _measured_by(
 
 @contextmanager
 def _stopwatches(clock: Callable[[], float]) -> Iterator[Times]:
-    """Add up by how much a clock moves on in every stage."""
+    """Accumulate the increase of a clock in every stage."""
     spent = dict.fromkeys(STAGES, 0.0)
 
     def timed(stage: str, function: Any) -> Any:
@@ -249,13 +255,13 @@ def _stopwatches(clock: Callable[[], float]) -> Iterator[Times]:
 
 
 def _bytes_a_vertex(faces: int, subdivisions: int) -> float:
-    """What the first curve on a mesh adds to the memory of a process of its own."""
+    """Memory in bytes per vertex that the first curve on a mesh takes in a separate process."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return float(pool.apply(_growth, (faces, subdivisions)))
 
 
 def _growth(faces: int, subdivisions: int) -> float:
-    nicmm.design_curve(shapes.sphere(3), [0, 100, 200])  # what every process loads once
+    nicmm.design_curve(shapes.sphere(3), [0, 100, 200])  # loads what is loaded once per process
     mesh = shapes.creature(SEED, faces=faces, subdivisions=subdivisions)
     before = _resident()
     points = np.random.default_rng(SEED).choice(len(mesh.vertices), POINTS, replace=False)
@@ -264,12 +270,12 @@ def _growth(faces: int, subdivisions: int) -> float:
 
 
 def _resident() -> int:
-    """Bytes of memory in use now."""
+    """Memory in use now, in bytes."""
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * resource.getpagesize()
 
 
 def _peak() -> int:
-    """Greatest memory that was ever in use, in bytes."""
+    """Peak memory of the process, in bytes."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024

@@ -1,4 +1,4 @@
-"""How fast the variational method converges (its reference claims quadratic convergence)."""
+"""Measures the order of convergence of the variational method; its authors claim order 2."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ WITHOUT = (*PARTS_WITHOUT, "network")
 
 SEED = 0
 NOISE = 1e-3
-"""Share of the first loss below which the excess over the least one is not followed.
+"""Excess of the loss over its minimum, relative to the first excess, that counts as noise.
 
-Every iteration ends with new distances, whose rounding to the mesh lifts the loss a little.
+Every iteration ends with a redistancing, whose discretisation error raises the loss slightly.
 """
 
 
 DIGITS = 10
-"""Of the losses: their differences are small."""
+"""Significant digits of the losses, whose differences are small."""
 
 
 def measure(scale: Scale) -> Results:
-    """Losses by iteration."""
+    """Record the loss of every iteration."""
     config = VariationalConfig()
     meshes = collections.surfaces(scale, scale.choose(40, 6))
     sets = []
@@ -49,24 +49,30 @@ def measure(scale: Scale) -> Results:
 
 
 def section(results: Results) -> str:
-    """The order that the losses show."""
+    """Fitted order of convergence, and whether it agrees with the claim."""
     counts = [len(each["losses"]) for each in results["sets"]]
     figure = report.figure(
-        "variational_order.png", "Loss of the variational method above its least, by iteration"
+        "variational_order.png", "Excess of the loss over its minimum against the iteration, by set"
     )
     tolerance = f"{results['tolerance']:g}".replace("e-0", "e-")
     return (
-        f"Seed {results['seed']}, {len(counts)} sets on {results['collection']}; iterations until "
-        f"the least loss has changed by less than {tolerance} over {results['patience']} of them: "
-        f"median {np.median(counts):.0f}, from {min(counts)} to {max(counts)}.\n\n"
+        "The losses of `variational` were recorded at every iteration, to see how fast it "
+        f"converges, for {len(counts)} sets of random control points on {results['collection']} "
+        f"(seed {results['seed']}). It needs {np.median(counts):.0f} iterations by the median, and "
+        f"from {min(counts)} to {max(counts)}, until the lowest loss has changed by less than "
+        f"{tolerance} over {results['patience']} iterations. The order p is fitted to "
+        "e(k+1) = c e(k)^p, where e(k) is the excess of the loss of iteration k over the lowest "
+        "loss.\n\n"
         f"{_verdict(results)}\n\n{figure}"
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Draw the losses above the least one of each set."""
+    """Plot the excess of the loss over its minimum, for each set."""
     figure, axes = plots.labelled(
-        "Variational method", "iteration", "loss above its least, share of the start"
+        "Convergence of the variational method",
+        "iteration",
+        "excess of the loss, relative to the start",
     )
     for excess in _excesses(results):
         relative = excess / excess[0] if len(excess) and excess[0] > 0.0 else excess
@@ -79,36 +85,36 @@ def _excesses(results: Results) -> list[FloatArray]:
 
 
 def _verdict(results: Results) -> str:
-    claim = "The reference claims order 2 (quadratic)."
+    claim = "the quadratic convergence (p = 2) that the authors of the method claim"
     fitted = [order_and_rate(excess) for excess in _excesses(results)]
     orders, rates = _finite(fitted)
     if not orders:
-        return f"Too few iterations came before the least loss to fit an order. {claim}"
+        return f"There are too few iterations to fit an order, so {claim} cannot be tested."
     median = float(np.median(orders))
-    agrees = "This agrees" if median > 1.8 else "This contradicts it"
+    agrees = "agrees with" if median > 1.8 else "contradicts"
     verdict = (
-        f"Fitted order of e(k+1) = c e(k)^p, e the loss above its least: median p = "
-        f"{median:.2f} (quartiles {np.quantile(orders, 0.25):.2f} and "
-        f"{np.quantile(orders, 0.75):.2f}) over {len(orders)} sets; an iteration leaves "
-        f"{np.median(rates):.0%} of e in the median. {claim} {agrees}."
+        f"The median order is p = {median:.2f} (quartiles {np.quantile(orders, 0.25):.2f} and "
+        f"{np.quantile(orders, 0.75):.2f}, {len(orders)} sets), which {agrees} {claim}. An "
+        f"iteration leaves {100 * np.median(rates):.0f} % of e by the median."
     )
     if median <= 1.8:
         verdict += (
-            " The steps are Gauss–Newton's on an energy that keeps residuals (a signed "
-            "distance of a bent curve is not linear in any face), and after each of them φ "
-            "becomes a signed distance again, which Newton's model does not know."
+            " There are two reasons. The steps are Gauss–Newton steps on an energy with non-zero "
+            "residuals, since the signed distance to a bent curve is not linear in any face. "
+            "After each step, φ becomes a signed distance again, which the Gauss–Newton model "
+            "does not include."
         )
     return verdict
 
 
 def _finite(fitted: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
-    """Orders and rates of the sets that have them."""
+    """Orders and rates of the sets for which they could be fitted."""
     kept = [each for each in fitted if np.isfinite(each[0])]
     return [order for order, _ in kept], [rate for _, rate in kept]
 
 
 def excess_to_least(losses: FloatArray) -> FloatArray:
-    """Losses above the least one, up to where they fall to the noise."""
+    """Excess of the losses over their minimum, up to where it falls to the noise level."""
     excess = losses - losses.min()
     small = np.flatnonzero(excess <= NOISE * excess[0])
     return excess[: small[0]] if len(small) else excess
@@ -117,7 +123,7 @@ def excess_to_least(losses: FloatArray) -> FloatArray:
 def order_and_rate(excess: FloatArray) -> tuple[float, float]:
     """Exponent p of e(k+1) = c e(k)^p by least squares, and the median of e(k+1) / e(k).
 
-    NaN where fewer than four falls are left.
+    Only decreases count; both values are NaN if there are fewer than four.
     """
     falling = (excess[1:] < excess[:-1]) if len(excess) > 1 else np.zeros(0, dtype=bool)
     if falling.sum() < 4:

@@ -1,4 +1,4 @@
-"""The yardstick of fairness against closed forms."""
+"""Tests the elastic curves, the reference for fairness, against closed forms."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from benchmarks.polylines import NearestPoints
 from nicmm_core import shapes
 
 CIRCLE = 4 * np.pi**2
-"""L ∮ κ² ds of a plane circle."""
+"""Bending L ∮ κ² ds of a circle in the plane."""
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,10 @@ def ball():
 
 
 def wavy_ring(mesh, axis, waves=5, height=0.2, points=300, controls=4):
-    """A closed curve that swings about the great circle across an axis and meets it at controls."""
+    """Closed curve that oscillates about a great circle and meets it at the control points.
+
+    The great circle is perpendicular to ``axis``.
+    """
     across = np.cross(axis, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     angle = np.arange(points) * 2 * np.pi / points
@@ -35,7 +38,7 @@ def test_points_on_a_great_circle_give_the_great_circle(ball):
 
     assert bending(ball, start) > CIRCLE
     assert result.energies[-1] < 0.01
-    assert bending(ball, result.curve) < 0.3  # what the facets of the ball leave
+    assert bending(ball, result.curve) < 0.3  # discretisation error of the facets
     assert np.abs(result.curve.points @ axis).max() < 5e-3
     assert result.curve.length == pytest.approx(2 * np.pi, rel=1e-2)
 
@@ -65,9 +68,9 @@ def test_energy_falls_and_control_points_stay(ball):
 
 
 def wavy_arc(mesh, place, controls, waves=6, height=0.1, points=241):
-    """An open curve that swings about an arc and meets it at evenly spaced controls.
+    """Open curve that oscillates about an arc and meets it at evenly spaced control points.
 
-    ``place(along, aside)`` gives positions for shares of the arc and offsets across it.
+    ``place(along, aside)`` returns positions for fractions of the arc and offsets across it.
     """
     along = np.linspace(0.0, 1.0, points)
     swing = np.sin(waves * np.pi * along) * np.sin((controls - 1) * np.pi * along)
@@ -85,7 +88,7 @@ def test_open_curve_on_a_great_circle_is_its_arc(ball):
     result = elastic_curve(ball, start)
     assert bending(ball, start) > 10.0
     assert result.energies[-1] < 0.01
-    assert bending(ball, result.curve) < 0.1  # what the facets of the ball leave
+    assert bending(ball, result.curve) < 0.1  # discretisation error of the facets
     assert not result.curve.closed
     assert np.abs(result.curve.points[:, 2]).max() < 5e-3
     assert result.curve.length == pytest.approx(2.5, rel=1e-2)
@@ -93,7 +96,7 @@ def test_open_curve_on_a_great_circle_is_its_arc(ball):
 
 @pytest.mark.parametrize("controls, share", [(5, 0.1), (9, 0.05)])
 def test_open_curve_through_points_on_an_arc_of_the_plane(controls, share):
-    """Nearly the arc, and a little fairer than it: it may straighten towards its ends."""
+    """The result is nearly the arc but slightly fairer, since it may straighten near its ends."""
     disc, angle = shapes.disc(24), 0.9 * np.pi
 
     def place(along, aside):
@@ -130,7 +133,7 @@ def test_bending_of_arcs_and_circles():
         ring = 0.5 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
         arc = NearestPoints(disc).curve(ring, np.zeros(0, dtype=np.int64), closed)
         for samples in (128, 240):
-            # The two ends are left out of an open curve's sum.
+            # The sum of an open curve leaves out its two ends.
             left_out = 0.0 if closed else 1.0 / (samples - 1)
             assert bending(disc, arc, samples) == pytest.approx(
                 angle**2 * (1.0 - left_out), rel=2e-3

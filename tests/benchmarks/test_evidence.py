@@ -1,4 +1,4 @@
-"""Documents are generated from data files, which say on which code they were measured."""
+"""Tests data files with their fingerprints, the generated documents, and the command `all`."""
 
 import importlib
 
@@ -13,7 +13,7 @@ RELAXATION = evidence.ROOT / "nicmm_core" / "relaxation" / "relaxing.py"
 
 
 def changed(path, extra):
-    """Reads files of the project, one of them with something more at its end."""
+    """Function that reads files of the project, one of them with an addition at its end."""
 
     def read(asked):
         return asked.read_bytes() + (extra.encode() if asked == path else b"")
@@ -22,7 +22,7 @@ def changed(path, extra):
 
 
 def affected(path, extra):
-    """Measurements whose fingerprint a change of a file alters."""
+    """Measurements whose fingerprint changes when a file gets an addition."""
     read = changed(path, extra)
     return {
         name
@@ -85,7 +85,7 @@ def test_weights_and_oracles_count():
 
 @pytest.fixture
 def kept(tmp_path, monkeypatch):
-    """An empty folder of data files, and two measurements."""
+    """An empty data folder, and only two measurements."""
     monkeypatch.setattr(evidence, "DATA", tmp_path)
     monkeypatch.setattr(command, "MEASUREMENTS", ("messes", "fuzz"))
     monkeypatch.setattr(command, "write", lambda: None)

@@ -1,4 +1,4 @@
-"""The network that is shown the neutral φ_fea everywhere."""
+"""Tests the network that sees the neutral value of φ_fea everywhere."""
 
 import numpy as np
 

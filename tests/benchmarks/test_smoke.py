@@ -1,4 +1,4 @@
-"""Every measurement runs at the smallest scale, keeps its data and writes its section from them."""
+"""Tests that every measurement runs at the smallest scale and writes its data and section."""
 
 import dataclasses
 import importlib
@@ -22,7 +22,7 @@ CORE = evidence.ROOT / "nicmm_core"
 
 @pytest.fixture(autouse=True)
 def short_finetuning(monkeypatch):
-    """Stop fine-tuning early wherever the default configuration is used: time is spent there."""
+    """Limit fine-tuning to a few iterations by default, because it takes most of the time."""
     defaults = tuple(
         FEW_ITERATIONS if field.name == "iterations" else field.default
         for field in dataclasses.fields(FinetuningConfig)
@@ -42,8 +42,7 @@ def quick_output(tmp_path, monkeypatch):
 
 @pytest.fixture
 def rooms_entered():
-    """Rooms of the core with functions that were called; modules that were only imported do not
-    count."""
+    """Folders of the core in which a function was called; imports alone do not count."""
     files = set()
 
     def note(frame, event, _argument):

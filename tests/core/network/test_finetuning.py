@@ -1,4 +1,4 @@
-"""Tests stage 2, fine-tuning: its result is never worse than its start, and it stops as specified."""
+"""Tests stage 2, fine-tuning: never worse than the start, and stopped by the right rule."""
 
 import numpy as np
 import pytest

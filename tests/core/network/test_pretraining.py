@@ -231,7 +231,7 @@ def test_kinds_are_mixed_by_their_shares(meshes, tmp_path, prepared):
 
 @pytest.mark.slow
 def test_energy_is_that_of_designs_and_knows_no_axes(meshes, tmp_path, prepared):
-    """An untrained network returns φ₀, or -φ₀ where the sign is reversed; the energy is the same."""
+    """An untrained network returns φ₀, or -φ₀ if the sign is reversed, with the same energy."""
     settings = replace(SETTINGS, learning_rate=0.0)
     losses = train(meshes, tmp_path / "weights.npz", settings)
     expected = [

@@ -167,7 +167,7 @@ class TestEveryOrder:
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_many_points(self, ball, closed):
-        """Twenty points back and forth; with legs found in this order the path was four times as long."""
+        """Twenty points back and forth; legs found in this order once made the path too long."""
         chosen = np.random.default_rng(20).choice(len(ball.vertices), 20, replace=False)
         points = locate_control_points(ball, chosen, closed)
         working, loop = build_initial_loop(ball, points, "given", None, closed)

@@ -28,7 +28,7 @@ def windings(curve):
 class TestWhichWay:
     @pytest.mark.slow
     def test_open_curve_goes_round_the_other_side_of_a_sphere(self, ball):
-        """Only the initial path decides between the shorter and the longer arc of a great circle."""
+        """Only the initial path decides between the two arcs of a great circle."""
         points = nearest_vertices(ball, circle([0.0, 2.0]))
         far = nearest_vertices(ball, circle([4.1]))
         near_side = design(ball, points, closed=False)
@@ -82,7 +82,7 @@ class TestWhichWay:
     @pytest.mark.slow
     @pytest.mark.parametrize("closed", [True, False])
     def test_on_the_boundary_they_steer_and_the_curve_keeps_off_it(self, flat_disc, closed):
-        """The via point is on the other side of the line between the two adjacent control points."""
+        """The via point is on the other side of the leg between its two control points."""
         rim = nearest_vertices(flat_disc, circle(np.pi / 3 * np.arange(6)))
         found = design(flat_disc, rim[[0, 2, 4]], closed=closed, via_points={0: rim[[3]]})
         assert_valid_design(flat_disc, found, flat_disc.vertices[rim[[0, 2, 4]]], closed)

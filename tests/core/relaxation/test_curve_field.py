@@ -1,4 +1,4 @@
-"""The level set of a curve against closed forms and brute force."""
+"""Tests the field of a curve against closed forms and brute force."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ ANGLES = np.arange(40) * 2 * np.pi / 40
 
 
 def brute_force(points, polyline):
-    """Distance in space of points to a closed polyline."""
+    """Distance in space from points to a closed polyline."""
     start, step = polyline[None], np.roll(polyline, -1, axis=0)[None] - polyline[None]
     offset = points[:, None] - start
     squared = np.maximum((step**2).sum(axis=2), 1e-300)
@@ -37,13 +37,13 @@ def test_in_the_plane_it_is_the_distance_to_a_circle_negative_inside(flat_disc, 
     field = curve_field(mesh, curve)
     centre = mesh.vertices - [0.02 * factor, 0, 0]
     expected = np.linalg.norm(centre, axis=1) - 0.6 * factor
-    clear = np.abs(expected) > 0.01 * factor  # the polygon has its sagitta inside the circle
+    clear = np.abs(expected) > 0.01 * factor  # the polygon lies inside the circle by its sagitta
     np.testing.assert_array_equal(np.sign(field)[clear], np.sign(expected)[clear])
     np.testing.assert_allclose(field, expected, rtol=0, atol=0.03 * factor)
 
 
 def test_in_the_plane_it_agrees_with_brute_force(flat_disc):
-    """Of any closed curve, if no wave has to go round: exact beside it, first order elsewhere."""
+    """Exact beside the curve and first-order elsewhere, if no wave has to turn a corner."""
     angle = ANGLES
     radius = 0.55 + 0.1 * np.sin(3 * angle)
     curve = curve_through(flat_disc, circle(angle) * radius[:, None], [0])
@@ -60,7 +60,7 @@ def test_in_the_plane_it_agrees_with_brute_force(flat_disc):
 
 
 def test_on_a_sphere_the_error_falls_with_the_mesh():
-    """A parallel at height 0.3: latitudes measure the distance; the cap is the smaller side."""
+    """For the parallel at height 0.3, the distance is a difference of latitudes."""
     errors = []
     for subdivisions in (2, 3, 4):
         mesh = shapes.sphere(subdivisions)
@@ -87,7 +87,7 @@ def vertices_on(mesh, curve):
 
 
 def parts_by_cutting(mesh, curve):
-    """Parts of the surface left when the faces that the curve passes are taken away."""
+    """Connected parts of the surface without the faces that the curve passes."""
     passed = np.isin(mesh.faces, vertices_on(mesh, curve)).any(axis=1)
     passed[curve.faces] = True
     free = np.flatnonzero(~passed)
@@ -112,7 +112,7 @@ def test_parts_of_a_body_that_the_curve_cuts_apart_have_different_signs(body, se
         assert len(np.unique(np.sign(field[here]))) == 1
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), len(mesh.vertices))
     assert 0.0 < area[field < 0.0].sum() <= area[field > 0.0].sum()
-    # The two ends of an edge that the curve crosses once lie on its two sides.
+    # The ends of an edge that the curve crosses once are on different sides.
     on_edge = (curve.barycentric > 0.0).sum(axis=1) == 2
     corners = mesh.faces[curve.faces[on_edge]]
     ends = np.sort(corners[curve.barycentric[on_edge] > 0.0].reshape(-1, 2), axis=1)
@@ -122,7 +122,7 @@ def test_parts_of_a_body_that_the_curve_cuts_apart_have_different_signs(body, se
 
 
 def test_a_curve_that_bounds_nothing_has_a_distance_without_sign(ring):
-    """Round the tube of a torus: |u| times the radius, on the outermost line."""
+    """For a meridian of a torus, the distance is |u| times the radius on the outermost parallel."""
     angle = ANGLES
     tube = np.stack([1 + 0.4 * np.cos(angle), 0.02 + 0 * angle, 0.4 * np.sin(angle)], axis=1)
     field = curve_field(ring, curve_through(ring, tube, [0]))
@@ -144,7 +144,7 @@ def test_the_core_of_a_moebius_strip_bounds_nothing():
 
 
 def test_twice_round_the_core_bounds_a_half_on_a_moebius_strip():
-    """A curve at 0.2 from the core closes after two turns and has the core on one side."""
+    """A curve beside the core closes after two turns and bounds the part that contains the core."""
     strip = shapes.moebius_strip(48, 7)
     u = np.arange(192) * 4 * np.pi / 192
     radius = 1.0 + 0.21 * np.cos(0.5 * u)

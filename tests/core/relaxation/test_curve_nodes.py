@@ -1,4 +1,4 @@
-"""Nodes of a curve and how the surface lies there, against closed forms and differences."""
+"""Tests the nodes of a curve and the surface at them, against closed forms and differences."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_turning_faces_over_changes_only_signs_of_normals(ball, flat_disc, seed)
 
 
 def test_normals_of_a_moebius_strip_are_across_its_rings_everywhere():
-    """At the seam as elsewhere: normal to the tangent of the ring through the vertex."""
+    """They are perpendicular to the rulings and to the core, also at the seam."""
     strip = shapes.moebius_strip(96, 4)
     normals = unsigned_normals(strip)
     ring = strip.vertices.reshape(96, 5, 3)
@@ -59,7 +59,7 @@ def test_steps_and_lengths_of_a_closed_and_an_open_polygon(flat_disc):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_sideways_of_a_circle_is_its_radius(flat_disc, closed):
-    """To the left of an anticlockwise circle: inwards. At open ends across the one step there."""
+    """The left of an anticlockwise circle is inwards; at open ends only one step counts."""
     nodes = circle_on_disc(flat_disc, closed=closed)
     radius = -nodes.positions / 0.6
     between = slice(None) if closed else slice(1, -1)
@@ -94,7 +94,7 @@ def test_without_a_map_every_place_has_importance_one(ball):
 
 
 def test_a_linear_map_is_read_exactly(body):
-    """φ_fea = 2 + g · x at every point of every face."""
+    """φ_fea is 2 + g · x at every point of every face."""
     gradient = np.array([0.1, -0.2, 0.3])
     surface = CurveSurface(body, unsigned_normals(body), 2.0 + body.vertices @ gradient, 1.0)
     nodes = nodes_at(surface, random_surface_points(body, 30, seed=4), True)
@@ -108,7 +108,7 @@ def test_derivatives_are_those_of_small_moves_inside_the_faces(body, factor):
     surface = CurveSurface(mesh, unsigned_normals(mesh), 1.0 + wave, 1.0)
     places = random_surface_points(mesh, 40, seed=7)
     nodes = nodes_at(surface, places, True)
-    # Sideways moves here have a part out of the plane of the face, which it does not see.
+    # Conormals have components out of the planes of the faces, which cannot be followed here.
     corner = mesh.vertices[mesh.faces[places.faces]]
     edges = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=2)
     change = np.einsum("nij,nj->ni", np.linalg.pinv(edges), nodes.conormals)
@@ -126,7 +126,7 @@ def test_derivatives_are_those_of_small_moves_inside_the_faces(body, factor):
 
 
 def test_on_a_sphere_normals_turn_with_the_move(ball):
-    """The derivative of x / |x| by a tangent move is that move."""
+    """The derivative of x / |x| in a tangent direction is that direction."""
     mesh = shapes.sphere(4)
     surface = CurveSurface(mesh, unsigned_normals(mesh))
     nodes = nodes_at(surface, points_near(mesh, circle(ANGLES) + [0, 0, 0.01]), True)

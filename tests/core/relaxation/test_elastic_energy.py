@@ -1,4 +1,4 @@
-"""The energy of a curve against closed forms, and its linearisation against differences."""
+"""Tests the energy of a curve against closed forms, and its linearisation against differences."""
 
 from dataclasses import replace
 
@@ -46,7 +46,7 @@ def wobble(count, factor=1.0):
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_a_circle_in_the_plane_has_its_own_energies(flat_disc, factor):
-    """∮ κ² ds = 2π / r and ∮ ds = 2π r, and without a map both terms weigh the same."""
+    """∮ κ² ds = 2π / r and ∮ ds = 2π r; without a map both terms are equal."""
     errors = []
     for count in (32, 128):
         radius = 0.6 * factor
@@ -74,7 +74,7 @@ def test_a_parallel_of_the_sphere_bends_by_the_tangent_of_its_latitude(latitude)
 
 
 def test_few_nodes_turn_in_the_tangent_plane():
-    """Three on a parallel: the angle there is that of the chords seen along the normal."""
+    """With three nodes on a parallel, the turning angle is that of the projected chords."""
     mesh = shapes.sphere(4)
     latitude = 0.5
     height = [0.0, 0.0, np.sin(latitude)]
@@ -88,13 +88,13 @@ def test_few_nodes_turn_in_the_tangent_plane():
 
 
 def test_the_core_of_a_moebius_strip_bends_across_its_seam_as_elsewhere():
-    """κ_g = cos(u / 2), as rulings make that angle with the radius: π for one turn."""
+    """Rulings make the angle u / 2 with the radius, so κ_g = cos(u / 2), and ∮ κ_g² ds = π."""
     core = nodes_on(shapes.moebius_strip(96, 7), circle(angles(96)))
     assert bending_energy(core) == pytest.approx(np.pi, rel=0.01)
 
 
 def test_an_open_arc_bends_between_its_ends_only(flat_disc):
-    """Half a circle bends by π / r, and a straight line not at all."""
+    """A half circle has the bending π / r, and a straight line has none."""
     arc = nodes_on(flat_disc, circle(np.linspace(0, np.pi, 65), 0.6), closed=False)
     assert bending_energy(arc) == pytest.approx(np.pi / 0.6 * 63 / 64, rel=2e-3)
     assert feature_energy(arc) == pytest.approx(np.pi * 0.6, rel=1e-3)
@@ -105,7 +105,7 @@ def test_an_open_arc_bends_between_its_ends_only(flat_disc):
 
 
 def test_the_map_weighs_length(flat_disc):
-    """∮ (2 + x)² ds round a circle about the origin is (4 + r²/2) 2π r."""
+    """∮ (2 + x)² ds along a circle about the origin is (4 + r²/2) 2π r."""
     mapped = 2.0 + flat_disc.vertices[:, 0]
     nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=mapped)
     assert feature_energy(nodes) == pytest.approx(4.18 * 2 * np.pi * 0.6, rel=2e-3)
@@ -123,7 +123,7 @@ def test_the_energy_has_no_first_node_and_no_direction(flat_disc, count):
 
 
 def test_the_energy_does_not_depend_on_numbers_orientation_or_pose(body):
-    """Positive on a surface that bends, whatever the orientation of its faces."""
+    """Tested on a curved surface, also with all faces reversed."""
     turn = Rotation.from_rotvec([0.3, -1.0, 2.0])
     posed = nicmm.Mesh(turn.apply(body.vertices.copy()), body.faces)
     section = body.vertices[np.argsort(body.vertices[:, 0])[::30]]
@@ -173,7 +173,7 @@ def test_a_taut_curve_has_more_tension_and_the_same_map(flat_disc, mapped):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
-    """The curve's energy rises by a constant, and no move changes that."""
+    """The map adds a constant to the energy, and neither slope nor matrix changes."""
     surface = surface_of(flat_disc, np.ones(len(flat_disc.vertices)), 17.0)
     nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), closed)
     plain = balance(surface_of(flat_disc), nodes, 1.0, apart=False)
@@ -189,7 +189,7 @@ def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
 
 
 def test_a_lane_does_not_pay_for_length_in_it(flat_disc):
-    """It would buckle: here a straight line costs less than a wavy one, all in one lane."""
+    """Otherwise curves would buckle: in a lane, a straight line must cost less than a wavy one."""
     lane = np.full(len(flat_disc.vertices), 0.1)
     x = np.linspace(-0.5, 0.5, 40)
     straight, wavy = (
@@ -205,7 +205,7 @@ def test_a_lane_does_not_pay_for_length_in_it(flat_disc):
 
 
 def test_an_obstacle_adds_to_the_tension(flat_disc):
-    """Where φ_fea is 2, length costs τ + 3 τ_fea."""
+    """Where φ_fea is 2, (φ_fea² - 1) τ_fea = 3 τ_fea is added to the tension τ."""
     twos = np.full(len(flat_disc.vertices), 2.0)
     nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=twos)
     weights = balance(surface_of(flat_disc, twos, 5.0), nodes, 1.0, apart=False)
@@ -214,7 +214,7 @@ def test_an_obstacle_adds_to_the_tension(flat_disc):
 
 
 def near_strands(count=60):
-    """A closed loop, long and narrow, whose two sides are less than a clearance apart."""
+    """A long, narrow loop whose two sides are less than the clearance apart."""
     x = np.linspace(-0.6, 0.6, count)
     side = np.stack([x, 0.004 * np.sin(9 * x), 0 * x], axis=1)
     tip = np.array([[0.615, 0.0, 0.0]])
@@ -237,7 +237,7 @@ CASES = {
 @pytest.mark.parametrize("mapped", [False, True])
 def test_the_slope_is_half_the_derivative_by_moves_on_the_surface(points, closed, weights, mapped):
     mesh = shapes.disc(7)
-    # Lanes and obstacles both.
+    # The map has lanes and obstacles.
     feature_map = 1.0 + mesh.vertices[:, 0] - 0.4 * mesh.vertices[:, 1] if mapped else None
     surface = surface_of(mesh, feature_map, 1.0)
     nodes = nodes_at(surface, points_near(mesh, points()), closed)
@@ -255,14 +255,14 @@ def test_the_slope_is_half_the_derivative_by_moves_on_the_surface(points, closed
         )
         change = elastic_energy(ahead, weights) - elastic_energy(behind, weights)
         expected[node] = 0.5 * change / (2.0 * step)
-    # The mean step, which contact compares with, knows of single nodes only at sharp tips.
+    # Contact depends on the mean step, which a single node changes noticeably only at sharp tips.
     compared = (np.abs(nodes.positions[:, 0]) < 0.55) | (weights.contact == 0.0)
     scale = np.abs(expected[compared]).max()
     np.testing.assert_allclose(slope[compared], expected[compared], rtol=0, atol=0.01 * scale)
 
 
 def test_on_a_sphere_the_slope_is_nearly_that_of_the_energy():
-    """Within what the mesh differs from the smooth surface that its normals belong to."""
+    """Up to the difference between the mesh and the smooth surface of its normals."""
     mesh = shapes.sphere(4)
     surface = surface_of(mesh)
     angle = angles(60)
@@ -284,7 +284,7 @@ def test_on_a_sphere_the_slope_is_nearly_that_of_the_energy():
 
 
 def dense(system):
-    """The matrix of the bands."""
+    """Dense matrix of a system."""
     n = system.bands.shape[1]
     matrix = np.zeros((n, n))
     for i in range(n):
@@ -326,7 +326,7 @@ def test_a_step_solves_the_dense_system_of_the_free_nodes(count, held):
 @pytest.mark.parametrize("held", [(), (0, 1), (2, 5)])
 @pytest.mark.parametrize("count", [8, 41])
 def test_with_contact_a_step_solves_the_dense_system_too(count, held):
-    """Of pairs far apart along the curve, which no band holds."""
+    """Contact couples pairs that are far apart along the curve and so outside the bands."""
     generator = np.random.default_rng(count)
     bands = np.abs(generator.normal(size=(3, count))) + [[9.0], [0.0], [0.0]]
     pairs = np.array([[0, 4], [5, 1], [2, 6]])
@@ -347,7 +347,7 @@ def test_with_contact_a_step_solves_the_dense_system_too(count, held):
 
 @pytest.mark.parametrize("mapped", [False, True])
 def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
-    """Strands in contact among them; the rest is of second order."""
+    """Some strands are in contact; the remaining difference is of second order."""
     feature_map = 1.5 + flat_disc.vertices[:, 0] if mapped else None
     surface = surface_of(flat_disc, feature_map, 1.0)
     nodes = nodes_on(flat_disc, near_strands(), feature_map=feature_map)
@@ -366,7 +366,7 @@ def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_faces_turned_over_only_turn_the_moves_of_their_nodes(flat_disc, seed):
-    """Matrix and slope are the same but for the signs of nodes whose left is the other side."""
+    """Matrix and slope only change sign at nodes whose left and right are exchanged."""
     mesh = flipped(flat_disc, seed)
     weights = Balance(3.0, 0.0)
     here, there = nodes_on(flat_disc, wobble(41)), nodes_on(mesh, wobble(41))
@@ -392,7 +392,7 @@ def test_the_matrix_is_positive_and_more_damping_takes_shorter_steps(flat_disc, 
 
 
 def test_a_step_lowers_the_energy_to_second_order(flat_disc):
-    """Of a curve near rest: an arc in the plane, its ends held, pulled straight at once."""
+    """For a curve near its minimum, a flat arc with fixed ends, one step makes it straight."""
     surface = surface_of(flat_disc)
     x = np.linspace(-0.5, 0.5, 40)
     nodes = nodes_on(flat_disc, np.stack([x, 0.02 * np.cos(np.pi * x), 0 * x], axis=1), False)

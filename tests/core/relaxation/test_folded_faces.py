@@ -1,4 +1,4 @@
-"""Faces that are folded back over others, in the plane, where every curve is known."""
+"""Tests faces that are folded back over others, in the plane, where all curves are known."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ STEP = 1.0 / CELLS
 
 
 def folded(mesh: nicmm.Mesh, column: int = 8, by: float = 1.6) -> nicmm.Mesh:
-    """A square whose vertices of one column have been pushed beyond the next one."""
+    """A square in which one column of vertices has been pushed beyond the next one."""
     vertices = mesh.vertices.copy()
     vertices[np.isclose(vertices[:, 0], column * STEP), 0] += by * STEP
     return nicmm.Mesh(vertices, mesh.faces)
@@ -38,7 +38,7 @@ def surface(square):
 
 
 def straight_across(square, mesh, height=0.53):
-    """The same trace over the same faces, straight in both meshes; it runs backward in the fold."""
+    """A straight curve over the same faces as in the square; in the fold it runs backwards."""
     along = np.linspace(0.1, 0.9, 60)
     positions = np.stack([along, np.full(60, height), np.zeros(60)], axis=1)
     curve = curve_through(square, positions, [0, 59], closed=False)
@@ -95,7 +95,7 @@ def test_a_trace_over_a_fold_stays_straight(square, surface):
 
 
 def test_a_long_way_without_folds_is_lost_though_the_mesh_has_some():
-    """A fold lengthens a trace, which is allowed there only and not around the rim of a sheet."""
+    """Longer traces are accepted only over folds, and not around the rim of a sheet."""
     plate = shapes.cube(8)
     low = plate.vertices * [1.0, 1.0, 0.01]
     mesh = nicmm.Mesh(low, plate.faces)
@@ -108,7 +108,7 @@ def test_a_long_way_without_folds_is_lost_though_the_mesh_has_some():
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.5, 4.0])
 def test_a_move_that_comes_to_a_fold_ends_behind_it(surface, distance):
-    """Points move by as much in space as they do beside a fold."""
+    """Points move by the same distance in space as they would without the fold."""
     mesh = surface.mesh
     height = np.linspace(0.2, 0.8, 9)
     start = points_near(mesh, np.stack([np.full(9, 0.45), height, 0.0 * height], axis=1))
@@ -136,7 +136,7 @@ def test_a_move_to_and_fro_over_a_fold_comes_back(square, surface):
 @pytest.mark.parametrize("rings", [16, 32])
 @pytest.mark.parametrize("seed", range(4))
 def test_on_a_degraded_disc_it_is_the_curve_of_the_clean_one(rings, seed):
-    """Vertices that are pushed about within a plane, some over edges, leave it that plane."""
+    """Displacing vertices within a plane, even across edges, does not change the surface."""
     clean = shapes.disc(rings)
     generator = np.random.default_rng(seed)
     angles = np.array([0.0, 1.5, 3.1, 4.6]) + generator.uniform(-0.3, 0.3, 4)

@@ -1,4 +1,4 @@
-"""Polylines with nodes: they stay on the mesh, in order, through their points, and simple."""
+"""Tests that noded curves stay simple, on the mesh, and through their points in order."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def ring_on(mesh, closed=True, radius=0.6):
 
 
 def distance_to(points, polyline, closed):
-    """Greatest distance of points to a polyline."""
+    """Greatest distance from points to a polyline."""
     end = np.roll(polyline, -1, axis=0)[None] if closed else polyline[None, 1:]
     start = polyline[None] if closed else polyline[None, :-1]
     step, offset = end - start, points[:, None] - start
@@ -96,12 +96,12 @@ def test_control_points_at_vertices_are_there_once(ball):
 
 
 def test_nodes_exactly_at_points_of_edges_keep_the_order():
-    """Sides of a square in a grid, whose edges they cross just where nodes are to be."""
+    """A square on a grid whose sides cross mesh edges exactly where nodes are placed."""
     mesh = grid(8)
     low, high = 0.203125, 0.703125
     corners = np.array([[low, 0.1875], [high, 0.1875], [high, 0.6875], [low, 0.6875]])
     curve = curve_through(mesh, np.pad(corners, ((0, 0), (0, 1))), np.arange(4))
-    # Inside a face, on its diagonal, at whole coordinates and so on: no rounding anywhere.
+    # Nodes are inside faces, on diagonals and at vertices of the grid, without any rounding.
     for count in (32, 64, 128, 256):
         result = noded_curve(surface_of(mesh), curve, count).surface_curve(mesh)
         assert_valid_curve(mesh, result, curve.points[curve.control_index])
@@ -144,7 +144,7 @@ def test_nodes_of_a_circle_move_sideways_to_a_smaller_one(flat_disc, factor):
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", [None, 3])
 def test_a_traced_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed):
-    """Round a section of the body, every node moved a little to its own side."""
+    """On a section of the body, with nodes moved slightly to either side."""
     mesh = body if seed is None else flipped(body, seed)
     surface = surface_of(mesh)
     exact = noded_curve(surface, section(mesh, closed), 80)
@@ -162,7 +162,7 @@ def test_a_traced_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed
 
 
 def section(mesh, closed=True):
-    """A level set of a coordinate, as a design finds it."""
+    """A curve round the body near a level set of the x coordinate."""
     x = mesh.vertices[:, 0]
     points = [int(np.argmin(np.abs(x - x.mean()) + 10 * side)) for side in sides(mesh)]
     design = nicmm.design_curve(mesh, points, closed=closed, order="shortest", method="variational")
@@ -170,7 +170,7 @@ def section(mesh, closed=True):
 
 
 def sides(mesh):
-    """Where vertices do not lie on each of three sides."""
+    """Angle of each vertex from three directions around the x axis."""
     y = mesh.vertices[:, 1:] - mesh.vertices[:, 1:].mean(axis=0)
     angle = np.arctan2(y[:, 1], y[:, 0])
     return [np.abs(np.angle(np.exp(1j * (angle - k * 2 * np.pi / 3)))) for k in range(3)]
@@ -189,7 +189,7 @@ def test_unmoved_nodes_give_an_exact_curve_again_of_no_more_length(ball):
 @settings(max_examples=15)
 @given(st.integers(0, 10_000))
 def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_disc, seed):
-    """Random moves of up to half the radius, where traces cross everywhere."""
+    """Random moves of up to about half the radius, after which traces cross everywhere."""
     generator = np.random.default_rng(seed)
     surface = surface_of(flat_disc)
     exact = noded_curve(surface, ring_on(flat_disc), 60)
@@ -221,12 +221,12 @@ def test_moves_that_cross_nothing_are_all_made(flat_disc):
 
 
 def test_only_the_nodes_that_would_cross_stay(flat_disc):
-    """Far from the crossing nodes do move."""
+    """Nodes far from the crossing do move."""
     surface = surface_of(flat_disc)
     exact = noded_curve(surface, ring_on(flat_disc), 60)
     here = exact.nodes.positions
     step = np.full(len(here), 0.02)
-    step[here[:, 0] > 0.5] = 1.19  # over to the other side
+    step[here[:, 0] > 0.5] = 1.19  # to the other side of the ring
     step[exact.control_nodes] = 0.0
     nodes, _, _ = moved_along_conormals(surface, exact.nodes, step)
     assert not is_simple(surface, traced_through(surface, exact, nodes))
@@ -236,7 +236,7 @@ def test_only_the_nodes_that_would_cross_stay(flat_disc):
 
 
 def test_nodes_too_far_apart_for_a_straight_way_are_lost_or_stay():
-    """On both sides of a hole in the disc."""
+    """Two consecutive nodes are on opposite sides of a hole in the disc."""
     mesh = shapes.annulus(12, 0.4)
     surface = surface_of(mesh)
     exact = noded_curve(surface, ring_on(mesh), 60)
@@ -261,7 +261,7 @@ def test_a_curve_that_crosses_itself_is_not_simple(flat_disc):
 
 
 def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
-    """Whatever the order of the corners there."""
+    """For any order of corners in the other face."""
     mesh = flipped(ball, 2)
     face = np.arange(len(mesh.faces))
     for side in range(3):
@@ -274,7 +274,7 @@ def test_points_of_an_edge_and_a_vertex_are_the_same_from_other_faces(ball):
 
 
 def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(flat_disc):
-    """∮ κ² ds of a circle is 2π / r; a polygon has more than twice that."""
+    """∮ κ² ds of a circle is 2π / r; at the finer nodes, the polygon has more than twice that."""
     surface = surface_of(flat_disc)
     ring = noded_curve(surface, ring_on(flat_disc), 48)
     polygon = traced_through(surface, ring, ring.nodes)
@@ -288,7 +288,7 @@ def test_finer_nodes_on_a_polygon_are_rounded_to_the_circle_through_its_corners(
 
 
 def test_a_node_close_beside_an_edge_makes_no_short_segment(flat_disc):
-    """Nodes are moved along the curve to a hundredth of a step behind the crossing before them."""
+    """Nodes are moved to a hundredth of a step behind the previous crossing of the curve."""
     surface = surface_of(flat_disc)
     ring = noded_curve(surface, ring_on(flat_disc), 64)
     ring = traced_through(surface, ring, ring.nodes)

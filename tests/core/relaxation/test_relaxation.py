@@ -1,4 +1,4 @@
-"""Curves converge: to known shapes, simple, through their points, and never worse."""
+"""Tests the relaxation: known shapes, simple curves through their points, decreasing energy."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ DEFAULT = RelaxationConfig()
 
 
 def relaxed(mesh, curve, smoothness=1.0, config=DEFAULT, watch=None, feature=None, weight=0.0):
-    """A relaxed curve, which is valid whatever else is asked of it."""
+    """Relax a curve and assert that the result is valid."""
     surface = CurveSurface(mesh, unsigned_normals(mesh), feature, weight)
     result = relax(surface, curve, smoothness, config, watch)
     controls = curve.points[curve.control_index]
@@ -47,7 +47,7 @@ def relaxed(mesh, curve, smoothness=1.0, config=DEFAULT, watch=None, feature=Non
 
 
 def wave_on_equator(mesh, waves=5, height=0.25):
-    """A wavy loop on the sphere that passes the equator at its control points."""
+    """A wavy loop on the sphere with its control points on the equator."""
     points = circle(ANGLES)
     points[:, 2] = height * np.sin(waves * ANGLES) * np.abs(np.sin(waves * ANGLES / 2))
     points[CONTROLS, 2] = 1e-3
@@ -55,14 +55,14 @@ def wave_on_equator(mesh, waves=5, height=0.25):
 
 
 def star(mesh, factor=1.0, wave=0.2, controls=CONTROLS):
-    """A loop in the plane that swings about the circle on which its control points lie."""
+    """A loop in the plane that oscillates about the circle through its control points."""
     radius = 0.6 * factor * (1.0 + wave * np.sin(7 * ANGLES))
     radius[controls] = 0.6 * factor
     return curve_through(mesh, circle(ANGLES) * radius[:, None], controls)
 
 
 def bow(mesh):
-    """A simple loop whose points lie so that straight legs between them would cross."""
+    """A simple loop through points whose straight connections would cross."""
     corners = [(-0.5, -0.3), (0.5, 0.3), (0.5, -0.3), (0.1, -0.6), (-0.6, -0.6), (-0.75, 0.0)]
     corners = np.array([*corners, (-0.5, 0.3), (-0.6, 0.0)])
     line = np.concatenate([corners, corners[:1]])
@@ -73,12 +73,12 @@ def bow(mesh):
 
 
 def straight_bow(mesh):
-    """The same points joined by straight legs: an eight."""
+    """The same points joined by straight legs, which form a figure of eight."""
     return curve_through(mesh, bow(mesh).points[bow(mesh).control_index], np.arange(4))
 
 
 def measured(curve, normals):
-    """∮ κ_g² ds from evenly spaced points, which the relaxation does not know of."""
+    """∮ κ_g² ds from evenly spaced points, independent of the nodes of the relaxation."""
     points, segment = resample(curve.points, 200, curve.closed)
     curvature = geodesic_curvature(points, normals(points), curve.closed)
     return (curvature**2).sum() * curve.length / 200
@@ -93,7 +93,7 @@ def outwards(points):
 
 
 def potential(bending, length, smoothness=1.0):
-    """What steps with the tension (2π / L)² / smoothness lower, as d(1 / L) = -dL / L²."""
+    """Function that steps with the tension (2π / L)² / smoothness decrease; d(1 / L) = -dL / L²."""
     return bending - (2.0 * np.pi) ** 2 / (smoothness * length)
 
 
@@ -110,7 +110,7 @@ def test_through_points_of_a_great_circle_it_is_that_circle(ball):
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
 def test_through_points_of_a_circle_it_bends_hardly_more_than_the_circle(flat_disc, factor):
-    """Closed elasticae of minimal bending with the length of a circle are circles."""
+    """Among closed curves of a given length, circles have minimal bending."""
     mesh = scaled(flat_disc, factor)
     result = relaxed(mesh, star(mesh, factor))
     assert result.status == Status.CONVERGED
@@ -124,7 +124,7 @@ def test_through_points_of_a_circle_it_bends_hardly_more_than_the_circle(flat_di
 
 
 def test_what_it_reports_is_that_of_its_curve(flat_disc):
-    """Without a map ∮ φ_fea² ds is the length."""
+    """Without a map, ∮ φ_fea² ds is the length."""
     result = relaxed(flat_disc, star(flat_disc, controls=[0, 13, 22, 41]))
     assert result.feature == pytest.approx(result.curve.length, rel=2e-3)
     assert measured(result.curve, upwards) == pytest.approx(result.bending, rel=0.05)
@@ -163,7 +163,7 @@ def test_on_a_sphere_with_faces_turned_over_it_is_the_same_curve(ball):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_on_a_moebius_strip_a_loop_comes_to_rest_across_the_seam(seed):
-    """Beside its core, which bends by π, and at the same place if other faces are turned over."""
+    """It ends near the core, whose bending is π, for any orientation of the faces."""
     strip = shapes.moebius_strip(96, 7)
     swing = 0.2 * np.sin(2.5 * ANGLES) * np.abs(np.sin(2.5 * ANGLES))
     radius = 1.0 + swing * np.cos(0.5 * ANGLES)
@@ -179,7 +179,7 @@ def test_on_a_moebius_strip_a_loop_comes_to_rest_across_the_seam(seed):
 
 
 def test_an_open_curve_between_two_points_is_straight(flat_disc):
-    """Natural ends: nothing bends, whatever the start."""
+    """With natural ends nothing bends, whatever the start."""
     x = np.linspace(-0.5, 0.6, 30)
     start = curve_through(flat_disc, np.stack([x, 0.3 * np.cos(3 * x), 0 * x], 1), [0, 29], False)
     result = relaxed(flat_disc, start)
@@ -189,7 +189,7 @@ def test_an_open_curve_between_two_points_is_straight(flat_disc):
 
 
 def test_an_open_curve_through_three_points_ends_without_curvature(flat_disc):
-    """An elastica under tension: curvature falls from the middle point to none at both ends."""
+    """In an elastica under tension, curvature falls from the middle point to zero at both ends."""
     corners = np.array([[-0.6, -0.2], [-0.3, 0.05], [0.0, 0.3], [0.3, 0.05], [0.6, -0.2]])
     start = curve_through(flat_disc, np.pad(corners, ((0, 0), (0, 1))), [0, 2, 4], False)
     result = relaxed(flat_disc, start)
@@ -201,7 +201,7 @@ def test_an_open_curve_through_three_points_ends_without_curvature(flat_disc):
 
 @pytest.mark.slow
 def test_legs_along_edges_and_through_vertices_are_no_trouble():
-    """A square whose corners are vertices of a grid."""
+    """The points are the corners of a square and vertices of a grid."""
     mesh = grid(8)
     square = 0.25 + 0.5 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     vertices = [int(np.argmin(np.linalg.norm(mesh.vertices[:, :2] - c, axis=1))) for c in square]
@@ -212,7 +212,7 @@ def test_legs_along_edges_and_through_vertices_are_no_trouble():
 
 
 def states(mesh, curve, config=DEFAULT, smoothness=1.0):
-    """The nodes after every iteration."""
+    """Relaxed curve, and the nodes after every iteration."""
     seen = []
 
     def watch(done, state):
@@ -224,7 +224,7 @@ def states(mesh, curve, config=DEFAULT, smoothness=1.0):
 
 @pytest.mark.parametrize("smoothness", [0.3, 1.0, 5.0])
 def test_the_energy_never_rises(flat_disc, smoothness):
-    """Without respacing nodes, which moves the places where they sample the curve."""
+    """Without respacing, which would change the sampling of the curve."""
     config = RelaxationConfig(levels=(128,), spacing_ratio=np.inf)
     _, seen = states(flat_disc, star(flat_disc), config, smoothness)
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
@@ -238,7 +238,7 @@ def test_the_energy_never_rises(flat_disc, smoothness):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_from_any_start_it_ends_better(ball, seed):
-    """Random loops round the sphere, measured by the polyline and not by nodes."""
+    """Random loops round the sphere, measured on the polyline and not at nodes."""
     generator = np.random.default_rng(seed)
     a, b = generator.normal(scale=0.12, size=(2, 5, 1))
     wave = np.arange(2, 7)[:, None] * ANGLES
@@ -262,7 +262,7 @@ def test_more_smoothness_gives_no_more_bending_and_no_shorter_curve(flat_disc):
 
 
 def test_obstacles_are_avoided(flat_disc):
-    """A hill on one side of the straight path: the curve leaves it and ∮ φ_fea² ds falls."""
+    """With a hill beside the straight path, the curve moves away and ∮ φ_fea² ds decreases."""
     hill = 1.0 + 4.0 * np.exp(-np.sum((flat_disc.vertices[:, :2] - [0, -0.05]) ** 2, 1) / 0.02)
     x = np.linspace(-0.6, 0.6, 30)
     start = curve_through(flat_disc, np.stack([x, 0.01 + 0 * x, 0 * x], axis=1), [0, 29], False)
@@ -278,7 +278,7 @@ def test_obstacles_are_avoided(flat_disc):
 
 @pytest.mark.slow
 def test_a_flat_map_is_a_tension(flat_disc):
-    """Of (φ_fea² - 1) τ_fea, so φ_fea = 1 is none; 3 times a weight is 3/4 of four times that."""
+    """A constant map is a tension of (φ_fea² - 1) τ_fea; 3 τ_fea equals 3/4 of 4 τ_fea."""
     start = star(flat_disc, controls=[0, 13, 22, 41])
     flat = np.ones(len(flat_disc.vertices))
     free, neutral, one = (
@@ -295,7 +295,7 @@ def test_a_flat_map_is_a_tension(flat_disc):
 
 
 def test_a_lane_is_followed_and_left_smoothly(flat_disc):
-    """A lane beside the middle of a straight path: the curve lies in it there and nowhere else."""
+    """With a lane beside the middle of a straight path, the curve follows it only there."""
     x, y, _ = flat_disc.vertices.T
     beyond = np.maximum(np.abs(x) - 0.25, 0.0)
     lane = np.sqrt(1.0 - np.exp(-((y - 0.08) ** 2 + beyond**2) / (2 * 0.05**2)))
@@ -314,13 +314,13 @@ def test_a_lane_is_followed_and_left_smoothly(flat_disc):
 
 @pytest.mark.parametrize("length", [0.05, 0.4, 1.2])
 def test_a_lane_is_followed_by_short_curves_too(length):
-    """Its width and its distance are shares of the curve's length, its weight is the surface's."""
+    """Width and distance of the lane scale with the curve; the weight does not."""
     mesh = scaled(shapes.disc(24), length)
     x, y, _ = mesh.vertices.T / length
     lane = np.sqrt(1.0 - np.exp(-((y - 0.06) ** 2) / (2 * 0.08**2)))
     along = length * np.linspace(-0.5, 0.5, 40)
     start = curve_through(mesh, np.stack([along, 0 * along, 0 * along], axis=1), [0, 39], False)
-    # τ_fea of a surface whose area is 1, which is where the three curves lie.
+    # The same τ_fea for all three curves, as if they lay on one surface of area 1.
     result = relaxed(mesh, start, feature=lane, weight=FEATURE_TENSION, config=GUIDED)
     points = result.curve.points / length
     inside = np.abs(points[:, 0]) < 0.2
@@ -328,7 +328,7 @@ def test_a_lane_is_followed_by_short_curves_too(length):
 
 
 def test_a_fold_of_the_start_is_pulled_straight(flat_disc):
-    """With few nodes and no tension to speak of it would grow to a bow, at rest but far off."""
+    """With few nodes and almost no tension it would grow into a bow, another local minimum."""
     _, y, _ = flat_disc.vertices.T
     lane = np.sqrt(1.0 - np.exp(-(y**2) / (2 * 0.04**2)))
     fold = [(-0.4, 0.0), (0.02, 0.0), (0.02, 0.08), (-0.02, 0.08), (-0.02, 0.04)]
@@ -347,7 +347,7 @@ def test_a_fold_of_the_start_is_pulled_straight(flat_disc):
 
 
 def test_strands_that_would_cross_stay_apart(flat_disc):
-    """The eight through these points would bend less, but crosses itself."""
+    """The figure of eight through these points would bend less, but it crosses itself."""
     start = bow(flat_disc)
     polyline = straight_bow(flat_disc)
     pairs = crossing_segments(
@@ -361,13 +361,13 @@ def test_strands_that_would_cross_stay_apart(flat_disc):
     gap = np.linalg.norm(points[:, None] - points, axis=2)
     along = np.abs(np.arange(300)[:, None] - np.arange(300))
     along = np.minimum(along, 300 - along)
-    # Two mean steps of the last level, less what a contact term of finite strength allows.
+    # The clearance is two mean steps of the last level, but contact is not infinitely stiff.
     assert gap[along > 25].min() > result.curve.length / 512
 
 
 @pytest.mark.parametrize("after", [0, 3, 20])
 def test_a_cancelled_relaxation_gives_a_valid_curve(flat_disc, after):
-    """Also in the midst of strands that pass through each other."""
+    """Also while strands would pass through each other."""
     for start in (star(flat_disc), bow(flat_disc)):
         calls = []
 
@@ -391,12 +391,12 @@ def test_the_cap_is_kept(flat_disc, cap):
     assert result.status == Status.ITERATION_LIMIT
     assert result.iterations == cap
     assert len(seen) <= cap
-    # Two attempts where strands cross: one that may, one that may not.
+    # If strands would cross there are two attempts: with crossings allowed, and without.
     assert relaxed(flat_disc, bow(flat_disc), config=config).iterations <= 2 * cap
 
 
 def test_a_coil_round_a_thin_ring_stays_on_it():
-    """With few nodes straight traces around the tube fail; a level of more nodes takes over."""
+    """With few nodes, straight traces around the tube fail, and a level with more nodes is used."""
     thin = shapes.torus(major=1.0, minor=0.05, around=96, across=8)
     angle = np.arange(600) * 2 * np.pi / 600
     radius = 1 + 0.05 * np.cos(40 * angle)
@@ -407,7 +407,7 @@ def test_a_coil_round_a_thin_ring_stays_on_it():
 
 
 def turns(points):
-    """How often a closed polyline goes round the tube of a torus with radius 1."""
+    """Winding number of a closed polyline around the tube of a torus with major radius 1."""
     tube = np.arctan2(points[:, 2], np.linalg.norm(points[:, :2], axis=1) - 1.0)
     change = np.angle(np.exp(1j * (np.roll(tube, -1) - tube)))
     return round(change.sum() / (2 * np.pi))
@@ -425,7 +425,7 @@ def test_more_levels_end_at_the_same_curve(flat_disc):
 
 @pytest.mark.slow
 def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
-    """Exactly, each as it was given."""
+    """Each control point is kept exactly."""
     near = points_near(ball, [[0.2, 0.1, 1.0]])
     face, other = near.faces[0], np.argmin(ball.vertices[ball.faces].mean(axis=1)[:, 2])
     points = nicmm.SurfacePoints(
@@ -447,7 +447,7 @@ def test_work_is_bounded_by_moves(flat_disc, work):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [41, 197])
 def test_a_curve_on_a_mess_ends_within_its_work(number, monkeypatch):
-    """Its nodes are respaced repeatedly, and steps over folds gain less than that costs."""
+    """Repeated respacing costs more energy here than steps over folds gain."""
     moves = []
     step = levenberg_marquardt.moved_along_conormals
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Several curves in one set of arrays: the same energies, steps and results as one by one."""
+"""Tests that curves in one set of arrays have the energies, steps and results of single curves."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def surface():
 
 
 def rings(surface, closed=True):
-    """Three wavy circles of latitude as one set of nodes, and each alone."""
+    """Three wavy circles of latitude, as one set of nodes and one by one."""
     angle = np.arange(SIZE) * 2.0 * np.pi / (SIZE if closed else 1.3 * SIZE)
     places = []
     for height, waves in ((0.1, 2), (-0.3, 3), (0.5, 0)):
@@ -64,7 +64,7 @@ def test_energies_and_steps_are_those_of_each_curve(surface, closed, mapped):
 
 
 def test_contact_is_within_each_curve(surface):
-    """Curves at the same place do not repel each other."""
+    """Different curves do not repel each other, even in the same place."""
     _, alone = rings(surface)
     twice = nodes_at(surface, joined([alone[0].places, alone[0].places]), True, 2)
     weights = balance(surface, twice, 1.0, apart=True)
@@ -120,7 +120,7 @@ def test_a_curve_that_crosses_itself_is_told(surface):
 
 
 def test_a_curve_without_length_does_not_disturb_the_others(surface):
-    """Its system is singular."""
+    """The system of a curve without length is singular."""
     angle = 4.0 * np.pi * np.arange(SIZE) / SIZE
     twice = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * np.sin(0.5 * angle + 0.3)])
     close = points_near(surface.mesh, twice)

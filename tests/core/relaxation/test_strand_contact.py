@@ -1,4 +1,4 @@
-"""Contacts of strands against closed forms and differences."""
+"""Tests contacts of strands against closed forms and differences."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ STEP = 0.02
 
 
 def seen_by_nodes(nodes):
-    """Contacts as each of the two nodes of a pair sees them."""
+    """Contacts listed once for each of the two nodes of a pair."""
     found = contacts_between(nodes)
     return SimpleNamespace(
         node=found.pairs.T.ravel(),
@@ -25,7 +25,7 @@ def seen_by_nodes(nodes):
 
 
 def lanes(mesh, gap, factor=1.0, closed=False):
-    """Out along y = 0, an arc, and back along y = gap, thirty nodes in each direction."""
+    """Nodes along y = 0, round a turn, and back along y = gap; thirty in each direction."""
     x = STEP * np.arange(-15, 16)
     bow = 2.0 * STEP * np.arange(1, 8)
     there = np.stack([x, 0 * x], axis=1)
@@ -43,12 +43,12 @@ def test_the_overlap_of_two_lanes_is_what_lacks_of_the_clearance(flat_disc, fact
     nodes = lanes(mesh, STEP, factor)
     contacts = seen_by_nodes(nodes)
     clearance = CLEARANCE * nodes.lengths.mean()
-    # Opposite nodes of the middle of both lanes: straight across.
+    # Pairs of opposite nodes in the middle parts of both lanes.
     opposite = {(i, len(nodes.positions) - 1 - i) for i in range(5, 25)}
     assert len(contacts.node) % 2 == 0
     nearest = [contacts.overlap[contacts.node == i].max() for i, _ in opposite]
     np.testing.assert_allclose(nearest, 1.0 - factor * STEP / clearance, rtol=1e-3)
-    # Sideways is to the left, and the other lane lies there: a move brings them together.
+    # The conormal points to the left, towards the other lane, so moves increase the overlap.
     for i, j in opposite:
         for node in (i, j):
             straight = contacts.overlap[contacts.node == node].argmax()
@@ -64,7 +64,7 @@ def test_lanes_farther_apart_than_the_clearance_do_not_touch(flat_disc):
 
 
 def test_a_round_circle_does_not_touch_itself(flat_disc):
-    """Neighbours are near, and so are the last nodes and the first of a closed curve."""
+    """Neighbouring nodes do not count, nor do the last and the first ones of a closed curve."""
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
     places = points_near(flat_disc, circle(np.arange(100) * 2 * np.pi / 100, 0.6))
     assert len(seen_by_nodes(nodes_at(surface, places, True)).node) == 0
@@ -79,7 +79,7 @@ def test_the_ends_of_an_open_curve_touch_each_other(flat_disc):
 
 @pytest.mark.parametrize("uneven", [0.05, 0.1, 0.3])
 def test_the_same_strand_does_not_touch_itself_where_its_nodes_are_dense(flat_disc, uneven):
-    """Distance along the curve counts, and not how many nodes lie between."""
+    """What counts is the distance along the curve, not the number of nodes in between."""
     dense = np.concatenate([np.full(12, uneven), np.ones(88)])
     angle = np.concatenate([[0.0], np.cumsum(dense)[:-1]]) * 2 * np.pi / dense.sum()
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc))
@@ -88,7 +88,7 @@ def test_the_same_strand_does_not_touch_itself_where_its_nodes_are_dense(flat_di
 
 
 def test_both_sides_of_a_thin_sheet_do_not_touch():
-    """Two strands of a flat ellipsoid, above each other on its two sides."""
+    """Two strands of a flat ellipsoid, above each other on opposite sides."""
     ball = shapes.sphere(4)
     thin = scaled(ball, 1.0).vertices * [1.0, 1.0, 0.005]
     mesh = type(ball)(thin, ball.faces)
@@ -111,7 +111,7 @@ def test_each_pair_is_there_once(flat_disc):
 
 
 def test_the_derivative_is_that_of_the_overlap(flat_disc):
-    """Differences with one node moved; the clearance, a mean, is not a matter of one node."""
+    """Compared with moves of one node; the change of the clearance, a mean, is removed."""
     nodes = lanes(flat_disc, 1.3 * STEP)
     contacts = seen_by_nodes(nodes)
     clearance = CLEARANCE * nodes.lengths.mean()
@@ -138,9 +138,10 @@ def test_faces_turned_over_in_one_piece_do_not_matter(flat_disc):
 
 @pytest.mark.parametrize("gap", [0.5, 0.9, 1.1, 1.9, 2.5, 4.0])
 def test_strands_sought_at_other_places_have_the_contacts_of_the_present_ones(flat_disc, gap):
-    """Short moves and long ones, of lanes that were out of reach of each other, or within it.
+    """Lanes were in contact or not before, and have made short or long moves.
 
-    Near the turn, where nodes are hardly far enough apart along the curve, the old places decide.
+    The turn is excluded: nodes there are barely far enough apart along the curve, and whether they
+    form a pair depends on their old positions.
     """
     present = lanes(flat_disc, gap * STEP)
 

@@ -1,4 +1,4 @@
-"""A curve is moved to control points nearby with the nodes that it has."""
+"""Tests that a curve moves to nearby control points with the nodes that it has."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ CHOSEN = [12, 80, 41, 150]
 
 
 def test_a_dragged_curve_keeps_its_nodes(ball):
-    """What is gone on from is the curve that was returned, with as many nodes as it has."""
+    """The start is the returned curve, with the same number of nodes."""
     surface = CurveSurface(ball, unsigned_normals(ball))
     start = nicmm.design_curve(ball, CHOSEN, order="shortest").curves[0]
     first = relax(surface, start, 1.0, RelaxationConfig())

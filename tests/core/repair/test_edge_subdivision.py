@@ -1,4 +1,4 @@
-"""Faces cut along some of their sides: they cover the same surface and meet in the same points."""
+"""Tests that faces subdivided along some sides cover the same surface without cracks."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     edge_of_side = number[edge.ravel()]
     parts = subdivided(faces, low, high, edge_of_side, segments, len(mesh.vertices))
 
-    # All of every face once, on its own side.
+    # The parts of every face cover it once, with its orientation.
     area = np.bincount(parts.parent, weights=np.linalg.det(parts.corners))
     np.testing.assert_allclose(area, 1.0, atol=1e-12)
     places = parts.corners @ mesh.vertices[faces[parts.parent]]
@@ -33,7 +33,7 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     for vertex in range(n_vertices):
         here = places[parts.faces == vertex]
         np.testing.assert_allclose(here, here[:1].repeat(len(here), axis=0), atol=1e-15)
-    # New vertices at equal steps along each subdivided edge, edge by edge.
+    # New vertices are at equal steps along each subdivided edge, edge by edge.
     expected = [
         mesh.vertices[low] + step / count * (mesh.vertices[high] - mesh.vertices[low])
         for (low, high), count in zip(edges[chosen], segments, strict=True)
@@ -41,14 +41,14 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     ]
     for point, place in enumerate(expected, start=len(mesh.vertices)):
         np.testing.assert_allclose(places[parts.faces == point][0], place, atol=1e-15)
-    # No crack: the rim is as long as before.
+    # There is no crack: the rim has the same length as before.
     rim, count = unique_edges(parts.faces)
     assert (count <= 2).all()
     at = np.zeros((n_vertices, 3))
     at[parts.faces] = places
     lengths = np.linalg.norm(at[rim[count == 1, 0]] - at[rim[count == 1, 1]], axis=1)
     assert abs(lengths.sum() - 4.0) < 1e-12
-    # The children of a cut side carry its segments in order.
+    # The parts along a subdivided side contain its segments in order.
     for side in np.flatnonzero(edge_of_side >= 0).tolist():
         run = parts.first_child[side] + np.arange(segments[edge_of_side[side]])
         middles = places[run][:, :2].mean(axis=1)

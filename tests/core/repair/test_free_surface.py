@@ -1,4 +1,4 @@
-"""Obstacles of weight 1 are never entered, and where they leave no way the answer says so."""
+"""Tests that curves never enter obstacles of weight 1, and the error if no curve exists."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def length_inside(mesh, curve, weights):
 
 
 def disc_on(mesh, curve, radius):
-    """Weights of a disc round the point of a curve that is farthest from its control points."""
+    """Weights of a disc around the point of a curve that is farthest from its control points."""
     controls = curve.points[curve.control_index]
     apart = np.linalg.norm(curve.points[:, None] - controls, axis=2).min(axis=1)
     away = np.linalg.norm(mesh.vertices - curve.points[apart.argmax()], axis=1)
@@ -60,7 +60,7 @@ def test_no_length_inside_on_any_surface(surface, closed, seed):
             surface, chosen, closed=closed, order="shortest", obstacles=weights
         )
     except nicmm.UnreachableError as error:
-        # A disc across a whole limb leaves no way, and so may one beside the rim.
+        # A disc that blocks a limb makes a curve impossible; so may one beside the rim.
         assert "obstacles" in str(error) or "order" in str(error)
         return
     assert_valid_design(surface, design, closed=closed)
@@ -70,7 +70,7 @@ def test_no_length_inside_on_any_surface(surface, closed, seed):
 @pytest.mark.slow
 def test_lower_weights_may_be_crossed():
     ball = shapes.sphere(4)
-    # A belt round the equator that the curve has to cross twice.
+    # The curve has to cross this belt round the equator twice.
     belt = 0.9 * (np.abs(ball.vertices[:, 2]) < 0.2)
     chosen = nearest_vertices(ball, [[0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.6, -0.8]])
     assert_valid_design(ball, nicmm.design_curve(ball, chosen, obstacles=belt))

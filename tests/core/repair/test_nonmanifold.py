@@ -1,4 +1,4 @@
-"""Meshes with every defect: a curve where one exists, on the user's own faces."""
+"""Tests meshes with all kinds of defects: a curve wherever one exists, on the given faces."""
 
 import numpy as np
 import pytest
@@ -20,11 +20,11 @@ MESHES = dict(defective_meshes())
 
 
 JOINED = {"duplicate faces": [0], "soup": [0, 2], "seam": [0, 2]}
-"""Copies that there are where it is not the first, and the second if edges have more faces."""
+"""Repairs that exist for a mesh, if not the first and, for non-manifold edges, the second."""
 
 
 def repairs_of(mesh):
-    """All repairs, None where one joins no more than those before."""
+    """All repairs of a mesh; None for one that connects no more than the previous ones."""
     every = np.arange(len(mesh.faces))
     return [repaired(mesh, number, every) for number in range(REPAIRS)]
 
@@ -54,7 +54,7 @@ def test_meshes_without_defects_are_their_own_copy(mesh):
 
 @pytest.mark.parametrize("seed", [None, *range(8)])
 def test_a_mesh_taken_for_a_manifold_needs_no_cut(seed):
-    """Checked on defects, and on spheres some of whose vertices are welded at random."""
+    """On all defective meshes, and on spheres with randomly welded vertices."""
     meshes = list(MESHES.values())
     if seed is not None:
         generator = np.random.default_rng(seed)
@@ -73,7 +73,7 @@ def test_a_mesh_taken_for_a_manifold_needs_no_cut(seed):
 
 
 def faces_between(faces):
-    """Faces whose corners differ."""
+    """Faces with three different corners."""
     return faces[corners_differ(faces)]
 
 
@@ -109,7 +109,7 @@ def test_parts_of_a_face_cover_it_once(name):
 
 @pytest.mark.parametrize("count", [3, 4, 5, 8, 9, 40])
 def test_all_faces_at_one_edge_are_connected(count):
-    """In so few pieces that the faces' number grows with count log count."""
+    """The number of pieces is so small that the number of faces grows as count log count."""
     angle = 2 * np.pi * np.arange(count) / count
     around = np.stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle], axis=1)
     mesh = nicmm.Mesh(
@@ -124,13 +124,13 @@ def test_all_faces_at_one_edge_are_connected(count):
 
 
 def assert_manifold(mesh):
-    """At most two faces an edge, one fan of faces a vertex."""
+    """Assert at most two faces per edge and one fan of faces per vertex."""
     assert (unique_edges(mesh.faces)[1] <= 2).all()
     assert not nonmanifold_vertices(mesh).any()
 
 
 def test_copies_of_one_vertex_are_at_different_places():
-    """Otherwise a straight way from a control point at one would pass exactly through another."""
+    """Otherwise a straight trace from a control point at one copy would pass through another."""
     copy = first_repair(MESHES["touching at vertices"])
     doubled = np.bincount(copy.place).max()
     assert doubled > 1
@@ -195,7 +195,7 @@ def test_maps_and_via_points_reach_the_copy(name):
 
 
 def test_points_of_a_twin_face_and_of_a_cut_edge():
-    """Control points in the faces that the copy leaves out or cuts."""
+    """Control points lie in faces that the repaired mesh omits or subdivides."""
     ball = shapes.sphere(2)
     mesh = nicmm.Mesh(ball.vertices, np.concatenate([ball.faces, ball.faces[:, [1, 0, 2]]]))
     faces = len(ball.faces) + np.array([3, 90, 200])
@@ -206,7 +206,7 @@ def test_points_of_a_twin_face_and_of_a_cut_edge():
 
 @pytest.mark.parametrize("along", [0.0, 0.25, 1.0])
 def test_position_in_a_face_without_area(along):
-    """Of a mesh that has no other face there."""
+    """On a mesh without any other face there."""
     mesh = joined(nicmm.Mesh([[2, 0, 0], [3, 0, 0], [5, 0, 0]], [[0, 1, 2]]), shapes.sphere(1))
     place = np.array([[2 + 3 * along, 0, 0]])
     located = locate_points(mesh, place, "here")
@@ -245,7 +245,7 @@ def test_sizes_beyond_all_numbers_are_refused(factor):
 
 
 class TestOpenEdgesAtOnePlace:
-    """Where nothing else joins control points."""
+    """Open edges are joined only if nothing else connects the control points."""
 
     @pytest.fixture
     def soup(self, ball):
@@ -261,7 +261,7 @@ class TestOpenEdgesAtOnePlace:
         points = nicmm.SurfacePoints(faces, np.tile([0.2, 0.3, 0.5], (4, 1)))
         weights = (ball.vertices[:, 2] > 0.95).astype(float)
         of_corners = np.zeros(len(soup.vertices))
-        # One corner of all that are at a place is enough.
+        # It is enough to paint one of the vertices at each place.
         of_corners[np.unique(ball.faces, return_index=True)[1]] = weights
         one, other = (
             nicmm.design_curve(mesh, points, order="shortest", obstacles=obstacles, method=method)
@@ -281,7 +281,7 @@ class TestOpenEdgesAtOnePlace:
         assert len(designer._whole._made) == 1
 
     def test_closed_surfaces_that_touch_stay_apart(self):
-        """Two boxes with a side in common, and every vertex there twice."""
+        """Two boxes that touch along one side, with separate vertices there."""
         mesh = MESHES["touching boxes"]
         assert (welded_vertices(mesh) == np.arange(len(mesh.vertices))).all()
         with pytest.raises(nicmm.UnreachableError, match="different components"):
@@ -318,12 +318,12 @@ class TestOpenEdgesAtOnePlace:
 
 
 class TestEdgesOfManyFaces:
-    """Where going straight on does not join the points."""
+    """Edges at which the straightest pairs of faces do not connect the points."""
 
     @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(4))
     def test_octants_about_one_vertex(self, seed):
-        """Every edge at it has four faces, and each curve needs other pairs of them."""
+        """All edges at the vertex have four faces, and each curve needs other pairs of them."""
         axes = np.concatenate([np.eye(3), -np.eye(3)])
         vertices = np.concatenate([np.zeros((1, 3)), axes])
         pairs = [(a, b) for a in range(1, 7) for b in range(a + 1, 7) if b != a + 3]
@@ -350,7 +350,7 @@ class TestEdgesOfManyFaces:
 
 @pytest.mark.slow
 def test_two_faces_with_the_same_corners_are_one(small_ball):
-    """Also where their edges have no other faces, so that they form a closed surface."""
+    """Even if their edges have no other faces, so that they would form a closed surface."""
     for second in ([0, 1, 2], [1, 0, 2]):
         corners = np.vstack([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], small_ball.vertices + 5.0])
         mesh = nicmm.Mesh(corners, np.vstack([[[0, 1, 2], second], small_ball.faces + 3]))

@@ -1,4 +1,4 @@
-"""Strands that touch only on the original are moved apart, and stay on the surface."""
+"""Tests that strands that touch only on the given mesh are moved apart on the surface."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def vertex(x, y):
 
 
 def identified(*pairs):
-    """Places of the vertices where the second of each pair is the first."""
+    """Index of the place of each vertex, where both vertices of each pair have the same place."""
     place = np.arange(len(MESH.vertices))
     for one, other in pairs:
         place[other] = one
@@ -26,7 +26,7 @@ def identified(*pairs):
 
 
 def polyline(*points, closed=False):
-    """Points as weights at vertices, each seen in a face that holds the next one too."""
+    """Polyline through points given by vertex weights, each in a face that contains the next."""
     faces, barycentric = [], []
     for number, point in enumerate(points):
         last = number + 1 == len(points)
@@ -39,12 +39,12 @@ def polyline(*points, closed=False):
 
 
 def along(*vertices):
-    """A polyline over vertices."""
+    """Polyline through vertices."""
     return polyline(*({one: 1.0} for one in vertices))
 
 
 def shared_places(points, place):
-    """Pairs of points that are one point of the original."""
+    """Number of points that coincide with another one on the given mesh."""
     here = points.barycentric > 0.0
     keys = []
     for corners, weights, positive in zip(
@@ -55,13 +55,13 @@ def shared_places(points, place):
 
 
 def assert_simple_on_mesh(points):
-    """On the surface face by face, and no strand touches another."""
+    """Assert that the polyline lies on the surface and no strand touches another."""
     curve = curve_on_mesh(MESH, False, points.faces, points.barycentric, np.array([0]))
     assert not judge_curve(MESH, curve, closed=False).faults
 
 
 STRAIGHT = [vertex(x, 1) for x in range(SIZE + 1)]
-"""Along the grid lines from rim to rim; the vertices between are interior."""
+"""Vertices along a grid line from rim to rim; all but the first and the last are interior."""
 
 TURNING = [vertex(0, 1), vertex(1, 1), vertex(2, 2), vertex(2, 3), vertex(1, 3), vertex(0, 3)]
 
@@ -81,7 +81,7 @@ def test_one_strand_goes_round_a_doubled_vertex(path, fixed):
     np.testing.assert_allclose(
         after[number[kept]].positions(MESH), before[kept].positions(MESH), atol=0
     )
-    # No farther from where it was than a small part of an edge.
+    # It stays within a small fraction of an edge from the previous curve.
     share = np.linspace(0.0, 1.0, 101)[:, None, None]
     line = before.positions(MESH)
     line = ((1.0 - share) * line[:-1] + share * line[1:]).reshape(-1, 3)

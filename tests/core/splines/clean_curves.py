@@ -1,4 +1,4 @@
-"""Polylines and designed curves, and distances between polylines, for the tests of clean curves."""
+"""Polylines, designed curves and distances for the tests of clean curves."""
 
 from functools import cache
 
@@ -14,7 +14,7 @@ DESIGNS = ("ball", "ring", "cube", "open")
 
 @cache
 def designed(name):
-    """A mesh and a curve designed on it; on the coarse ring and the cube it has corners."""
+    """A mesh and a curve designed on it; on the coarse ring and on the cube it has corners."""
     mesh, count = {
         "ball": (shapes.sphere(3), 5),
         "ring": (shapes.torus(around=12, across=8), 4),
@@ -27,12 +27,12 @@ def designed(name):
 
 
 def irregular(count, seed):
-    """Parameters in [0, 1), ascending, with gaps of very different lengths."""
+    """Sorted parameters in [0, 1) with very uneven gaps."""
     return np.sort(np.random.default_rng(seed).random(count))
 
 
 def square(pieces):
-    """The unit square from the middle of a side, with a number of points on each half side."""
+    """Unit square that starts at the middle of a side, with ``pieces`` points per half side."""
     corners = np.array([[0.5, 0], [1, 0], [1, 1], [0, 1], [0, 0], [0.5, 0]])
     at = np.arange(8 * pieces) / (2 * pieces)
     flat = [np.interp(at, [0, 0.5, 1.5, 2.5, 3.5, 4], corners[:, axis]) for axis in range(2)]
@@ -40,13 +40,13 @@ def square(pieces):
 
 
 def strays(points, polyline, closed):
-    """Farthest that points (k, 3) are from a polyline."""
+    """Greatest distance from points (k, 3) to a polyline."""
     line = np.concatenate([polyline, polyline[:1]]) if closed else polyline
     line = line[np.concatenate([[True], np.diff(line, axis=0).any(axis=1)])]
     if len(line) == 1:
         return float(np.linalg.norm(points - line, axis=1).max())
     lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    # Short segments of similar lengths: the nearest one is among those with the nearest middles.
+    # With short segments of similar length, the nearest one is among those with nearest midpoints.
     pieces = np.ceil(lengths * 2000 / lengths.sum()).astype(int)
     arc = np.concatenate([[0.0], np.cumsum(lengths)])
     starts = zip(arc[:-1], arc[1:], pieces, strict=True)
@@ -61,7 +61,7 @@ def strays(points, polyline, closed):
 
 
 def subdivided(polyline, closed, parts=8):
-    """Points on a polyline, a number on each segment."""
+    """Points on a polyline, ``parts`` per segment."""
     line = np.concatenate([polyline, polyline[:1]]) if closed else polyline
     at = np.arange(parts * (len(line) - 1) + 1) / parts
     return np.stack([np.interp(at, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)

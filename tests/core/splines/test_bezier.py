@@ -1,4 +1,4 @@
-"""Bézier splines: within the tolerance, few knots, smooth but for corners."""
+"""Tests that Bézier splines keep the tolerance, have few knots and are smooth except at corners."""
 
 import numpy as np
 import pytest
@@ -13,11 +13,11 @@ from tests.core.splines.clean_curves import DESIGNS, designed, irregular, square
 
 NONE = np.zeros(0, dtype=np.int64)
 SAMPLES = 3000
-"""Points on all cubics, about; between two of them they stray from their chords by very little."""
+"""Approximate number of points on all cubics; their chords are very close to the cubics."""
 
 
 def sampled(spline):
-    """Points on all cubics."""
+    """Points along all cubics of a spline."""
     following = np.roll(np.arange(len(spline.knots)), -1)
     ends = spline.knots, spline.right, spline.left[following], spline.knots[following]
     cubics = np.stack(ends, axis=1)[: None if spline.closed else -1]
@@ -29,20 +29,20 @@ def sampled(spline):
 
 
 def turns(spline):
-    """Angles between the handles of knots, in radians."""
+    """Angles between the two handles of each knot, in radians."""
     found = angles(spline.knots - spline.left, spline.right - spline.knots)
     return found if spline.closed else found[1:-1]
 
 
 def turning(points, closed):
-    """Sum of all angles of a polyline."""
+    """Sum of all turning angles of a polyline."""
     steps = np.diff(np.concatenate([points, points[:1]]) if closed else points, axis=0)
     steps = np.concatenate([steps, steps[:1]]) if closed else steps
     return angles(steps[:-1], steps[1:]).sum()
 
 
 def assert_fits(points, closed, control_index, tolerance, slack=1.01):
-    """Everything that holds for any polyline; the spline."""
+    """Fit a spline, assert everything that holds for any polyline, and return the spline."""
     spline = fit_bezier(points, closed, control_index, tolerance)
     assert spline.closed == closed
     assert spline.knots.shape == spline.left.shape == spline.right.shape
@@ -67,7 +67,7 @@ def test_circle_has_few_knots(controls):
     np.testing.assert_allclose(turns(spline), 0.0, atol=1e-6)
     radii = np.linalg.norm(sampled(spline), axis=1)
     np.testing.assert_allclose(radii, 1.0, atol=3.2e-4)
-    # A handle of an arc φ of the unit circle is 4/3 tan(φ / 4) long, about φ / 3.
+    # A handle for an arc φ of the unit circle has the length 4/3 tan(φ / 4), about φ / 3.
     lengths = np.linalg.norm(spline.right - spline.knots, axis=1)
     following = np.roll(spline.knots, -1, axis=0)
     arcs = 2.0 * np.arcsin(0.5 * np.linalg.norm(following - spline.knots, axis=1))
@@ -84,7 +84,7 @@ def test_helix():
 
 
 def test_a_cubic_is_found_again():
-    """Its tangents are measured within a small part of it, and one cubic is enough."""
+    """One cubic is enough, although its tangents are estimated from short parts of the polyline."""
     t = np.linspace(0.0, 1.0, 500)[:, None]
     ends = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [2, 1, 1]])
     basis = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3]
@@ -106,7 +106,7 @@ def test_corners_have_free_handles():
 
 
 def test_a_weak_corner_is_rounded():
-    """A turn of 10° is not a corner: the handles there lie on one line and are short."""
+    """A turn of 10° does not count as a corner, so the handles are collinear."""
     slope = np.tan(np.radians(10.0))
     x = np.linspace(-1.0, 1.0, 41)
     points = np.stack([x, slope * np.maximum(x, 0.0), 0.0 * x], axis=1)
@@ -116,7 +116,7 @@ def test_a_weak_corner_is_rounded():
 
 
 def test_zigzag_within_the_tolerance_does_not_show():
-    """As at the edges that an exact curve crosses."""
+    """Exact curves have such zigzags where they cross edges."""
     at = 2.0 * np.pi * irregular(1000, seed=4)
     points = circle(at, (1.0 + 2e-5 * (-1.0) ** np.arange(1000))[:, None])
     spline = assert_fits(points, True, np.array([100, 600]), 3e-4)
@@ -133,7 +133,7 @@ def test_designed_curve(name, share):
     spline = assert_fits(curve.points, curve.closed, curve.control_index, tolerance)
     assert len(spline.knots) < 0.5 * len(curve.points)
     turn = turns(spline)
-    # At a knot the spline is smooth, or the polyline has a corner; nothing in between.
+    # At each knot the spline is either smooth or follows a corner of the polyline.
     assert ((turn < 1e-6) | (turn > np.radians(15.0))).all()
     if name == "ball":
         assert turn.max() < 1e-6
@@ -176,7 +176,7 @@ def test_repeated_points(closed):
 
 
 def test_a_closed_curve_has_two_knots():
-    """Even where one cubic, from a corner back to it, would be enough."""
+    """Even if one cubic from a corner back to it would be enough."""
     t = np.linspace(0.0, 1.0, 200)[:, None]
     drop = 3 * t * (1 - t) ** 2 * [1.0, 1, 0] + 3 * t**2 * (1 - t) * [1.0, -1, 0]
     spline = assert_fits(drop[:-1], True, np.array([0]), 1e-3)
@@ -199,7 +199,7 @@ def test_noise_is_followed_where_the_tolerance_demands_it():
     controls=st.lists(st.floats(0.0, 0.999), max_size=5),
 )
 def test_any_polyline(seed, count, closed, controls):
-    """Closed curves of low frequency with irregular points, cut at any of them."""
+    """Smooth closed curves with irregular points, which may be cut open at one of them."""
     amplitudes = np.random.default_rng(seed).normal(size=(2, 3, 3)) / [[[1], [4], [9]]]
     at = 2.0 * np.pi * irregular(count, seed)[:, None] * np.arange(1, 4)
     points = np.cos(at) @ amplitudes[0] + np.sin(at) @ amplitudes[1]

@@ -1,4 +1,4 @@
-"""Evenly spaced points: within the tolerance, regular on each leg, through control points."""
+"""Tests that evenly spaced points keep the tolerance and the control points."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def positions(points, segment, share):
 
 
 def legs(places, closed, index):
-    """Lengths of the chords of each leg."""
+    """Chord lengths of each leg."""
     bounds = np.unique(index[index >= 0])
     steps = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
     if closed:
@@ -32,7 +32,7 @@ def legs(places, closed, index):
 
 
 def assert_even(points, closed, control_index, tolerance):
-    """Everything that holds for any polyline whose tolerance can be met; the new points."""
+    """Assert everything that holds if the tolerance can be met, and return the new points."""
     segment, share, index = even_places(points, closed, control_index, tolerance)
     assert ((share >= 0.0) & (share < 1.0)).all()
     assert (np.diff(np.unique(segment + share)) > 0.0).all()
@@ -54,12 +54,12 @@ def assert_even(points, closed, control_index, tolerance):
 @pytest.mark.parametrize("closed", [True, False])
 def test_circle_of_irregular_points(count, closed):
     points = circle(2 * np.pi * irregular(count, seed=count))
-    # Coarser than the polygon's own corners, so that it counts as round.
+    # The tolerance is larger than the corners of the polygon, so it counts as round.
     tolerance = 0.05 if count == 40 else 3e-4
     controls = np.array([count // 3, 5, -1, count // 2])
     places, index = assert_even(points, closed, controls, tolerance)
     spacing = [chords.mean() for chords in legs(places, closed, index)]
-    # With the greatest spacing, the chord's height 1 - cos(s / 2) is the tolerance.
+    # At the greatest spacing s, the sagitta 1 - cos(s / 2) is the tolerance.
     greatest = 2.0 * np.arccos(1.0 - tolerance)
     assert max(spacing) <= 1.1 * greatest
     if count == 3000:
@@ -77,7 +77,7 @@ def test_helix_between_control_points_in_any_order():
 
 
 def test_corners_are_points():
-    """A square needs its four corners only, wherever its points begin."""
+    """A square needs only its four corners, wherever its points begin."""
     for shift in (0, 3, 10):
         points = np.roll(square(10), shift, axis=0)
         places, _ = assert_even(points, True, NONE, 1e-4)
@@ -91,7 +91,7 @@ def test_corners_between_control_points_need_few_points():
 
 
 def test_a_corner_of_a_smooth_curve_takes_few_points():
-    """Two quarter circles at a right angle; even spacing alone would need thousands of points."""
+    """Two quarter circles meet at a corner; even spacing alone would need thousands of points."""
     at = np.linspace(0.0, 0.5 * np.pi, 400)
     quarter = np.stack([np.sin(at), 1.0 - np.cos(at), 0.0 * at], axis=1)
     points = np.concatenate([quarter, quarter[1:] + quarter[-1]])
@@ -101,7 +101,7 @@ def test_a_corner_of_a_smooth_curve_takes_few_points():
 
 
 def test_neighbouring_legs_have_similar_spacing():
-    """A small bend next to a long straight leg, whose spacing alone would be its length."""
+    """A small bend follows a straight leg that by itself would need no inner points."""
     bend = 0.1 * circle(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 300)) + [0.0, 0.1, 0.0]
     straight = np.stack([np.linspace(-3.0, -0.01, 300), *np.zeros((2, 300))], axis=1)
     points = np.concatenate([straight, bend])
@@ -120,7 +120,7 @@ def test_a_leg_shorter_than_the_spacing_is_one_segment():
 def test_scale_does_not_matter():
     points = circle(2 * np.pi * irregular(500, seed=2))
     one = even_places(points, True, np.array([7, 200]), 1e-3)
-    # A power of two, so that nothing is rounded.
+    # The factor is a power of two, so there is no rounding.
     other = even_places(points * 2.0**-20, True, np.array([7, 200]), 1e-3 * 2.0**-20)
     for first, second in zip(one, other, strict=True):
         np.testing.assert_array_equal(first, second)
@@ -137,7 +137,7 @@ def test_designed_curve(name, share):
     np.testing.assert_array_equal(even.points, (even.barycentric[:, :, None] * corners).sum(axis=1))
     assert even.barycentric.min() >= 0.0
     np.testing.assert_allclose(even.barycentric.sum(axis=1), 1.0, atol=1e-12)
-    # On the curve itself, not only near it.
+    # The points lie on the curve itself.
     assert strays(even.points, curve.points, curve.closed) < 1e-12 * mesh.diagonal
     at_controls = even.points[even.control_index]
     np.testing.assert_allclose(at_controls, curve.points[curve.control_index], atol=1e-12)
@@ -185,7 +185,7 @@ def test_a_closed_curve_has_three_points():
 
 
 def test_a_wild_polyline_gets_a_limited_number_of_regular_points():
-    """Noise far above the tolerance: it cannot be met, but the rest still holds."""
+    """With noise far above the tolerance, only the tolerance cannot be met."""
     generator = np.random.default_rng(0)
     points = circle(np.linspace(0.0, 2 * np.pi, 2000, endpoint=False))
     points += generator.normal(size=points.shape) * 1e-2
@@ -206,7 +206,7 @@ def test_a_wild_polyline_gets_a_limited_number_of_regular_points():
     controls=st.lists(st.floats(0.0, 0.999), max_size=6),
 )
 def test_any_smooth_polyline(seed, count, closed, controls):
-    """Closed curves of low frequency with irregular points, cut at any of them."""
+    """Smooth closed curves with irregular points, which may be cut open at one of them."""
     amplitudes = np.random.default_rng(seed).normal(size=(2, 3, 3)) / [[[1], [4], [9]]]
     at = 2.0 * np.pi * irregular(count, seed)[:, None] * np.arange(1, 4)
     points = np.cos(at) @ amplitudes[0] + np.sin(at) @ amplitudes[1]

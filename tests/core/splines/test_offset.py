@@ -1,4 +1,4 @@
-"""Points lifted off the surface along interpolated normals."""
+"""Tests points that are offset from the surface along interpolated normals."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_height_is_exact_over_a_plane(flat_disc):
 
 
 def test_direction_is_continuous_over_an_edge():
-    """At a point of an edge, seen from both of its faces."""
+    """Tested at a point of an edge, given in either of its faces."""
     cube = shapes.cube(2)
     edge, neighbour = 0, 0
     for face in range(len(cube.faces)):
@@ -45,7 +45,7 @@ def test_direction_is_continuous_over_an_edge():
 
 
 def test_face_normal_counts_where_normals_cancel():
-    """Two faces back to back, and a vertex that no face uses."""
+    """Two faces back to back, and a vertex without faces."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
     mesh = nicmm.Mesh(vertices, np.array([[0, 1, 2], [0, 2, 1]]))
     third = np.full((2, 3), 1.0 / 3.0)
