@@ -15,7 +15,7 @@ import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
 from .courses.course_search import SAME_COURSE, farthest_between
-from .courses.course_surface import CourseSurface
+from .courses.course_surface import CourseSurfaces
 from .design_result import Design
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
@@ -31,6 +31,7 @@ from .maps.guidance import component_unit
 from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
+from .path.via_points import with_via_points
 from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
@@ -51,17 +52,23 @@ LIMIT_TO_USUAL_ITERATIONS = 10
 Since most curves converge long before the limit, reported progress rises quickly at first.
 """
 
-STRONGLY_BENT = 80.0
+STRONGLY_BENT = 14.0
 """L ∮ κ_g² ds above which the search is repeated with random lengths, and the best result kept.
 
-It is twice the value of a circle. Curves above it wind around thin limbs, where a search misses
+It is a third of the value of a circle. Curves above it wind around limbs, where a search misses
 more courses.
 """
 
-RANDOM_SEARCHES = 2
-"""Number of searches with random lengths."""
+RANDOM_SEARCHES = 4
+"""Greatest number of searches with random lengths."""
 
-MOST_TRACED = 20_000
+FRUITLESS_SEARCHES = 2
+"""Number of consecutive searches with little gain after which no further one is made."""
+
+LEAST_GAIN = 0.02
+"""Relative decrease of the energy below which a search counts as fruitless."""
+
+MOST_TRACED = 60_000
 """Sum of points times iterations over the relaxations above which the search is not repeated."""
 
 MAX_COURSES_RELAXED = 10
@@ -160,6 +167,10 @@ class SurfaceDesigner:
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the curve of the network if no course is found."""
+        if request.via_points:  # raises an error if they are not on the component of the points
+            with_via_points(
+                self.mesh, request.points, request.via_points, request.order, request.closed
+            )
         config = RelaxationConfig() if request.alignment is None else GUIDED
         with subrange(0.0, START_FRACTION):
             courses = self._course_starts(request)
@@ -171,14 +182,15 @@ class SurfaceDesigner:
             designs = [self._relaxed(request, start, config, max_iterations, started)]
             if max_iterations is not None or designs[0].status is Status.CANCELLED:
                 return designs[0]
-            drawn = self._random_courses(request)
+            searches = self._random_courses(request)
             try:
-                for draw in drawn:
-                    if by_course and _worth_another_search(designs):
-                        for other in itertools.islice(draw, 1):
-                            designs.append(self._relaxed(request, other, config, None, started))
+                for search in searches:
+                    if not (by_course and _worth_another_search(start.surface, designs, request)):
+                        break
+                    for other in itertools.islice(search, 1):
+                        designs.append(self._relaxed(request, other, config, None, started))
                 if request.alternatives:
-                    others = itertools.chain(courses, *drawn)
+                    others = itertools.chain(courses, *searches)
                     new = (start for start in others if _differs(start, designs))
                     for other in itertools.islice(
                         new, MAX_COURSES_RELAXED + 2 * request.alternatives
@@ -199,7 +211,7 @@ class SurfaceDesigner:
             for found in self._coarse_starts.courses(request, seed):
                 yield _Start(found.curve, found.visited, there, unit)
             return
-        for course in self._courses.courses(request, seed):
+        for course in self._courses.under(request.points).courses(request, seed):
             checkpoint()
             controls = request.points[course.visited]
             faces, barycentric = (
@@ -225,7 +237,7 @@ class SurfaceDesigner:
                 unit=self._unit(request),
                 breaking=coarse.breaking_vertices,
             )
-        there = self._courses.copy
+        there = self._courses.under(request.points).copy
         with placed(there.in_original):
             found = infer(there.mesh, renumbered_request(there, request))
         problem, zeros = found.problem, found.zeros
@@ -313,25 +325,40 @@ class SurfaceDesigner:
         return curve_surface(self.mesh)
 
     @cached_property
-    def _courses(self) -> CourseSurface:
-        return CourseSurface(self.mesh)
+    def _courses(self) -> CourseSurfaces:
+        return CourseSurfaces(self.mesh)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
         return CoarseStarts(self._surface)
 
 
-def _worth_another_search(designs: list[Design]) -> bool:
-    """Whether the first curve bends so much that the search may have missed a far better one.
+def _worth_another_search(surface: CurveSurface, designs: list[Design], request: Request) -> bool:
+    """Whether the fairest curve bends so much that another search may find a far better one.
 
-    False if the relaxations took long, as on needles, since another one would take as long.
+    False if the last searches gained little, and if the relaxations took long, as on needles, since
+    another one would take as long.
     """
-    resumable = designs[0].resumable
+    energies = _energies(surface, designs, request)
+    resumable = designs[int(np.argmin(energies))].resumable
     assert resumable is not None
     nodes = resumable.curve.nodes
     bends = bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
+    lowest = np.minimum.accumulate(energies)
+    gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
+    fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
     traced = sum(design.iterations * len(design.curves[0].faces) for design in designs)
-    return bends and traced <= MOST_TRACED
+    return bends and not fruitless and traced <= MOST_TRACED
+
+
+def _energies(surface: CurveSurface, designs: list[Design], request: Request) -> list[float]:
+    """Energies of relaxed designs, with the least length among them as the common scale."""
+    curves = [design.resumable.curve for design in designs if design.resumable is not None]
+    scale = min(curve.length for curve in curves)
+    return [
+        float(comparable_energies(surface, curve.nodes, request.smoothness, scale)[0])
+        for curve in curves
+    ]
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
@@ -339,12 +366,8 @@ def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> 
     curves = [design.resumable.curve for design in designs if design.resumable is not None]
     if len(designs) == 1 or len(curves) < len(designs):
         return designs[0]
-    scale = min(curve.length for curve in curves)
-    energy = [
-        float(comparable_energies(surface, curve.nodes, request.smoothness, scale)[0])
-        for curve in curves
-    ]
-    best, *others = np.argsort(energy, kind="stable").tolist()
+    energies = _energies(surface, designs, request)
+    best, *others = np.argsort(energies, kind="stable").tolist()
     limit = SAME_COURSE * surface.mesh.diagonal
     chosen = [best]
     for number in others:

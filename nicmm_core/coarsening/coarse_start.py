@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..courses.course_surface import CourseSurface, edges_crossed
+from ..courses.course_surface import CourseSurfaces, edges_crossed
 from ..errors import MeshError, NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
@@ -70,7 +70,7 @@ class _CoarseSurface:
 
     coarse: CoarseMesh
     surface: CurveSurface
-    courses: CourseSurface
+    courses: CourseSurfaces
 
 
 class CoarseStarts:
@@ -98,7 +98,7 @@ class CoarseStarts:
             return
         with contextlib.suppress(NicmmError):
             on_coarse = _on_coarse(self._mesh, level.coarse, request)
-            for course in level.courses.courses(on_coarse, seed):
+            for course in level.courses.under(on_coarse.points).courses(on_coarse, seed):
                 checkpoint()
                 nodes = noded(level.surface, course.places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
@@ -147,8 +147,9 @@ class CoarseStarts:
 
     def _by_network_on(self, level: _CoarseSurface, request: Request) -> CoarseStart | None:
         """The network's curve on one coarse mesh, mapped to the fine mesh; None if it fails."""
-        coarse, copy = level.coarse, level.courses.copy
+        coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
+        copy = level.courses.under(on_coarse.points).copy
         with subrange(COARSE_SHARE, 0.9), placed(copy.in_original):
             zeros = infer(copy.mesh, renumbered_request(copy, on_coarse)).zeros
         if not zeros.is_simple_curve(copy.mesh, request.closed):
@@ -166,7 +167,7 @@ class CoarseStarts:
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
             self._made[key] = _CoarseSurface(
-                coarse, curve_surface(coarse.mesh), CourseSurface(coarse.mesh)
+                coarse, curve_surface(coarse.mesh), CourseSurfaces(coarse.mesh)
             )
         return self._made[key]
 

@@ -48,6 +48,15 @@ SAME_COURSE = 0.02
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
 
+WAVES = 3
+"""Number of random waves around each point."""
+
+WAVELENGTHS = (0.3, 1.5)
+"""Least and greatest wavelength of a random wave, relative to the spacing of the cells.
+
+Short waves are almost independent at neighbouring cells, which gives the most different courses.
+"""
+
 MOST_LEGS = 60
 """Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
@@ -98,9 +107,8 @@ def find_courses(
     legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
     if seed:
-        # The numbering depends only on the surface (`geometry.numbering`), so the factors do too.
-        chance = np.random.default_rng(seed).standard_normal(len(surface.mesh.vertices))
-        factor = np.exp(LENGTH_NOISE * chance) * (1.0 if factor is None else factor)
+        waves = random_waves(along[:, : len(surface.mesh.vertices)], graph.spacing, seed)
+        factor = np.exp(LENGTH_NOISE * waves) * (1.0 if factor is None else factor)
     tension = TENSION * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
@@ -135,6 +143,32 @@ def find_courses(
         for _ in range(2):
             yield own, visited
             own, visited = _denser(surface, own, visited)
+
+
+def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:
+    """Random waves around the points of a curve, with a standard deviation of about 1.
+
+    They are functions of the distances to the points, so they depend on nothing but the surface and
+    the points, and have the symmetries of both.
+
+    Parameters
+    ----------
+    distances : (k, V) float array
+        Distances from k points to the vertices.
+    spacing : float
+        Distance between neighbouring cells of the hop graph.
+    seed : int
+
+    Returns
+    -------
+    (V,) float array
+    """
+    generator = np.random.default_rng(seed)
+    wavelengths = spacing * generator.uniform(*WAVELENGTHS, WAVES)
+    phases = generator.uniform(0.0, 2.0 * np.pi, WAVES)
+    angles = 2.0 * np.pi * distances / wavelengths[:, None, None] + phases[:, None, None]
+    waves: FloatArray = np.cos(angles).sum(axis=(0, 1))
+    return np.sqrt(2.0 / (WAVES * len(distances))) * waves
 
 
 def _denser(surface: CurveSurface, nodes: Nodes, visit: IntArray) -> tuple[Nodes, IntArray]:

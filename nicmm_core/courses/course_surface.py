@@ -70,8 +70,8 @@ def edges_crossed(mesh: Mesh, component: int) -> float:
     return float(sides.sum()) / np.pi * np.sqrt(area / CELLS) / area
 
 
-class CourseSurface:
-    """Searches one mesh for courses; computes once what depends only on the mesh.
+class CourseSurfaces:
+    """The components of a mesh, each prepared for the search when it is first used.
 
     Parameters
     ----------
@@ -80,17 +80,37 @@ class CourseSurface:
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-        self._graphs: dict[int, HopGraph] = {}
+        self._surfaces: dict[int, CourseSurface] = {}
+
+    def under(self, points: SurfacePoints) -> CourseSurface:
+        """The component on which points lie."""
+        component = int(self._mesh.face_component[points.faces[0]])
+        if component not in self._surfaces:
+            self._surfaces[component] = CourseSurface(self._mesh, component)
+        return self._surfaces[component]
+
+
+class CourseSurface:
+    """Searches a component of a mesh for courses; computes once what depends only on the surface.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    component : int
+    """
+
+    def __init__(self, mesh: Mesh, component: int = 0) -> None:
+        self._mesh, self._component = mesh, component
 
     @cached_property
     def copy(self) -> Renumbered:
-        """The canonical copy of the mesh, which depends only on the surface."""
-        return renumbered(self._mesh)
+        """The canonical copy of the component, which depends only on the surface."""
+        return renumbered(self._mesh, self._component)
 
     @cached_property
     def _refined(self) -> Refined:
-        times, count = 0, np.count_nonzero(np.bincount(self.copy.mesh.faces.ravel()))
-        while count * 4**times < FEWEST_VERTICES:
+        times = 0
+        while len(self.copy.mesh.vertices) * 4**times < FEWEST_VERTICES:
             times += 1
         return refined(self.copy.mesh, times)
 
@@ -142,13 +162,11 @@ class CourseSurface:
         else:
             fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
             along = along[visited][:, np.append(np.arange(size), size + visited)]
-        component = int(self._refined.mesh.face_component[on_refined.faces[0]])
-        if edges_crossed(self._refined.mesh, component) > MOST_CROSSED:
+        if edges_crossed(self._refined.mesh, 0) > MOST_CROSSED:
             return
-        surface = self._with_maps(there, int(on_refined.faces[0]))
         found = find_courses(
-            self._graph(component),
-            surface,
+            self._graph,
+            self._with_maps(there),
             on_refined,
             along,
             fixed,
@@ -163,20 +181,16 @@ class CourseSurface:
             places = self.copy.original_points(on_copy)
             yield Course(places, control, visited[visit[control]])
 
-    def _graph(self, component: int) -> HopGraph:
-        if component not in self._graphs:
-            self._graphs[component] = build_hop_graph(self._surface, component)
-        return self._graphs[component]
+    @cached_property
+    def _graph(self) -> HopGraph:
+        return build_hop_graph(self._surface)
 
-    def _with_maps(self, request: Request, face: int) -> CurveSurface:
-        """The surface with the maps of a request, scaled to the component of a face.
-
-        The request is one on the copy, the face one of the refined mesh.
-        """
+    def _with_maps(self, request: Request) -> CurveSurface:
+        """The surface with the maps of a request on the copy."""
 
         def at_vertices(values: FloatArray | None) -> FloatArray | None:
             return None if values is None else self._refined.interpolation @ values
 
         obstacles, alignment = at_vertices(request.obstacles), at_vertices(request.alignment)
-        unit = component_unit(self._refined.mesh, face)
+        unit = component_unit(self._refined.mesh, 0)
         return with_maps(self._surface, obstacles, alignment, unit)

@@ -83,7 +83,7 @@ class Hops:
 
 @dataclass(frozen=True)
 class HopGraph:
-    """The graph of one component of a surface, without control points.
+    """The graph of a connected surface, without control points.
 
     Attributes
     ----------
@@ -116,12 +116,11 @@ class HopGraph:
         return indptr, after, bending(hops, before, hops, after)
 
 
-def build_hop_graph(surface: CurveSurface, component: int) -> HopGraph:
-    """Build the hop graph of one component of a surface."""
+def build_hop_graph(surface: CurveSurface) -> HopGraph:
+    """Build the hop graph of a connected surface."""
     mesh = surface.mesh
-    inside = mesh.face_component == component
     areas = np.zeros(len(mesh.vertices))
-    np.add.at(areas, mesh.faces[inside], mesh.face_areas[inside, None] / 3.0)
+    np.add.at(areas, mesh.faces, mesh.face_areas[:, None] / 3.0)
     vertex = np.flatnonzero(areas > 0.0)
     spacing = float(np.sqrt(areas.sum() / min(CELLS, len(vertex))))
     if len(vertex) > CELLS:

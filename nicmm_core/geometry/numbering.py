@@ -1,11 +1,11 @@
-"""Canonical copies of meshes: numbered by position, with coordinates in the principal frame.
+"""Canonical copies of components: numbered by position, in the coordinates of the principal frame.
 
 Which of several paths of about the same length is found depends on the order in which vertices and
-faces are visited. In the copy, both are sorted by position in the principal frame of the surface.
+faces are visited. In the copy, both are sorted by position in the principal frame of the component.
 Each axis of this frame points to where the surface reaches farther, even if the frame is then
 left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has the same copy
 up to rounding and scale. Surfaces without a unique principal frame, such as a ball, are an
-exception.
+exception. Other components of the mesh make no difference.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SYMMETRIC = 1e-6
 
 @dataclass(frozen=True)
 class Renumbered:
-    """A mesh and its canonical copy.
+    """A mesh and the canonical copy of one of its components, with V' vertices and F' faces.
 
     Attributes
     ----------
@@ -45,10 +45,10 @@ class Renumbered:
     mesh : Mesh
         The copy.
     number : (V,) int array
-        Index in the copy of each original vertex.
-    face : (F,) int array
+        Index in the copy of each original vertex, or -1 if it belongs to no face of the component.
+    face : (F',) int array
         Original face of each face of the copy.
-    corner : (F, 3) int array
+    corner : (F', 3) int array
         Index, in the original face, of each corner of each face of the copy.
     centre : (3,) float array
         Origin of the copy's coordinates, in the space of the original.
@@ -69,19 +69,20 @@ class Renumbered:
         return positions @ self.axes.T + self.centre
 
     def points_to_copy(self, points: SurfacePoints) -> SurfacePoints:
-        """Map points of the original to the copy, each in the first face that contains it."""
-        place = np.empty(len(self.face), dtype=np.int64)
+        """Map points of the component to the copy, each in the first face that contains it."""
+        place = np.empty(len(self.original.faces), dtype=np.int64)
         place[self.face] = np.arange(len(self.face))
         faces = place[points.faces]
         weights = np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
         return in_first_faces(self.mesh, SurfacePoints(faces, weights))
 
     def values(self, values: FloatArray | None) -> FloatArray | None:
-        """Map values at the vertices of the original, (V,), to the vertices of the copy."""
+        """Map values at the vertices of the original, (V,), to the vertices of the copy, (V',)."""
         if values is None:
             return None
-        result = np.empty_like(values)
-        result[self.number] = values
+        inside = self.number >= 0
+        result = np.empty(len(self.mesh.vertices))
+        result[self.number[inside]] = values[inside]
         return result
 
     def original_points(self, points: SurfacePoints) -> SurfacePoints:
@@ -98,42 +99,48 @@ class Renumbered:
         )
 
 
-def renumbered(mesh: Mesh) -> Renumbered:
-    """Make the canonical copy of a mesh."""
-    centre, axes, places = _in_frame(mesh)
-    order = np.lexsort(_rounded(mesh, places).T[::-1])
-    number = np.empty(len(order), dtype=np.int64)
-    number[order] = np.arange(len(order))
-    corner = np.tile(np.arange(3), (len(mesh.faces), 1))
+def renumbered(mesh: Mesh, component: int = 0) -> Renumbered:
+    """Make the canonical copy of a component of a mesh."""
+    inside = np.flatnonzero(mesh.face_component == component)
+    given, areas = mesh.faces[inside], mesh.face_areas[inside]
+    vertex = np.unique(given)
+    centre, axes, places = _in_frame(mesh.vertices, given, areas)
+    order = np.lexsort(_rounded(places[vertex], areas).T[::-1])
+    number = np.full(len(mesh.vertices), -1)
+    number[vertex[order]] = np.arange(len(order))
+    corner = np.tile(np.arange(3), (len(given), 1))
     if np.linalg.det(axes) < 0.0:
         corner = corner[:, ::-1]  # mirrored coordinates reverse the orientation of faces
-    first = np.take_along_axis(number[mesh.faces], corner, axis=1).argmin(axis=1)
+    first = np.take_along_axis(number[given], corner, axis=1).argmin(axis=1)
     corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
-    faces = np.take_along_axis(number[mesh.faces], corner, axis=1)
+    faces = np.take_along_axis(number[given], corner, axis=1)
     face = np.lexsort(np.sort(faces, axis=1).T[::-1])
-    copy = Mesh(places[order].clip(-LARGEST, LARGEST), faces[face])
-    return Renumbered(mesh, copy, number, face, corner[face], centre, axes)
+    copy = Mesh(places[vertex[order]].clip(-LARGEST, LARGEST), faces[face])
+    return Renumbered(mesh, copy, number, inside[face], corner[face], centre, axes)
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
     """Coordinates of the vertices in the principal frame, in units of `RESOLUTION`, (V, 3)."""
-    return _rounded(mesh, _in_frame(mesh)[2])
+    places = _in_frame(mesh.vertices, mesh.faces, mesh.face_areas)[2]
+    return _rounded(places, mesh.face_areas)
 
 
-def _in_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _in_frame(
+    vertices: FloatArray, faces: IntArray, face_areas: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Centre, (3,), and signed axes, (3, 3), of the principal frame; vertices in it, (V, 3)."""
-    frame = principal_frame(mesh.vertices, mesh.faces, mesh.face_areas)
+    frame = principal_frame(vertices, faces, face_areas)
     checkpoint()
     axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
-        places = np.nan_to_num((mesh.vertices - frame.centre) @ axes)
+        places = np.nan_to_num((vertices - frame.centre) @ axes)
     checkpoint()
     return frame.centre, axes, places
 
 
-def _rounded(mesh: Mesh, places: FloatArray) -> IntArray:
+def _rounded(places: FloatArray, face_areas: FloatArray) -> IntArray:
     """Coordinates rounded to integers in units of `RESOLUTION`."""
-    unit = max(RESOLUTION * float(np.sqrt(mesh.face_areas.sum())), TINY)
+    unit = max(RESOLUTION * float(np.sqrt(face_areas.sum())), TINY)
     with np.errstate(over="ignore"):
         return np.round((places / unit).clip(-FARTHEST, FARTHEST)).astype(np.int64)
 

@@ -110,8 +110,8 @@ def test_forty_points_back_and_forth(monkeypatch):
     assert len(splits) <= orders * of_paths + 2 * band_refinement.MOST_SPLITS
 
 
-def test_long_relaxations_are_not_repeated(monkeypatch):
-    """If the first course was expensive, courses are not searched again, however much it bends."""
+def test_repeated_searches_are_bounded(monkeypatch):
+    """Courses are searched again if a curve bends, unless that gained little or was expensive."""
     searched = []
     seek = surface_designer.SurfaceDesigner._course_starts
 
@@ -121,9 +121,14 @@ def test_long_relaxations_are_not_repeated(monkeypatch):
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
     monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(surface_designer, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert sorted(set(searched)) == [0, *range(1, 1 + surface_designer.RANDOM_SEARCHES)]
+    assert searched == list(range(1 + surface_designer.FRUITLESS_SEARCHES))
+    searched.clear()
+    monkeypatch.setattr(surface_designer, "FRUITLESS_SEARCHES", 100)
+    nicmm.design_curve(body, chosen)
+    assert searched == list(range(1 + surface_designer.RANDOM_SEARCHES))
     searched.clear()
     monkeypatch.setattr(surface_designer, "MOST_TRACED", 0)
     nicmm.design_curve(body, chosen)

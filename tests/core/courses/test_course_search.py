@@ -6,7 +6,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
-from nicmm_core.courses.course_search import farthest_between, find_courses
+from nicmm_core.courses.course_search import farthest_between, find_courses, random_waves
 from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
 from nicmm_core.courses.leg_combinations import (
     CROSSING,
@@ -62,7 +62,7 @@ def test_courses_pass_their_points(body, closed):
     """In the given order, or in the order of the indices at the nodes."""
     surface = curve_surface(body)
     points = random_surface_points(body, 4, seed=3)
-    graph, fixed = build_hop_graph(surface, 0), np.ones(4, dtype=bool)
+    graph, fixed = build_hop_graph(surface), np.ones(4, dtype=bool)
     for any_order in (False, True):
         along = distances_along_edges(surface, points)
         found = list(find_courses(graph, surface, points, along, fixed, closed, 1.0, any_order))
@@ -83,7 +83,7 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     angle = np.array([0.3, 2.2, 4.6])
     on_circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
     points = points_near(ball, on_circle)
-    graph = build_hop_graph(surface, 0)
+    graph = build_hop_graph(surface)
     along, fixed = distances_along_edges(surface, points), np.ones(3, bool)
     nodes, _ = next(find_courses(graph, surface, points, along, fixed, True, 1.0, False))
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
@@ -155,3 +155,15 @@ def test_alternatives_that_cannot_be_given(body):
         nicmm.design_curve(body, [20, 250, 600], alternatives=1, method="variational")
     with pytest.raises(nicmm.ArgumentError, match="alternatives"):
         nicmm.Designer(body).design([20, 250, 600], alternatives=1, max_iterations=3)
+
+
+def test_random_waves_depend_on_distances_alone():
+    """They have zero mean and unit deviation, the symmetry of the points, and differ by seed."""
+    distances = np.random.default_rng(0).uniform(0.0, 50.0, (4, 2000))
+    waves = random_waves(distances, 1.0, seed=1)
+    assert abs(waves.mean()) < 0.1
+    assert waves.std() == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(random_waves(distances[[2, 0, 3, 1]], 1.0, seed=1), waves)
+    np.testing.assert_allclose(random_waves(7.0 * distances, 7.0, seed=1), waves)
+    other = random_waves(distances, 1.0, seed=2)
+    assert abs(np.corrcoef(waves, other)[0, 1]) < 0.1

@@ -21,7 +21,7 @@ def graph_through(mesh, positions, legs=LEGS, tension=160.0):
     surface = curve_surface(mesh)
     points = points_near(mesh, np.asarray(positions, dtype=float))
     along = distances_along_edges(surface, points)
-    return with_control_points(build_hop_graph(surface, 0), points, along, legs, None, tension)
+    return with_control_points(build_hop_graph(surface), points, along, legs, None, tension)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_hops_between_neighbouring_control_points_need_no_cell():
 
 
 def test_no_hop_goes_on_with_a_turn_sharper_than_allowed_and_others_do(body):
-    graph = build_hop_graph(curve_surface(body), 0)
+    graph = build_hop_graph(curve_surface(body))
     indptr, after, _ = graph.arcs
     before = np.repeat(np.arange(len(graph.reverse)), np.diff(indptr))
     cosine = (graph.hops.arriving[before] * graph.hops.leaving[after]).sum(axis=1)

@@ -119,3 +119,19 @@ def test_motions_and_mirrors_do_not_decide_the_course(mirror):
         back = (again.points - [1.0, 2.0, 3.0]) @ np.linalg.inv(matrix).T
         moved.append(apart(curve.points, back) / mesh.diagonal)
     assert np.median(moved) < 1e-6
+
+
+def test_other_components_make_no_difference(body):
+    alone = renumbered(body)
+    far = body.vertices[:, [1, 2, 0]] * 3.0 + 50.0
+    vertices = np.concatenate([far, body.vertices, [[9.0, 9.0, 9.0]]])
+    faces = np.concatenate([body.faces, body.faces + len(far)])
+    together = nicmm.Mesh(vertices, faces)
+    component = int(together.face_component[-1])
+    there = renumbered(together, component)
+    np.testing.assert_array_equal(there.mesh.faces, alone.mesh.faces)
+    np.testing.assert_allclose(there.mesh.vertices, alone.mesh.vertices, atol=1e-12)
+    values = np.arange(len(vertices), dtype=float)
+    np.testing.assert_array_equal(
+        there.values(values), alone.values(np.arange(len(far), dtype=float)) + len(far)
+    )
