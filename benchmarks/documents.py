@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.oracles.corpus import DECLINED, DUE, GOOD, WRONG
 
-from . import courses, report
+from . import courses, report, sharp_edges
 from .evidence import ROOT, Record, Results
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -178,6 +178,19 @@ def _lanes(results: Results) -> str:
     )
 
 
+def _sharp_edges(results: Results) -> str:
+    led = np.array([line["led"] for lines in results["lines"].values() for line in lines])
+    near = int((led <= sharp_edges.WANTED).sum())
+    return _item(
+        "A curve whose ends are 2 % of the diagonal away from a sharp edge is attracted to the "
+        f"edge and runs along it: within a quarter of a mesh edge on {near} of the {len(led)} "
+        "lines that were [measured](../benchmarks/RESULTS.md#sharp-edges-to-follow), all of them "
+        "except on stepped shafts, where the curve may prefer a neighbouring rim. If two courses "
+        "along edges are equally near, such as both halves of a circle, the curve may take either; "
+        "[via points](via_points.md) select one."
+    )
+
+
 SOUP = "the same, a soup of triangles"
 
 
@@ -274,6 +287,7 @@ FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
     "runtime": (_runtime, "runtime"),
     "stages": (_stages, "stages"),
     "lanes": (_lanes, "lanes"),
+    "sharp_edges": (_sharp_edges, "sharp_edges"),
     "cancellation": (_cancellation, "cancellation"),
     "degraded": (_degraded, "degraded"),
     "corpus": (_corpus, "corpus"),
