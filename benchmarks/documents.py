@@ -179,14 +179,16 @@ def _lanes(results: Results) -> str:
 
 
 def _sharp_edges(results: Results) -> str:
-    led = np.array([line["led"] for lines in results["lines"].values() for line in lines])
-    near = int((led <= sharp_edges.WANTED).sum())
+    every = [line for lines in results["lines"].values() for line in lines]
+    others = [line["mesh"] for line in every if line["led"] > sharp_edges.WANTED]
+    kinds = sorted({name.split(", ")[-1].rstrip(" 0123456789") for name in others})
+    where = f" (the others are on: {report.listed(kinds)})" if kinds else ""
     return _item(
         "A curve whose ends are 2 % of the diagonal away from a sharp edge is attracted to the "
-        f"edge and runs along it: within a quarter of a mesh edge on {near} of the {len(led)} "
-        "lines that were [measured](../benchmarks/RESULTS.md#sharp-edges-to-follow), all of them "
-        "except on stepped shafts, where the curve may prefer a neighbouring rim. If two courses "
-        "along edges are equally near, such as both halves of a circle, the curve may take either; "
+        f"edge and runs along it: within a quarter of a mesh edge on {len(every) - len(others)} of "
+        "the lines that were [measured](../benchmarks/RESULTS.md#sharp-edges-to-follow), of "
+        f"{len(every)}{where}. If other sharp edges are about as near, such as a neighbouring rim "
+        "of a shaft or the other half of a circle, the curve may follow those; "
         "[via points](via_points.md) select one."
     )
 
