@@ -246,9 +246,19 @@ def _corpus(results: Results) -> str:
     )
 
 
+OUTCOMES = {
+    "good curve": "good curves",
+    "error where due": "errors that are due",
+    "another order named": "errors that name an order that works",
+}
+"""Outcomes of `messes` that are right, in words."""
+
+
 def _messes(results: Results) -> str:
     outcomes, seconds = results["outcomes"], results["seconds"]
-    counted = ", ".join(f"{count:,} times {outcome}" for outcome, count in outcomes.items())
+    counted = report.listed(
+        f"{outcomes.get(name, 0):,} {words}" for name, words in OUTCOMES.items()
+    )
     return _item(
         "`python -m benchmarks messes`, surfaces whose vertices are welded at random, with faces "
         f"added, duplicated, reversed and removed: of {len(seconds):,} requests {counted}; "
