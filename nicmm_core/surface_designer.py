@@ -59,11 +59,14 @@ It is a third of the value of a circle. Curves above it wind around limbs, where
 more courses.
 """
 
-RANDOM_SEARCHES = 4
+RANDOM_SEARCHES = 6
 """Greatest number of searches with random lengths."""
 
 FRUITLESS_SEARCHES = 2
 """Number of consecutive searches with little gain after which no further one is made."""
+
+EXTREMELY_BENT = 80.0
+"""L ∮ κ_g² ds above which searches go on even if they gain little; twice the value of a circle."""
 
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
@@ -188,17 +191,26 @@ class SurfaceDesigner:
                     if not (by_course and _worth_another_search(start.surface, designs, request)):
                         break
                     for other in itertools.islice(search, 1):
-                        designs.append(self._relaxed(request, other, config, None, started))
+                        designs.append(self._another(request, other, config, started))
                 if request.alternatives:
                     others = itertools.chain(courses, *searches)
                     new = (start for start in others if _differs(start, designs))
                     for other in itertools.islice(
                         new, MAX_COURSES_RELAXED + 2 * request.alternatives
                     ):
-                        designs.append(self._relaxed(request, other, config, None, started))
+                        designs.append(self._another(request, other, config, started))
             except CancelledError:
                 return replace(_fairest(start.surface, designs, request), status=Status.CANCELLED)
             return _fairest(start.surface, designs, request)
+
+    def _another(
+        self, request: Request, start: _Start, config: RelaxationConfig, started: float
+    ) -> Design:
+        """Relax a further start; raise CancelledError if that is cancelled."""
+        design = self._relaxed(request, start, config, None, started)
+        if design.status is Status.CANCELLED:
+            raise CancelledError
+        return design
 
     def _random_courses(self, request: Request) -> list[Iterator[_Start]]:
         """The courses of each search with random lengths. A search begins on first use."""
@@ -343,12 +355,13 @@ def _worth_another_search(surface: CurveSurface, designs: list[Design], request:
     resumable = designs[int(np.argmin(energies))].resumable
     assert resumable is not None
     nodes = resumable.curve.nodes
-    bends = bending_energy(nodes) * float(nodes.lengths.sum()) > STRONGLY_BENT
+    bending = bending_energy(nodes) * float(nodes.lengths.sum())
     lowest = np.minimum.accumulate(energies)
     gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
     fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
+    promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
     traced = sum(design.iterations * len(design.curves[0].faces) for design in designs)
-    return bends and not fruitless and traced <= MOST_TRACED
+    return promising and traced <= MOST_TRACED
 
 
 def _energies(surface: CurveSurface, designs: list[Design], request: Request) -> list[float]:
