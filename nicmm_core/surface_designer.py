@@ -59,7 +59,7 @@ It is a third of the value of a circle. Curves above it wind around limbs, where
 more courses.
 """
 
-RANDOM_SEARCHES = 6
+RANDOM_SEARCHES = 5
 """Greatest number of searches with random lengths."""
 
 FRUITLESS_SEARCHES = 2
