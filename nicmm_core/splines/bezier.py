@@ -41,6 +41,9 @@ curve over less of it.
 TANGENT_SAMPLES = 12
 """Number of points on either side of a knot to which its tangent is fitted."""
 
+MEASURED = 0.97
+"""Part of the tolerance that the fit uses, since it measures distances at finitely many places."""
+
 CORNER_REACH = 4.0
 """Distance on either side within which the turn of a corner is measured, in tolerances."""
 
@@ -106,7 +109,7 @@ def fit_bezier(
         index = np.where(control_index >= 0, 0, -1)
         return BezierSpline(closed, place.copy(), place.copy(), place.copy(), index)
 
-    fitter = _Fitter(line, tolerance)
+    fitter = _Fitter(line, MEASURED * tolerance)
     knots = _split(fitter)
     knots, tangents, handles = _merge(fitter, knots)
 
