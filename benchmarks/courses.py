@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
-from multiprocessing import get_context
 from unittest import mock
 
 import numpy as np
@@ -30,6 +29,7 @@ from nicmm_core.relaxation.noded_curve import NodedCurve
 
 from . import collections, report
 from .evidence import Results
+from .parallel import in_processes
 from .samples import random_sets
 from .scale import Scale
 
@@ -120,7 +120,7 @@ def measure(scale: Scale) -> Results:
         for closed in (True, False)
     )
     requests = []
-    for request in _measured(jobs, 1 if scale is Scale.SMOKE else WORKERS):
+    for request in in_processes(_compared, jobs, 1 if scale is Scale.SMOKE else WORKERS):
         requests.append(request)
         best = min(map(min, request["energies"].values()))
         ratio = request["energies"][DEFAULT][0] / best
@@ -218,16 +218,6 @@ def is_moved(answer: Results) -> bool:
 def _declined_words(requests: Sequence[Results]) -> str:
     declined = sum(request["declined"] for request in requests)
     return f"{declined} of the random starts ended in a typed error and do not count."
-
-
-def _measured(jobs: Iterator[Job], workers: int) -> Iterator[Results]:
-    """What was found for each job, in their order."""
-    if workers == 1:
-        yield from map(_compared, jobs)
-        return
-    # A forked process would inherit the locks of PyTorch's threads.
-    with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap(_compared, jobs)
 
 
 def _compared(job: Job) -> Results:

@@ -44,6 +44,9 @@ PRESENTATION = tuple(
 )
 """Modules that only present results; they are left out of the fingerprints."""
 
+LINE = 100
+"""Number of characters up to which a value in a data file is written on one line."""
+
 Read = Callable[[Path], bytes]
 
 
@@ -67,9 +70,25 @@ def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
     path = folder_of(scale) / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".part")
-    unfinished.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    unfinished.write_text(_as_json(record) + "\n", encoding="utf-8")
     unfinished.replace(path)  # other processes may be reading it
     return load(name, scale)
+
+
+def _as_json(value: Any, indent: str = "") -> str:
+    """JSON text with short values and lists of scalars on one line, for readable changes."""
+    line = json.dumps(value, allow_nan=False)
+    is_flat = isinstance(value, list) and not any(isinstance(each, dict | list) for each in value)
+    if len(line) <= LINE or is_flat or not isinstance(value, dict | list):
+        return line
+    inner = indent + " "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key)}: {_as_json(each, inner)}" for key, each in value.items()]
+        begin, end = "{}"
+    else:
+        parts = [_as_json(each, inner) for each in value]
+        begin, end = "[]"
+    return f"{begin}\n{inner}" + f",\n{inner}".join(parts) + f"\n{indent}{end}"
 
 
 def load(name: str, scale: Scale = Scale.FULL) -> Record:

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from . import collections, plots, report
 from .elastic_curve import NODES, elastic_curve
 from .evidence import Results
 from .measures import SAMPLES, bending, squared_curvature
+from .parallel import in_processes
 from .samples import point_sets
 from .scale import Scale
 
@@ -80,7 +80,7 @@ class Job:
 def measure(scale: Scale) -> Results:
     """Design closed and open curves on every collection, and judge them."""
     meshes = []
-    for of_mesh in _measured(_jobs(scale), 1 if scale is Scale.SMOKE else WORKERS):
+    for of_mesh in in_processes(_judged, _jobs(scale), 1 if scale is Scale.SMOKE else WORKERS):
         meshes.append(of_mesh)
         words = report.listed(f"{KIND[one['closed']]} {_words(one)}" for one in of_mesh["curves"])
         print(f"  {of_mesh['collection']}, {of_mesh['mesh']}: {words}", flush=True)
@@ -176,16 +176,6 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
 def _compared_every(scale: Scale) -> int:
     """Interval of the meshes of a collection on which the reference of fairness is computed."""
     return scale.choose(8, 4)
-
-
-def _measured(jobs: Iterable[Job], workers: int) -> Iterator[Results]:
-    """Results on every mesh, in the order of the jobs."""
-    if workers == 1:
-        yield from map(_judged, jobs)
-        return
-    # A forked process would inherit locks that threads of PyTorch hold.
-    with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap(_judged, jobs)
 
 
 def _judged(job: Job) -> Results:

@@ -5,6 +5,7 @@ This is the pipeline of a checked request; `design` is its entry point.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import time
 from collections.abc import Iterator
@@ -14,14 +15,20 @@ from functools import cached_property, partial
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
-from .courses.course_search import SAME_COURSE, farthest_between
+from .courses.comparison import (
+    FURTHER_SEARCHES,
+    MOST_TRACED,
+    distinct_by_energy,
+    is_apart,
+    is_kinked,
+    is_search_worthwhile,
+)
 from .courses.course_surface import CourseSurfaces
 from .design_result import Design
+from .errors import NicmmError
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .geometry.surface_points import SurfacePoints
-from .geometry.tracing import strictly_inside
 from .level_set import variational
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
@@ -35,9 +42,9 @@ from .path.via_points import with_via_points
 from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
-from .relaxation.elastic_energy import bending_energy, comparable_energies
-from .relaxation.noded_curve import NodedCurve, is_simple, noded, traced_through
-from .relaxation.relaxing import GUIDED, RelaxationConfig, relax
+from .relaxation.noded_curve import NodedCurve
+from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, relax
+from .relaxation.simple_curve import simple_curve
 from .relaxation.warm_start import WARM
 from .request import Request, renumbered_request
 from .start import Resumable, moved_start
@@ -52,33 +59,14 @@ LIMIT_TO_USUAL_ITERATIONS = 10
 Since most curves converge long before the limit, reported progress rises quickly at first.
 """
 
-STRONGLY_BENT = 14.0
-"""L ∮ κ_g² ds above which the search is repeated with random lengths, and the best result kept.
-
-It is a third of the value of a circle. Curves above it wind around limbs, where a search misses
-more courses.
-"""
-
-RANDOM_SEARCHES = 5
-"""Greatest number of searches with random lengths."""
-
-FRUITLESS_SEARCHES = 2
-"""Number of consecutive searches with little gain after which no further one is made."""
-
-EXTREMELY_BENT = 80.0
-"""L ∮ κ_g² ds above which searches go on even if they gain little; twice the value of a circle."""
-
-LEAST_GAIN = 0.02
-"""Relative decrease of the energy below which a search counts as fruitless."""
-
-MOST_TRACED = 60_000
-"""Sum of points times iterations over the relaxations above which the search is not repeated."""
-
 MAX_COURSES_RELAXED = 10
 """Courses relaxed for alternatives, in addition to two for each alternative.
 
 Many courses relax to the same curve.
 """
+
+FURTHER_SEEDS = range(1, 1 + FURTHER_SEARCHES)
+"""Seeds of repeated searches; the first search has the seed 0."""
 
 COLLISIONS = 3
 """Number of designs after a collision for which strands are assumed to collide again."""
@@ -174,7 +162,6 @@ class SurfaceDesigner:
             with_via_points(
                 self.mesh, request.points, request.via_points, request.order, request.closed
             )
-        config = RelaxationConfig() if request.alignment is None else GUIDED
         with subrange(0.0, START_FRACTION):
             courses = self._course_starts(request)
             start = next(courses, None)
@@ -182,39 +169,44 @@ class SurfaceDesigner:
             if start is None:
                 start = self._start_by_network(request)
         with subrange(START_FRACTION, 1.0):
-            designs = [self._relaxed(request, start, config, max_iterations, started)]
-            if max_iterations is not None or designs[0].status is Status.CANCELLED:
-                return designs[0]
-            searches = self._random_courses(request)
+            first = self._relaxed(request, start, _config(request), max_iterations, started)
+            if max_iterations is not None or first.status is Status.CANCELLED:
+                return first
+            surface, designs, starts = start.surface, [first], [start]
+            further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
+
+            def add(other: _Start, config: RelaxationConfig) -> None:
+                design = self._relaxed(request, other, config, None, started)
+                if design.status is Status.CANCELLED:
+                    raise CancelledError
+                designs.append(design)
+                starts.append(other)
+
             try:
-                for search in searches:
-                    if not (by_course and _worth_another_search(start.surface, designs, request)):
+                for search in further:
+                    if not is_search_worthwhile(surface, _curves(designs), request.smoothness):
+                        break
+                    if _work(designs) > MOST_TRACED:
                         break
                     for other in itertools.islice(search, 1):
-                        designs.append(self._another(request, other, config, started))
+                        add(other, _config(request))
+                if _is_kinked(surface, designs, request):
+                    best = _by_energy(surface, designs, request)[0]
+                    add(starts[best], TIGHTENED)
+                if by_course and _is_kinked(surface, designs, request):
+                    # On steps and creases, the network's path may be better than any course. It is
+                    # only another candidate, so its errors do not matter.
+                    with contextlib.suppress(NicmmError):
+                        add(self._start_by_network(request), _config(request))
                 if request.alternatives:
-                    others = itertools.chain(courses, *searches)
-                    new = (start for start in others if _differs(start, designs))
-                    for other in itertools.islice(
-                        new, MAX_COURSES_RELAXED + 2 * request.alternatives
-                    ):
-                        designs.append(self._another(request, other, config, started))
+                    others = itertools.chain(courses, *further)
+                    new = (other for other in others if _is_new(other, designs))
+                    most = MAX_COURSES_RELAXED + 2 * request.alternatives
+                    for other in itertools.islice(new, most):
+                        add(other, _config(request))
             except CancelledError:
-                return replace(_fairest(start.surface, designs, request), status=Status.CANCELLED)
-            return _fairest(start.surface, designs, request)
-
-    def _another(
-        self, request: Request, start: _Start, config: RelaxationConfig, started: float
-    ) -> Design:
-        """Relax a further start; raise CancelledError if that is cancelled."""
-        design = self._relaxed(request, start, config, None, started)
-        if design.status is Status.CANCELLED:
-            raise CancelledError
-        return design
-
-    def _random_courses(self, request: Request) -> list[Iterator[_Start]]:
-        """The courses of each search with random lengths. A search begins on first use."""
-        return [self._course_starts(request, seed) for seed in range(1, 1 + RANDOM_SEARCHES)]
+                return replace(_fairest(surface, designs, request), status=Status.CANCELLED)
+            return _fairest(surface, designs, request)
 
     def _course_starts(self, request: Request, seed: int = 0) -> Iterator[_Start]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths."""
@@ -225,17 +217,14 @@ class SurfaceDesigner:
             return
         for course in self._courses.under(request.points).courses(request, seed):
             checkpoint()
-            controls = request.points[course.visited]
-            faces, barycentric = (
-                course.places.faces.copy(),
-                strictly_inside(course.places.barycentric),
+            curve = simple_curve(
+                self._surface,
+                course.places,
+                course.control_nodes,
+                request.points[course.visited],
+                request.closed,
             )
-            faces[course.control_nodes] = controls.faces
-            barycentric[course.control_nodes] = controls.barycentric
-            places = SurfacePoints(faces, barycentric)
-            nodes = noded(self._surface, places, course.control_nodes, request.closed)
-            curve = traced_through(self._surface, nodes, nodes.nodes)
-            if curve is not None and is_simple(self._surface, curve):
+            if curve is not None:
                 yield _Start(curve, course.visited, there, unit)
 
     def _start_by_network(self, request: Request) -> _Start:
@@ -345,63 +334,42 @@ class SurfaceDesigner:
         return CoarseStarts(self._surface)
 
 
-def _worth_another_search(surface: CurveSurface, designs: list[Design], request: Request) -> bool:
-    """Whether the fairest curve bends so much that another search may find a far better one.
-
-    False if the last searches gained little, and if the relaxations took long, as on needles, since
-    another one would take as long.
-    """
-    energies = _energies(surface, designs, request)
-    resumable = designs[int(np.argmin(energies))].resumable
-    assert resumable is not None
-    nodes = resumable.curve.nodes
-    bending = bending_energy(nodes) * float(nodes.lengths.sum())
-    lowest = np.minimum.accumulate(energies)
-    gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
-    fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
-    promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
-    traced = sum(design.iterations * len(design.curves[0].faces) for design in designs)
-    return promising and traced <= MOST_TRACED
+def _config(request: Request) -> RelaxationConfig:
+    return RelaxationConfig() if request.alignment is None else GUIDED
 
 
-def _energies(surface: CurveSurface, designs: list[Design], request: Request) -> list[float]:
-    """Energies of relaxed designs, with the least length among them as the common scale."""
-    curves = [design.resumable.curve for design in designs if design.resumable is not None]
-    scale = min(curve.length for curve in curves)
-    return [
-        float(comparable_energies(surface, curve.nodes, request.smoothness, scale)[0])
-        for curve in curves
-    ]
+def _curves(designs: list[Design]) -> list[NodedCurve]:
+    # `nicmm` relaxes every curve, so every design has one.
+    return [design.resumable.curve for design in designs if design.resumable is not None]
+
+
+def _work(designs: list[Design]) -> int:
+    """Sum of points times iterations over all relaxations."""
+    return sum(design.iterations * len(design.curves[0].faces) for design in designs)
+
+
+def _by_energy(surface: CurveSurface, designs: list[Design], request: Request) -> list[int]:
+    """Indices of designs by ascending energy, without repetitions of the same curve."""
+    return distinct_by_energy(surface, _curves(designs), request.smoothness)
+
+
+def _is_kinked(surface: CurveSurface, designs: list[Design], request: Request) -> bool:
+    """Whether even the fairest curve has kinks, so that another attempt may be better."""
+    return is_kinked(_curves(designs)[_by_energy(surface, designs, request)[0]])
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
     """The design of least energy; its alternatives differ from it and from each other."""
-    curves = [design.resumable.curve for design in designs if design.resumable is not None]
-    if len(designs) == 1 or len(curves) < len(designs):
-        return designs[0]
-    energies = _energies(surface, designs, request)
-    best, *others = np.argsort(energies, kind="stable").tolist()
-    limit = SAME_COURSE * surface.mesh.diagonal
-    chosen = [best]
-    for number in others:
-        positions = curves[number].nodes.positions
-        away = [farthest_between(positions, curves[each].nodes.positions) for each in chosen]
-        if min(away) > limit:
-            chosen.append(number)
+    best, *others = _by_energy(surface, designs, request)
     return replace(
-        designs[best], alternatives=[designs[each] for each in chosen[1 : request.alternatives + 1]]
+        designs[best], alternatives=[designs[each] for each in others[: request.alternatives]]
     )
 
 
-def _differs(start: _Start, designs: list[Design]) -> bool:
+def _is_new(start: _Start, designs: list[Design]) -> bool:
     """Whether a course is apart from the curves of all designs so far."""
     assert isinstance(start.curve, NodedCurve)
-    positions, limit = start.curve.nodes.positions, SAME_COURSE * start.surface.mesh.diagonal
-    return all(
-        farthest_between(positions, design.resumable.curve.nodes.positions) > limit
-        for design in designs
-        if design.resumable is not None
-    )
+    return is_apart(start.surface, start.curve, _curves(designs))
 
 
 class _FieldWatch:

@@ -74,7 +74,9 @@ def find_courses(
     any_order: bool,
     seed: int = 0,
 ) -> Iterator[tuple[Nodes, IntArray]]:
-    """Yield simple relaxed courses through points, by ascending energy.
+    """Yield relaxed courses through points, by ascending energy, simple ones first.
+
+    Courses that cross themselves follow, since small loops can be removed on the original mesh.
 
     Each course is given by its nodes and, for every node, the index of its control point, or -1 if
     it has none. It is yielded twice, the second time with twice as many nodes.
@@ -138,7 +140,7 @@ def find_courses(
         with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):
             nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
         nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
-    for one in _best(surface, nodes, simple, smoothness)[0].tolist():
+    for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
         for _ in range(2):
             yield own, visited

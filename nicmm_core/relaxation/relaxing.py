@@ -102,6 +102,12 @@ from lane to lane, a local minimum far above the lowest energy. So a first pass 
 tension removes folds; lanes still hold the curve during that pass.
 """
 
+TIGHTENED = RelaxationConfig(levels=(64, 128, 512), tension_factor=10.0)
+"""Settings for another attempt where a curve has kinks, as on rough surfaces.
+
+The kinks are local minima. Tightening the start first leads to others, half of them lower.
+"""
+
 RELEASES = 2
 """Number of times per level that held nodes are released after convergence."""
 

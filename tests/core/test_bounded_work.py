@@ -7,6 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
+from nicmm_core.courses import comparison
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
 from tests.oracles.checker import judge
@@ -120,15 +121,15 @@ def test_repeated_searches_are_bounded(monkeypatch):
         yield from seek(self, request, seed)
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
-    monkeypatch.setattr(surface_designer, "STRONGLY_BENT", 0.0)
-    monkeypatch.setattr(surface_designer, "LEAST_GAIN", 1.0)
+    monkeypatch.setattr(comparison, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(comparison, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(1 + surface_designer.FRUITLESS_SEARCHES))
+    assert searched == list(range(1 + comparison.FRUITLESS_SEARCHES))
     searched.clear()
-    monkeypatch.setattr(surface_designer, "FRUITLESS_SEARCHES", 100)
+    monkeypatch.setattr(comparison, "FRUITLESS_SEARCHES", 100)
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(1 + surface_designer.RANDOM_SEARCHES))
+    assert searched == list(range(1 + comparison.FURTHER_SEARCHES))
     searched.clear()
     monkeypatch.setattr(surface_designer, "MOST_TRACED", 0)
     nicmm.design_curve(body, chosen)
