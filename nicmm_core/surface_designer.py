@@ -17,7 +17,8 @@ import numpy as np
 from .coarsening.coarse_start import CoarseStarts
 from .courses.comparison import (
     FURTHER_SEARCHES,
-    MOST_TRACED,
+    MOST_WORK,
+    WORK_OF_A_SEARCH,
     distinct_by_energy,
     is_apart,
     is_kinked,
@@ -183,10 +184,10 @@ class SurfaceDesigner:
                 starts.append(other)
 
             try:
-                for search in further:
+                for number, search in enumerate(further, 1):
                     if not is_search_worthwhile(surface, _curves(designs), request.smoothness):
                         break
-                    if _work(designs) > MOST_TRACED:
+                    if number * WORK_OF_A_SEARCH + _work(designs) > MOST_WORK:
                         break
                     for other in itertools.islice(search, 1):
                         add(other, _config(request))
@@ -344,7 +345,7 @@ def _curves(designs: list[Design]) -> list[NodedCurve]:
 
 
 def _work(designs: list[Design]) -> int:
-    """Sum of points times iterations over all relaxations."""
+    """Sum of points times iterations over all relaxations, a measure of their duration."""
     return sum(design.iterations * len(design.curves[0].faces) for design in designs)
 
 

@@ -36,11 +36,14 @@ FRUITLESS_SEARCHES = 2
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_TRACED = 60_000
-"""Sum of points times iterations over the relaxations above which no further search is made.
+MOST_WORK = 70_000
+"""Work above which no further search is made, in points times iterations of relaxations.
 
-It takes about a second. Curves on needles have thousands of points.
+It takes one to two seconds. Curves on needles have thousands of points.
 """
+
+WORK_OF_A_SEARCH = 10_000
+"""Work of a search, in the same units."""
 
 
 def is_kinked(curve: NodedCurve) -> bool:

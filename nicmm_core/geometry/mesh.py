@@ -22,6 +22,9 @@ stay representable."""
 BLOCK = 32_768
 """Number of faces or edges in a block, see `blocks`."""
 
+FEW_ROWS = 8
+"""Number of rows of a sparse matrix up to which slices are faster than indexing."""
+
 MOST_FACES_PER_TREE = 100_000
 """Maximum number of faces in a bounding-box tree.
 
@@ -187,7 +190,12 @@ class Mesh:
 
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces that have at least one of the given vertices, ascending."""
-        return np.unique(self.vertex_faces[vertices].indices).astype(np.int64)
+        incidence = self.vertex_faces
+        if len(vertices) > FEW_ROWS:
+            return np.unique(incidence[vertices].indices).astype(np.int64)
+        begin, end = incidence.indptr[vertices].tolist(), incidence.indptr[vertices + 1].tolist()
+        rows = [incidence.indices[slice(*bounds)] for bounds in zip(begin, end, strict=True)]
+        return np.unique(np.concatenate(rows)).astype(np.int64)
 
     def faces_with(self, vertices: IntArray) -> IntArray:
         """Faces that have all of the given vertices, ascending."""

@@ -256,7 +256,7 @@ def _along_edges(
             step = arc[high[number]] - arc[here]
             weight[number] = (wanted - arc[here]) / step if step > 0.0 else 0.0
     around = [
-        np.intersect1d(mesh.faces_at(np.array([one])), mesh.faces_at(np.array([other])))[0]
+        mesh.faces_with(np.array([one, other]))[0]
         for one, other in zip(low.tolist(), high.tolist(), strict=True)
     ]
     face = np.array(around, dtype=np.int64)

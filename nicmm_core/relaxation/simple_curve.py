@@ -24,7 +24,7 @@ from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
 from .noded_curve import NodedCurve, noded, straight_traces
 
-ROUNDS = 8
+ROUNDS = 4
 """Rounds in which loops are removed; traces between the remaining nodes may cross again."""
 
 RINGS = (2, 4, 8)
