@@ -18,11 +18,11 @@ from .coarsening.coarse_start import CoarseStarts
 from .courses.comparison import (
     FURTHER_SEARCHES,
     MOST_WORK,
-    WORK_OF_A_SEARCH,
     distinct_by_energy,
     is_apart,
     is_kinked,
     is_search_worthwhile,
+    work_of_search,
 )
 from .courses.course_surface import CourseSurfaces
 from .design_result import Design
@@ -174,7 +174,10 @@ class SurfaceDesigner:
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return first
             surface, designs, starts = start.surface, [first], [start]
-            further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
+            # If no course was simple, further searches would hardly find one, and take long.
+            seeds = FURTHER_SEEDS if by_course else range(0)
+            further = [self._course_starts(request, seed) for seed in seeds]
+            of_search, searched = work_of_search(len(request.points)), 1
 
             def add(other: _Start, config: RelaxationConfig) -> None:
                 design = self._relaxed(request, other, config, None, started)
@@ -183,18 +186,24 @@ class SurfaceDesigner:
                 designs.append(design)
                 starts.append(other)
 
+            def is_affordable(work: float) -> bool:
+                return searched * of_search + _work(designs) + work <= MOST_WORK
+
             try:
-                for number, search in enumerate(further, 1):
-                    if not is_search_worthwhile(surface, _curves(designs), request.smoothness):
+                for search in further:
+                    mean = of_search + _work(designs) / searched
+                    worthwhile = is_search_worthwhile(surface, _curves(designs), request.smoothness)
+                    if not (worthwhile and is_affordable(mean)):
                         break
-                    if number * WORK_OF_A_SEARCH + _work(designs) > MOST_WORK:
-                        break
+                    searched += 1
                     for other in itertools.islice(search, 1):
                         add(other, _config(request))
-                if _is_kinked(surface, designs, request):
-                    best = _by_energy(surface, designs, request)[0]
+                best = _by_energy(surface, designs, request)[0]
+                if is_kinked(_curves(designs)[best]) and is_affordable(_work([designs[best]])):
                     add(starts[best], TIGHTENED)
-                if by_course and _is_kinked(surface, designs, request):
+                    best = _by_energy(surface, designs, request)[0]
+                mean = of_search + _work(designs) / len(designs)
+                if by_course and is_kinked(_curves(designs)[best]) and is_affordable(mean):
                     # On steps and creases, the network's path may be better than any course. It is
                     # only another candidate, so its errors do not matter.
                     with contextlib.suppress(NicmmError):
@@ -352,11 +361,6 @@ def _work(designs: list[Design]) -> int:
 def _by_energy(surface: CurveSurface, designs: list[Design], request: Request) -> list[int]:
     """Indices of designs by ascending energy, without repetitions of the same curve."""
     return distinct_by_energy(surface, _curves(designs), request.smoothness)
-
-
-def _is_kinked(surface: CurveSurface, designs: list[Design], request: Request) -> bool:
-    """Whether even the fairest curve has kinks, so that another attempt may be better."""
-    return is_kinked(_curves(designs)[_by_energy(surface, designs, request)[0]])
 
 
 def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:

@@ -36,14 +36,16 @@ FRUITLESS_SEARCHES = 2
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_WORK = 70_000
-"""Work above which no further search is made, in points times iterations of relaxations.
+MOST_WORK = 100_000
+"""Work above which no further attempt is begun, in points times iterations of relaxations.
 
-It takes one to two seconds. Curves on needles have thousands of points.
+It takes two to three seconds. Curves on needles have thousands of points.
 """
 
-WORK_OF_A_SEARCH = 10_000
-"""Work of a search, in the same units."""
+
+def work_of_search(n_points: int) -> int:
+    """Approximate work of a search through some points, in the same units."""
+    return 3_000 * (1 + n_points)
 
 
 def is_kinked(curve: NodedCurve) -> bool:

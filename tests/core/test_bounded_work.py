@@ -123,7 +123,7 @@ def test_repeated_searches_are_bounded(monkeypatch):
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
     monkeypatch.setattr(comparison, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(comparison, "LEAST_GAIN", 1.0)
-    monkeypatch.setattr(surface_designer, "MOST_WORK", 10**6)
+    monkeypatch.setattr(surface_designer, "MOST_WORK", 1e9)
     body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
     nicmm.design_curve(body, chosen)
     assert searched == list(range(1 + comparison.FRUITLESS_SEARCHES))
