@@ -191,7 +191,7 @@ class Mesh:
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces that have at least one of the given vertices, ascending."""
         incidence = self.vertex_faces
-        if len(vertices) > FEW_ROWS:
+        if not 0 < len(vertices) <= FEW_ROWS:
             return np.unique(incidence[vertices].indices).astype(np.int64)
         begin, end = incidence.indptr[vertices].tolist(), incidence.indptr[vertices + 1].tolist()
         rows = [incidence.indices[slice(*bounds)] for bounds in zip(begin, end, strict=True)]
