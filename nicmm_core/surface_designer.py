@@ -174,9 +174,7 @@ class SurfaceDesigner:
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return first
             surface, designs, starts = start.surface, [first], [start]
-            # If no course was simple, further searches would hardly find one, and take long.
-            seeds = FURTHER_SEEDS if by_course else range(0)
-            further = [self._course_starts(request, seed) for seed in seeds]
+            further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
             of_search, searched = work_of_search(len(request.points)), 1
 
             def add(other: _Start, config: RelaxationConfig) -> None:
@@ -190,7 +188,8 @@ class SurfaceDesigner:
                 return searched * of_search + _work(designs) + work <= MOST_WORK
 
             try:
-                for search in further:
+                # If no course was simple, further searches would hardly find one, and take long.
+                for search in further if by_course else ():
                     mean = of_search + _work(designs) / searched
                     worthwhile = is_search_worthwhile(surface, _curves(designs), request.smoothness)
                     if not (worthwhile and is_affordable(mean)):
