@@ -1,4 +1,4 @@
-"""Pictures of courses: by the start of the network alone, by the search, and the next best ones."""
+"""Pictures of courses: started by the network, by the search, and the next best ones."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ MOVED = 0.01
 TIE = 0.02
 """Relative difference of two energies below which either course is a right answer."""
 
-DEFAULT, NETWORK, RENUMBERED = "default", "start by the network alone", "renumbered"
+DEFAULT, NETWORK, RENUMBERED = "default", "started by the network", "renumbered"
 FIELDS, GRAPHS = "paths over random fields", "hop graphs with random weights"
 
 KIND = {True: "closed", False: "open"}
@@ -291,7 +291,7 @@ def _answer(design: nicmm.Design, change: Similarity = UNCHANGED) -> Answer:
 
 @contextmanager
 def without_courses() -> Iterator[None]:
-    """Designs start from the network alone."""
+    """Designs start from the network."""
     with mock.patch.object(course_surface, "find_courses", lambda *arguments, **named: iter(())):
         yield
 

@@ -168,8 +168,8 @@ def _stages(results: Results) -> str:
 
 
 def _lanes(results: Results) -> str:
-    led = [each["led"] for each in results["sets"] if each["led"] is not None]
-    half, nearly_all = np.percentile([each["distance"] for each in led], [50, 90])
+    aligned = [each["aligned"] for each in results["sets"] if each["aligned"] is not None]
+    half, nearly_all = np.percentile([each["distance"] for each in aligned], [50, 90])
     return _item(
         f"A curve follows a painted lane that is {100 * results['offset']:g} % of the diagonal "
         "away from it: the median distance of the lane to the curve falls to "
@@ -180,7 +180,7 @@ def _lanes(results: Results) -> str:
 
 def _sharp_edges(results: Results) -> str:
     every = [line for lines in results["lines"].values() for line in lines]
-    others = [line["mesh"] for line in every if line["led"] > sharp_edges.WANTED]
+    others = [line["mesh"] for line in every if line["aligned"] > sharp_edges.WANTED]
     kinds = sorted({name.split(", ")[-1].rstrip(" 0123456789") for name in others})
     where = f" (the others are on: {report.listed(kinds)})" if kinds else ""
     return _item(

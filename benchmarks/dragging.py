@@ -40,12 +40,12 @@ PEER_POINTS = 4
 
 def measure(scale: Scale) -> Results:
     """Drag on meshes of the resolution in the paper, and with sixteen times as many faces."""
-    coarse = _measured(collections.surfaces(scale, scale.choose(40, 4)), rival=True)
+    coarse = _measured(collections.surfaces(scale, scale.choose(40, 4)), variational=True)
     if scale is Scale.SMOKE:
         fine = coarse
     else:
         meshes = collections.shrec16(scale.choose(8, 1), FINE_SUBDIVISIONS)
-        fine = _measured(meshes, rival=False)
+        fine = _measured(meshes, variational=False)
     return {
         "seed": SEED,
         "drags": DRAGS,
@@ -69,8 +69,8 @@ def section(results: Results) -> str:
         _row(f"{len(coarse)} meshes: {results['collection']}", coarse),
         _row(f"{len(fine)} meshes: {results['fine_subdivisions']} Loop subdivisions", fine),
     ]
-    ratio = _median(coarse, "dragged") / _median(coarse, "rival")
-    first = _median(coarse, "first") / _median(coarse, "rival")
+    ratio = _median(coarse, "dragged") / _median(coarse, "variational")
+    first = _median(coarse, "first") / _median(coarse, "variational")
     growth = _median(fine, "dragged") / _median(coarse, "dragged")
     return (
         "The table shows how long a curve takes while a control point is dragged, that is, when "
@@ -102,7 +102,7 @@ def _beside_signed_heat(scale: Scale) -> Results | None:
     ours, theirs = [], []
     for _ in range(scale.choose(PEER_SETS, 3)):
         points = generator.choice(len(mesh.vertices), PEER_POINTS, replace=False)
-        ours.append(_dragged(mesh, points, rival=False)["dragged"])
+        ours.append(_dragged(mesh, points, variational=False)["dragged"])
         theirs.append(round(later_signed_heat(task_on(mesh, points))[1], 6))
     return {"faces": len(mesh.faces), "points": PEER_POINTS, "ours": ours, "theirs": theirs}
 
@@ -119,10 +119,10 @@ def _signed_heat_words(beside: Results | None) -> str:
     )
 
 
-def _measured(meshes: Iterable[tuple[str, Mesh]], rival: bool) -> list[Results]:
+def _measured(meshes: Iterable[tuple[str, Mesh]], variational: bool) -> list[Results]:
     found = []
     for name, mesh, points in random_sets(meshes, 1, SEED):
-        drag = _dragged(mesh, points, rival)
+        drag = _dragged(mesh, points, variational)
         found.append({"mesh": name, "vertices": len(mesh.vertices), **drag})
         print(
             f"  {name}: first {1000 * drag['first']:.0f} ms, dragged {1000 * drag['dragged']:.0f}",
@@ -131,12 +131,12 @@ def _measured(meshes: Iterable[tuple[str, Mesh]], rival: bool) -> list[Results]:
     return found
 
 
-def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
+def _dragged(mesh: Mesh, points: IntArray, variational: bool) -> Results:
     """Times in seconds, iterations, bending and faults on one mesh.
 
     "first" is the first curve on the mesh, "another" a curve through other points on the same
-    Designer, "dragged" the median of the curves after small moves, and "rival" the curve of the
-    variational method.
+    Designer, "dragged" the median of the curves after small moves, and "variational" the curve of
+    the variational method.
     """
     neighbours = igl.adjacency_list(mesh.faces)
     mesh = Mesh(mesh.vertices, mesh.faces)  # a copy without cached values
@@ -159,7 +159,7 @@ def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
     others = generator.choice(np.flatnonzero(mesh.referenced), len(points), replace=False)
     another = designer.design(others, order="shortest")
     slow = None
-    if rival:
+    if variational:
         design = nicmm.design_curve(mesh, points, order="shortest", method="variational")
         slow = round(design.seconds, 6)
     bends = [bending(mesh, each.curves[0], SAMPLES) for each in (designs[-1], anew)]
@@ -167,7 +167,7 @@ def _dragged(mesh: Mesh, points: IntArray, rival: bool) -> Results:
         "first": round(designs[0].seconds, 6),
         "another": round(another.seconds, 6),
         "dragged": round(float(np.median([design.seconds for design in dragged])), 6),
-        "rival": slow,
+        "variational": slow,
         "iterations": float(np.median([design.iterations for design in dragged])),
         "bending": round(bends[0] / bends[1], 6),
         "refused": refused,
@@ -181,13 +181,13 @@ def _median(drags: Sequence[Results], name: str) -> float:
 
 def _row(label: str, drags: Sequence[Results]) -> tuple[object, ...]:
     names = ["first", "another", "dragged"]
-    measured_rival = all(drag["rival"] is not None for drag in drags)
+    solved_variational = all(drag["variational"] is not None for drag in drags)
     return (
         label,
         f"{_median(drags, 'vertices'):.0f}",
         *(f"{1000 * _median(drags, name):.0f}" for name in names),
         f"{_median(drags, 'iterations'):.0f}",
-        f"{1000 * _median(drags, 'rival'):.0f}" if measured_rival else "–",
+        f"{1000 * _median(drags, 'variational'):.0f}" if solved_variational else "–",
         f"{_median(drags, 'bending'):.2f}",
         sum(drag["refused"] for drag in drags),
         sum(drag["faults"] for drag in drags),

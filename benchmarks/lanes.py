@@ -40,7 +40,7 @@ OFFSET = 0.045
 LEAST_OFFSET = 0.03
 """Least mean distance of a lane from the free curve in space, in diagonals.
 
-A lane that leads round a limb may come back to the curve.
+A lane that leads around a limb may come back to the curve.
 """
 
 WIDTH = 0.01
@@ -89,7 +89,7 @@ def measure(scale: Scale) -> Results:
         "least_width": LEAST_WIDTH,
         "offset": OFFSET,
         "sets": [
-            {"mesh": name, "led": _led(name, mesh, points)}
+            {"mesh": name, "aligned": _aligned(name, mesh, points)}
             for name, mesh, points in random_sets(meshes, 1, SEED)
         ],
     }
@@ -98,28 +98,28 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """The aligned curve relative to the free one."""
     sets = results["sets"]
-    led = [each["led"] for each in sets if each["led"] is not None]
-    kept = sum(not each["faults"] for each in led)
+    aligned = [each["aligned"] for each in sets if each["aligned"] is not None]
+    kept = sum(not each["faults"] for each in aligned)
     rows = [
-        ("distance of the lane to the curve", *_quartiles(led, "distance")),
-        ("bending L ∮ κ_g² ds", *_quartiles(led, "bending")),
-        ("length", *_quartiles(led, "length")),
-        ("CPU time", *_quartiles(led, "time")),
+        ("distance of the lane to the curve", *_quartiles(aligned, "distance")),
+        ("bending L ∮ κ_g² ds", *_quartiles(aligned, "bending")),
+        ("length", *_quartiles(aligned, "length")),
+        ("CPU time", *_quartiles(aligned, "time")),
     ]
     return (
         f"Seed {results['seed']}, one set of 3–5 random vertices a mesh, shortest order. Lanes of "
         f"weight 1, {2 * results['width']:.0%} of the diagonal or {2 * results['least_width']:g} "
         "edges wide, beside the middle half of the longest stretch between two control points of "
         f"the free curve, {results['offset']:.1%} of the diagonal away on the surface; "
-        f"{len(sets) - len(led)} of {len(sets)} meshes have no room for one. Everything relative "
-        "to the free curve; the map's own making is in the time.\n\n"
+        f"{len(sets) - len(aligned)} of {len(sets)} meshes have no room for one. Everything "
+        "relative to the free curve; the time includes making the map.\n\n"
         + report.table(("with the lane, relative", "25 %", "median", "75 %", "90 %"), rows)
-        + f"\n\n{kept} of {len(led)} curves are one simple loop through their "
+        + f"\n\n{kept} of {len(aligned)} curves are one simple loop through their "
         "points in order, by the guarantee's judge."
     )
 
 
-def _led(name: str, mesh: Mesh, points: IntArray) -> Results | None:
+def _aligned(name: str, mesh: Mesh, points: IntArray) -> Results | None:
     """The aligned curve relative to the free one; None if there is no room for a lane."""
     free, _ = _timed(mesh, points, None)
     lane = lane_beside(mesh, free.curves[0])
@@ -127,14 +127,14 @@ def _led(name: str, mesh: Mesh, points: IntArray) -> Results | None:
         print(f"  {name}: no room for a lane", flush=True)
         return None
     free, before = _timed(mesh, points, None)
-    led, after = _timed(mesh, points, lane.weights)
-    curve, other = free.curves[0], led.curves[0]
+    aligned, after = _timed(mesh, points, lane.weights)
+    curve, other = free.curves[0], aligned.curves[0]
     found = {
         "distance": round(lane.distance(other) / lane.distance(curve), 6),
         "bending": round(bending(mesh, other, SAMPLES) / bending(mesh, curve, SAMPLES), 6),
         "length": round(other.length / curve.length, 6),
         "time": round(after / before, 4),
-        "faults": list(judge(mesh, led, points, True, "shortest").faults),
+        "faults": list(judge(mesh, aligned, points, True, "shortest").faults),
     }
     print(
         f"  {name}: lane {found['distance']:.2f}, bending {found['bending']:.2f}, "
@@ -183,6 +183,6 @@ def _painted(mesh: Mesh, line: FloatArray, normals: FloatArray) -> FloatArray:
     return ((distance < width) & facing).astype(np.float64)
 
 
-def _quartiles(led: Sequence[Results], name: str) -> list[str]:
-    ratios = [each[name] for each in led]
+def _quartiles(aligned: Sequence[Results], name: str) -> list[str]:
+    ratios = [each[name] for each in aligned]
     return [f"{value:.2f}" for value in np.quantile(ratios, [0.25, 0.5, 0.75, 0.9])]

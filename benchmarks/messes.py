@@ -73,7 +73,7 @@ def section(results: Results) -> str:
         "exists, which is decided from the arrays of the mesh alone (`feasibility.py`). If more "
         "than three points lie on boundaries or at non-manifold vertices or edges, an order of the "
         "points may be impossible; then the error must name another order, which must give a good "
-        "curve (*another order named*). *Work limit* counts errors because a path winds round "
+        "curve (*another order named*). *Work limit* counts errors because a path winds around "
         "itself too often. All other answers are findings. The meshes are made from "
         f"closed and open surfaces of up to {results['most_faces']} faces: up to "
         f"{results['most_welded']} pairs of vertices are welded, and faces are added, duplicated, "

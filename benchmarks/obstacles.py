@@ -44,7 +44,7 @@ def measure(scale: Scale) -> Results:
         "seed": SEED,
         "radius": RADIUS,
         "sets": [
-            {"mesh": name, "round": _gone_round(name, mesh, points)}
+            {"mesh": name, "detour": _detour(name, mesh, points)}
             for name, mesh, points in random_sets(meshes, 1, SEED)
         ],
     }
@@ -52,8 +52,8 @@ def measure(scale: Scale) -> Results:
 
 def section(results: Results) -> str:
     """Number of curves that avoid their obstacle, and the costs."""
-    outcomes = Counter(_outcome(each["round"]) for each in results["sets"])
-    found = [each["round"] for each in results["sets"] if each["round"] is not None]
+    outcomes = Counter(_outcome(each["detour"]) for each in results["sets"])
+    found = [each["detour"] for each in results["sets"] if each["detour"] is not None]
     bends, times = (_quartiles([each[name] for each in found]) for name in ("bending", "time"))
     return (
         "A disc was painted as an obstacle on each free curve, and the table counts whether a new "
@@ -70,7 +70,7 @@ def section(results: Results) -> str:
     )
 
 
-def _gone_round(name: str, mesh: Mesh, points: IntArray) -> Results | None:
+def _detour(name: str, mesh: Mesh, points: IntArray) -> Results | None:
     """Curve with a disc on the free one, relative to it; None if an error says there is none."""
     free = nicmm.design_curve(mesh, points, order="shortest")
     weights = _disc(mesh, free.curves[0])
@@ -94,13 +94,13 @@ def _gone_round(name: str, mesh: Mesh, points: IntArray) -> Results | None:
 
 def _outcome(found: Results | None) -> str:
     if found is None:
-        return "error: no way round"
+        return "error: no way around"
     return "enters or is faulty" if found["entered"] or found["faults"] else AVOIDS
 
 
 def _finding(sets: Sequence[Results]) -> str:
     """Whether the curves avoid their obstacles, as in Fig. 14."""
-    found = [each["round"] for each in sets if each["round"] is not None]
+    found = [each["detour"] for each in sets if each["detour"] is not None]
     avoiding = sum(_outcome(each) == AVOIDS for each in found)
     verdict = (
         "agrees with the paper"

@@ -79,7 +79,7 @@ Field = Callable[[Problem], FloatArray]
 """Function that gives φ in place of the network."""
 
 
-Rests = dict[str, list[Results]]
+RelaxedFrom = dict[str, list[Results]]
 """Outcomes by start, one entry per set."""
 
 
@@ -99,10 +99,10 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """Cost of each start, and bending of the relaxed curves."""
     by_kind = {
-        kind: _rests([each for each in results["sets"] if each["curve"] == kind])
+        kind: _relaxed_from([each for each in results["sets"] if each["curve"] == kind])
         for kind in dict.fromkeys(each["curve"] for each in results["sets"])
     }
-    pooled = _rests(results["sets"])
+    pooled = _relaxed_from(results["sets"])
     figure = report.figure(
         "pretrained_start.png",
         "Share of the sets whose final bending is at most the given multiple of the best known",
@@ -137,7 +137,7 @@ def draw(results: Results, folder: Path) -> None:
         "L ∫ κ_g² ds relative to the best known",
         "share of the sets",
     )
-    for label, ratios in _to_best(_rests(results["sets"])).items():
+    for label, ratios in _to_best(_relaxed_from(results["sets"])).items():
         shares = (np.arange(len(ratios)) + 1.0) / len(ratios)
         axes.step(np.sort(ratios), shares, where="post", label=label)
     axes.set_xscale("log")
@@ -188,12 +188,12 @@ def _relaxed(sets: Iterable[tuple[str, Mesh, IntArray]]) -> list[Results]:
             except nicmm.UnreachableError as error:
                 print(f"  {name}, {kind}: {error}", flush=True)
                 continue
-            rests = {
+            relaxed = {
                 label: _rest(designer, points, closed, order, field)
                 for label, field in fields.items()
             }
-            found.append({"mesh": name, "curve": kind, "rests": rests})
-            ends = ", ".join(f"{rest['end']:.1f}" for rest in rests.values())
+            found.append({"mesh": name, "curve": kind, "relaxed": relaxed})
+            ends = ", ".join(f"{one['end']:.1f}" for one in relaxed.values())
             print(f"  {name}, {kind}: {ends}", flush=True)
     if not found:
         raise SystemExit("No set had a simple path through its points; there is nothing to measure")
@@ -244,16 +244,16 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
         yield level_sets
 
 
-def _rests(sets: Sequence[Results]) -> Rests:
-    return {label: [each["rests"][label] for each in sets] for label in sets[0]["rests"]}
+def _relaxed_from(sets: Sequence[Results]) -> RelaxedFrom:
+    return {label: [each["relaxed"][label] for each in sets] for label in sets[0]["relaxed"]}
 
 
-def _failed(rest: Results) -> bool:
+def _failed(one: Results) -> bool:
     """Whether there is no relaxed curve."""
-    return rest["status"] in (nicmm.Status.NOT_ONE_CURVE.name, nicmm.Status.UNRELAXED.name)
+    return one["status"] in (nicmm.Status.NOT_ONE_CURVE.name, nicmm.Status.UNRELAXED.name)
 
 
-def _ends(rests: Rests) -> dict[str, FloatArray]:
+def _ends(relaxed: RelaxedFrom) -> dict[str, FloatArray]:
     """Bending of the relaxed curves, by start.
 
     Values are raised to `NEARLY_STRAIGHT`, since ratios between nearly straight curves are
@@ -261,25 +261,25 @@ def _ends(rests: Rests) -> dict[str, FloatArray]:
     """
     return {
         label: np.maximum([one["end"] for one in of_start], NEARLY_STRAIGHT)
-        for label, of_start in rests.items()
+        for label, of_start in relaxed.items()
     }
 
 
-def _to_best(rests: Rests) -> dict[str, FloatArray]:
+def _to_best(relaxed: RelaxedFrom) -> dict[str, FloatArray]:
     """Bending relative to the least bending known for each set, by start."""
-    ends = _ends(rests)
+    ends = _ends(relaxed)
     best = np.min(list(ends.values()), axis=0)
     return {label: values / best for label, values in ends.items()}
 
 
-def _gain(rests: Rests, label: str) -> tuple[float, float]:
+def _gain(relaxed: RelaxedFrom, label: str) -> tuple[float, float]:
     """Mean log ratio of the final bending to that from φ₀, and its standard error."""
-    ends = _ends(rests)
+    ends = _ends(relaxed)
     logarithm = np.log(ends[label] / ends[NO_NETWORK])
     return float(logarithm.mean()), float(logarithm.std() / np.sqrt(len(logarithm)))
 
 
-def _table(by_kind: Mapping[str, Rests]) -> str:
+def _table(by_kind: Mapping[str, RelaxedFrom]) -> str:
     header = (
         "curves", "start", "sets", "topology repaired", "failed", "bending of the start, median",
         "iterations, median · mean", "at the cap", "design (ms), mean", "final bending, median",
@@ -289,23 +289,23 @@ def _table(by_kind: Mapping[str, Rests]) -> str:
     rows = []
     for kind, of_kind in by_kind.items():
         to_best, ends = _to_best(of_kind), _ends(of_kind)
-        for label, rests in of_kind.items():
+        for label, relaxed in of_kind.items():
             mean, error = _gain(of_kind, label)
             against = ends[label] / ends[NO_NETWORK]
             wins = (against < 1.0 - CLEARLY).sum(), (against > 1.0 + CLEARLY).sum()
-            iterations = [one["iterations"] for one in rests]
+            iterations = [one["iterations"] for one in relaxed]
             quantiles = np.quantile(to_best[label], SHARES)
             rows.append(
                 (
                     kind,
                     label,
-                    len(rests),
-                    _percent([one["repaired"] for one in rests]),
-                    sum(_failed(one) for one in rests),
-                    f"{np.median([one['start'] for one in rests]):.0f}",
+                    len(relaxed),
+                    _percent([one["repaired"] for one in relaxed]),
+                    sum(_failed(one) for one in relaxed),
+                    f"{np.median([one['start'] for one in relaxed]):.0f}",
                     f"{np.median(iterations):.0f} · {np.mean(iterations):.1f}",
-                    sum(one["status"] == nicmm.Status.ITERATION_LIMIT.name for one in rests),
-                    f"{1000 * np.mean([one['seconds'] for one in rests]):.0f}",
+                    sum(one["status"] == nicmm.Status.ITERATION_LIMIT.name for one in relaxed),
+                    f"{1000 * np.mean([one['seconds'] for one in relaxed]):.0f}",
                     f"{np.median(ends[label]):.1f}",
                     " · ".join(f"{value:.2f}" for value in quantiles),
                     _percent(to_best[label] > FAR),
@@ -320,13 +320,17 @@ def _percent(flags: Sequence[bool] | BoolArray) -> str:
     return f"{100 * np.mean(flags):.0f} %"
 
 
-def _findings(pooled: Rests) -> str:
+def _findings(pooled: RelaxedFrom) -> str:
     """What the table shows for all kinds of curves together, in words."""
     means = {
-        label: np.mean([one["iterations"] for one in rests]) for label, rests in pooled.items()
+        label: np.mean([one["iterations"] for one in relaxed]) for label, relaxed in pooled.items()
     }
-    seconds = {label: np.mean([one["seconds"] for one in rests]) for label, rests in pooled.items()}
-    starts = {label: np.median([one["start"] for one in rests]) for label, rests in pooled.items()}
+    seconds = {
+        label: np.mean([one["seconds"] for one in relaxed]) for label, relaxed in pooled.items()
+    }
+    starts = {
+        label: np.median([one["start"] for one in relaxed]) for label, relaxed in pooled.items()
+    }
     text = (
         f"Over all {len(pooled[NO_NETWORK])} curves, the start from the shipped weights has "
         f"{starts[SHIPPED] / starts[NO_NETWORK]:.2f} times the bending of the start from φ₀ "

@@ -118,7 +118,7 @@ def section(results: Results) -> str:
 
 
 def _row(label: str, lines: Sequence[Results]) -> tuple[object, ...]:
-    after = [line["led"] for line in lines]
+    after = [line["aligned"] for line in lines]
     return (
         label,
         len(lines),
@@ -134,18 +134,18 @@ def _beside_lines(name: str, mesh: Mesh, generator: np.random.Generator) -> Iter
     weights = nicmm.sharp_edge_map(mesh)
     for line, points, free in itertools.islice(_close(name, mesh, generator), LINES):
         try:
-            led = nicmm.design_curve(mesh, points, closed=False, alignment=weights)
+            aligned = nicmm.design_curve(mesh, points, closed=False, alignment=weights)
         except nicmm.NicmmError as error:
             print(f"  {name}: {error}", flush=True)
             continue
         edge_length = np.linalg.norm(np.diff(line, axis=0), axis=1).mean()
-        before, after = (_away(line, curve) / edge_length for curve in (free, led.curves[0]))
-        verdict = judge_curve(mesh, led.curves[0], points.positions(mesh), closed=False)
+        before, after = (_away(line, curve) / edge_length for curve in (free, aligned.curves[0]))
+        verdict = judge_curve(mesh, aligned.curves[0], points.positions(mesh), closed=False)
         print(f"  {name}: {before:.2f} -> {after:.2f} edges", flush=True)
         yield {
             "mesh": name,
             "free": round(float(before), 6),
-            "led": round(float(after), 6),
+            "aligned": round(float(after), 6),
             "faults": list(verdict.faults),
         }
 

@@ -47,7 +47,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     ],
     "normals": [(surface_designer, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
-    "copy in its frame": [(course_surface, "renumbered")],
+    "copy in principal frame": [(course_surface, "renumbered")],
     "hop graph": [(course_surface, "build_hop_graph")],
     "distances, order of the points": [
         (course_surface, "distances_along_edges"),

@@ -34,7 +34,7 @@ PLACES = (
     (-0.75, -0.25, 0.45),
     (-0.38, -0.74, 0.56),
 )
-"""On Suzanne: the valley between the brows, over one brow, round the crown, over the other."""
+"""On Suzanne: the valley between the brows, over one brow, around the crown, over the other."""
 
 RADIUS = 0.03
 TILE = 640, 540

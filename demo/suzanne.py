@@ -20,7 +20,7 @@ FOLDER = Path(__file__).resolve().parent
 
 SUBDIVISIONS = 2
 
-# Places on the head, in the order in which the curve visits them: a loop round the crown.
+# Places on the head, in the order in which the curve visits them: a loop around the crown.
 CONTROL_PLACES = (
     (0.0, -0.45, 0.68),
     (0.65, -0.05, 0.73),

@@ -26,14 +26,14 @@ def sphere(subdivisions: int = 4) -> Mesh:
 
 
 def torus(major: float = 1.0, minor: float = 0.4, around: int = 96, across: int = 48) -> Mesh:
-    """Torus round the z axis.
+    """Torus around the z axis.
 
     Parameters
     ----------
     major, minor : float
         Radius of the centre line, and radius of the tube.
     around, across : int
-        Numbers of vertices along the centre line and round the tube.
+        Numbers of vertices along the centre line and around the tube.
     """
     u, v = np.meshgrid(
         np.arange(around) * 2 * np.pi / around,
@@ -68,7 +68,7 @@ def cube(pieces: int = 8) -> Mesh:
 
 
 def disc(rings: int = 24) -> Mesh:
-    """Flat unit disc in the xy plane, with rings of 6, 12, 18 … vertices round its centre."""
+    """Flat unit disc in the xy plane, with rings of 6, 12, 18 … vertices around its centre."""
     points = [np.zeros((1, 2))]
     for ring in range(1, rings + 1):
         angle = np.arange(6 * ring) * 2 * np.pi / (6 * ring)

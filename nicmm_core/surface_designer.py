@@ -15,15 +15,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
-from .courses.comparison import (
-    FURTHER_SEARCHES,
-    MOST_WORK,
-    distinct_by_energy,
-    is_apart,
-    is_kinked,
-    is_search_worthwhile,
-    work_of_search,
-)
+from .courses.attempts import FURTHER_SEARCHES, Attempts
+from .courses.comparison import is_apart
 from .courses.course_surface import CourseSurfaces
 from .design_result import Design
 from .errors import NicmmError
@@ -173,49 +166,45 @@ class SurfaceDesigner:
             first = self._relaxed(request, start, _config(request), max_iterations, started)
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return first
-            surface, designs, starts = start.surface, [first], [start]
-            further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
-            of_search, searched = work_of_search(len(request.points)), 1
-
-            def add(other: _Start, config: RelaxationConfig) -> None:
-                design = self._relaxed(request, other, config, None, started)
-                if design.status is Status.CANCELLED:
-                    raise CancelledError
-                designs.append(design)
-                starts.append(other)
-
-            def is_affordable(work: float) -> bool:
-                return searched * of_search + _work(designs) + work <= MOST_WORK
-
+            tried = _Tried(request, start, first)
             try:
-                # If no course was simple, further searches would hardly find one, and take long.
-                for search in further if by_course else ():
-                    mean = of_search + _work(designs) / searched
-                    worthwhile = is_search_worthwhile(surface, _curves(designs), request.smoothness)
-                    if not (worthwhile and is_affordable(mean)):
-                        break
-                    searched += 1
-                    for other in itertools.islice(search, 1):
-                        add(other, _config(request))
-                best = _by_energy(surface, designs, request)[0]
-                if is_kinked(_curves(designs)[best]) and is_affordable(_work([designs[best]])):
-                    add(starts[best], TIGHTENED)
-                    best = _by_energy(surface, designs, request)[0]
-                mean = of_search + _work(designs) / len(designs)
-                if by_course and is_kinked(_curves(designs)[best]) and is_affordable(mean):
-                    # On steps and creases, the network's path may be better than any course. It is
-                    # only another candidate, so its errors do not matter.
-                    with contextlib.suppress(NicmmError):
-                        add(self._start_by_network(request), _config(request))
-                if request.alternatives:
-                    others = itertools.chain(courses, *further)
-                    new = (other for other in others if _is_new(other, designs))
-                    most = MAX_COURSES_RELAXED + 2 * request.alternatives
-                    for other in itertools.islice(new, most):
-                        add(other, _config(request))
+                for other, config in self._further_starts(request, tried, courses, by_course):
+                    design = self._relaxed(request, other, config, None, started)
+                    if design.status is Status.CANCELLED:
+                        raise CancelledError
+                    tried.add(other, design)
             except CancelledError:
-                return replace(_fairest(surface, designs, request), status=Status.CANCELLED)
-            return _fairest(surface, designs, request)
+                return replace(tried.fairest(request.alternatives), status=Status.CANCELLED)
+            return tried.fairest(request.alternatives)
+
+    def _further_starts(
+        self, request: Request, tried: _Tried, courses: Iterator[_Start], by_course: bool
+    ) -> Iterator[tuple[_Start, RelaxationConfig]]:
+        """What to relax next, as long as it pays; each result is in `tried` before the next one.
+
+        The remaining `courses` of the first search are for alternatives. If no course was simple
+        (`by_course` is False), further searches would hardly find one, and take long.
+        """
+        config = _config(request)
+        further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
+        attempts = tried.attempts
+        for search in further if by_course else ():
+            if not attempts.another_search_pays():
+                break
+            attempts.searches += 1
+            yield from ((start, config) for start in itertools.islice(search, 1))
+        if attempts.tightening_pays():
+            yield tried.starts[attempts.best], TIGHTENED
+        if by_course and attempts.network_pays():
+            # On steps and creases, the network's path may be better than any course. It is only
+            # another candidate, so its errors do not matter.
+            with contextlib.suppress(NicmmError):
+                yield self._start_by_network(request), config
+        if request.alternatives:
+            others = itertools.chain(courses, *further)
+            new = (start for start in others if tried.is_new(start))
+            most = MAX_COURSES_RELAXED + 2 * request.alternatives
+            yield from ((start, config) for start in itertools.islice(new, most))
 
     def _course_starts(self, request: Request, seed: int = 0) -> Iterator[_Start]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths."""
@@ -347,33 +336,35 @@ def _config(request: Request) -> RelaxationConfig:
     return RelaxationConfig() if request.alignment is None else GUIDED
 
 
-def _curves(designs: list[Design]) -> list[NodedCurve]:
-    # `nicmm` relaxes every curve, so every design has one.
-    return [design.resumable.curve for design in designs if design.resumable is not None]
+class _Tried:
+    """Starts of one request and the designs to which they have relaxed."""
 
+    def __init__(self, request: Request, start: _Start, design: Design) -> None:
+        n_points = len(request.points) + sum(map(len, request.via_points.values()))
+        self.attempts = Attempts(start.surface, request.smoothness, n_points)
+        self.starts: list[_Start] = []
+        self._designs: list[Design] = []
+        self.add(start, design)
 
-def _work(designs: list[Design]) -> int:
-    """Sum of points times iterations over all relaxations, a measure of their duration."""
-    return sum(design.iterations * len(design.curves[0].faces) for design in designs)
+    def add(self, start: _Start, design: Design) -> None:
+        """Record a start and its design."""
+        assert design.resumable is not None  # `nicmm` relaxes every curve
+        self.attempts.add(design.resumable.curve, design.iterations)
+        self.starts.append(start)
+        self._designs.append(design)
 
+    def is_new(self, start: _Start) -> bool:
+        """Whether a course is apart from the curves of all designs."""
+        assert isinstance(start.curve, NodedCurve)
+        return is_apart(start.surface, start.curve, self.attempts.curves)
 
-def _by_energy(surface: CurveSurface, designs: list[Design], request: Request) -> list[int]:
-    """Indices of designs by ascending energy, without repetitions of the same curve."""
-    return distinct_by_energy(surface, _curves(designs), request.smoothness)
-
-
-def _fairest(surface: CurveSurface, designs: list[Design], request: Request) -> Design:
-    """The design of least energy; its alternatives differ from it and from each other."""
-    best, *others = _by_energy(surface, designs, request)
-    return replace(
-        designs[best], alternatives=[designs[each] for each in others[: request.alternatives]]
-    )
-
-
-def _is_new(start: _Start, designs: list[Design]) -> bool:
-    """Whether a course is apart from the curves of all designs so far."""
-    assert isinstance(start.curve, NodedCurve)
-    return is_apart(start.surface, start.curve, _curves(designs))
+    def fairest(self, alternatives: int) -> Design:
+        """The design of least energy; its alternatives differ from it and from each other."""
+        best, *others = self.attempts.by_energy()[: 1 + alternatives]
+        return replace(
+            self._designs[best],
+            alternatives=[self._designs[each] for each in others],
+        )
 
 
 class _FieldWatch:

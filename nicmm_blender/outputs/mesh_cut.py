@@ -67,7 +67,7 @@ def check_editable(mesh_object, cuts: bool) -> None:
 class CornerNormals:
     """Custom normals of a mesh in Object Mode, to be restored after a cut.
 
-    Blender stores them relative to the faces round each vertex, so the stored values should not be
+    Blender stores them relative to the faces around each vertex, so the stored values should not be
     interpolated. In Edit Mode Blender interpolates them nevertheless, which is a good approximation
     if these faces are nearly flat.
     """

@@ -24,7 +24,7 @@ from .surface_points import SurfacePoints, corners_of, interpolated
 from .vectors import cross, dot, lengths
 
 MOST_FACES = 4096
-"""Maximum number of faces of a trace. A longer trace runs round the surface and is not a short
+"""Maximum number of faces of a trace. A longer trace runs around the surface and is not a short
 connection."""
 
 SIDES_AT_ONCE, FEWEST_AT_ONCE, MOST_AT_ONCE = 800, 3, 16

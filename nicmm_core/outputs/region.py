@@ -129,7 +129,7 @@ def _sides(cut: CutMesh) -> IntArray:
     beside = sides_among(cut.faces, cut.chain_edges).reshape(-1, 3).any(axis=1)
     with_curve = np.isin(part, part[beside])
     if (side == 0)[with_curve].any():
-        closed = "It is closed, but runs round a handle, a tube or a Möbius strip"
+        closed = "It is closed, but runs around a handle, a tube or a Möbius strip"
         reason = closed if cut.closed else "It is open"
         raise CurveError(
             f"curve bounds no region: its two sides are connected on the surface. {reason}; cut "

@@ -37,7 +37,7 @@ SEGMENTS = 2
 one pair of faces, so no two edges of the result have the same ends."""
 
 MOST_FACES = 100
-"""Number of faces at a vertex up to which `is_manifold` walks round the vertices of a mesh."""
+"""Number of faces at a vertex up to which `is_manifold` walks around the vertices of a mesh."""
 
 MOST_COMPARED = 32
 """Number of faces at an edge up to which all pairs are compared to find the straightest one."""
@@ -117,7 +117,7 @@ def is_manifold(mesh: Mesh) -> bool:
     degree = np.bincount(faces.ravel(), minlength=len(mesh.vertices))
     if degree.max() > MOST_FACES:
         return False
-    # Walk round each vertex, from the last face of its fan if the fan is open, otherwise from any
+    # Walk around each vertex, from the last face of its fan if the fan is open, otherwise from any
     # face, and count the faces on the way.
     face = np.zeros(len(mesh.vertices), dtype=np.int64)
     for corner in range(3):
@@ -319,7 +319,7 @@ class _Sides:
 
 
 def _opposite(outward: FloatArray) -> IntArray:
-    """Pairs of about opposite directions round a line, (q, 3), by the order of their angles."""
+    """Pairs of about opposite directions around a line, (q, 3), by the order of their angles."""
     axes = np.linalg.svd(outward, full_matrices=False)[2][:2]
     order = np.argsort(np.arctan2(outward @ axes[1], outward @ axes[0]), kind="stable")
     half = len(order) // 2

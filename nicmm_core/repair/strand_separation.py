@@ -1,7 +1,7 @@
 """Separates strands of a curve that touch on the original mesh but not on the mapped one.
 
 A curve that is simple on the mapped mesh passes each vertex of that mesh at most once, but two of
-these vertices may be copies of one vertex of the original. One strand is then routed round its
+these vertices may be copies of one vertex of the original. One strand is then routed around its
 copy, across the edges that meet there. Copies of an edge are treated similarly. If strands cross
 them at the same point, the point of one strand is moved along the edge. A strand that runs along a
 copy is bent into the adjacent face.
@@ -32,7 +32,7 @@ ATTEMPTS = 8
 """Maximum number of attempts to move one point."""
 
 ROUNDS = 4
-"""Maximum number of rounds. Strands moved round copies of one vertex may then meet on copies of an
+"""Maximum number of rounds. Strands moved around copies of one vertex may then meet on copies of an
 edge."""
 
 SAME_POINT = 1e-9
@@ -208,7 +208,7 @@ def _into_face(
 
 
 def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
-    """The shortest chain of adjacent faces round a vertex from one face to another."""
+    """The shortest chain of adjacent faces around a vertex from one face to another."""
     previous = {start: start}
     queue = [start]
     for face in queue:

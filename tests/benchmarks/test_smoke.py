@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib
+import pkgutil
 import re
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import matplotlib.image
 import pytest
 
+import nicmm_core
 from benchmarks import evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
@@ -43,10 +45,13 @@ def quick_output(tmp_path, monkeypatch):
 @pytest.fixture
 def rooms_entered():
     """Folders of the core in which a function was called; imports alone do not count."""
+    for module in pkgutil.walk_packages(nicmm_core.__path__, "nicmm_core."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
     files = set()
 
     def note(frame, event, _argument):
-        if event == "call" and frame.f_code.co_name != "<module>":
+        if event == "call":
             files.add(frame.f_code.co_filename)
 
     def rooms():

@@ -93,7 +93,7 @@ def test_map_of_curvature_is_that_of_the_core(empty_scene):
     assert found.max() == 1.0 and (found == 0.0).any()
 
 
-def test_map_that_is_nothing_is_said(empty_scene, capfd):
+def test_empty_map_is_reported(empty_scene, capfd):
     scenes.sphere()
     bpy.ops.nicmm.new_map(role="ALIGNMENT", source="SHARP_EDGES", angle=1.5)
     assert "are zero" in capfd.readouterr().out

@@ -546,7 +546,7 @@ def test_multiresolution_is_not_cut(monkey):
     assert bpy.ops.nicmm.design_curve(output="REGION") == {"FINISHED"}
 
 
-def test_changed_mesh_is_said(monkey):
+def test_changed_mesh_is_reported(monkey):
     drawn(monkey)
     bpy.ops.nicmm.convert_curve(output="EDGES", keep_original=True)
     bpy.context.view_layer.objects.active = scenes.curves()[0]
@@ -554,7 +554,7 @@ def test_changed_mesh_is_said(monkey):
     assert "mesh has changed" in report and "draw the curve again" in report
 
 
-def test_missing_mesh_is_said(monkey):
+def test_missing_mesh_is_reported(monkey):
     curve = drawn(monkey)
     bpy.data.objects.remove(monkey)
     bpy.context.view_layer.objects.active = curve

@@ -253,7 +253,7 @@ def test_transforms(empty_scene, matrix, output):
     assert scenes.distances_to(expected.curves[0].points, found).max() < 5e-3 * size
 
 
-def test_flat_scale_is_said(empty_scene):
+def test_flat_scale_is_reported(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     sphere.scale = (1, 1, 0)

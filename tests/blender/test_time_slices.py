@@ -212,7 +212,7 @@ def test_only_navigation_passes_a_long_solve(window):
     operator.cancel(context)
 
 
-def test_mesh_that_changes_meanwhile_is_said(window):
+def test_mesh_that_changes_meanwhile_is_reported(window):
     operator, context = window.operator, window.context
     operator._begin(context)
     window.sphere.data.vertices[0].co.x += 0.1

@@ -7,7 +7,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
-from nicmm_core.courses import comparison
+from nicmm_core.courses import attempts
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
 from tests.oracles.checker import judge
@@ -90,7 +90,7 @@ def test_a_fan_of_thousands_of_needles(monkeypatch):
 
 
 def test_forty_points_back_and_forth(monkeypatch):
-    """Each leg of the path has to wind round the previous ones."""
+    """Each leg of the path has to wind around the previous ones."""
     splits = []
     add = virtual_splits.SplitMesh._add_vertex
     monkeypatch.setattr(
@@ -121,17 +121,17 @@ def test_repeated_searches_are_bounded(monkeypatch):
         yield from seek(self, request, seed)
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
-    monkeypatch.setattr(comparison, "STRONGLY_BENT", 0.0)
-    monkeypatch.setattr(comparison, "LEAST_GAIN", 1.0)
-    monkeypatch.setattr(surface_designer, "MOST_WORK", 1e9)
+    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
+    monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
     body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(1 + comparison.FRUITLESS_SEARCHES))
+    assert searched == list(range(1 + attempts.FRUITLESS_SEARCHES))
     searched.clear()
-    monkeypatch.setattr(comparison, "FRUITLESS_SEARCHES", 100)
+    monkeypatch.setattr(attempts, "FRUITLESS_SEARCHES", 100)
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(1 + comparison.FURTHER_SEARCHES))
+    assert searched == list(range(1 + attempts.FURTHER_SEARCHES))
     searched.clear()
-    monkeypatch.setattr(surface_designer, "MOST_WORK", 0)
+    monkeypatch.setattr(attempts, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
     assert searched == [0]

@@ -8,7 +8,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
-from nicmm_core.courses import comparison
+from nicmm_core.courses import attempts
 from nicmm_core.progress import CancelledError, checkpoint, placed, subrange, watched
 from tests.oracles.checker import judge_curve
 from tests.oracles.defects import defective_meshes
@@ -126,7 +126,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
 @pytest.mark.slow
 def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
     """If a curve bends strongly, courses are searched again; here this always happens."""
-    monkeypatch.setattr(comparison, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     body = shapes.creature(5, resolution=32, faces=1500)
     chosen = [20, 250, 600]
     calls = []

@@ -43,7 +43,7 @@ def named_curves() -> Iterator[NamedCurve]:
     yield NamedCurve("core of a Möbius strip", strip, core, "given")
     annulus = shapes.annulus()
     hole = nearest_vertices(annulus, _circle([0.0, 1.5, 3.0, 4.5], 0.6))
-    yield NamedCurve("round the hole of an annulus", annulus, hole, "given")
+    yield NamedCurve("around the hole of an annulus", annulus, hole, "given")
 
 
 def torus_points(mesh: Mesh, along: int, across: int, count: int) -> IntArray:

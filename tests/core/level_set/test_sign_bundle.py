@@ -65,7 +65,7 @@ class TestLoopsThatBoundNothing:
         assert not judge(mesh, result, points, True, "shortest").faults
 
     def test_round_a_boundary(self):
-        """A loop round the hole of an annulus bounds a region only together with the rim."""
+        """A loop around the hole of an annulus bounds a region only together with the rim."""
         annulus = shapes.annulus()
         points = nearest_vertices(annulus, circle([0.0, 1.5, 3.0, 4.5], radius=0.6))
         assert_one_curve(annulus, design(annulus, points), points)

@@ -115,7 +115,7 @@ def test_other_components_do_not_matter():
 
 @pytest.mark.slow
 def test_loop_round_the_tube_of_a_torus_bounds_nothing(ring):
-    """Neither do loops round the hole; the control points are on a meridian or a parallel."""
+    """Neither do loops around the hole; the control points are on a meridian or a parallel."""
     meridian = [0, 6, 12]
     parallel = [0, 12 * 18, 24 * 18]
     for vertices in (meridian, parallel):

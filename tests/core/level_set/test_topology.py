@@ -65,7 +65,7 @@ def test_isotopic_field_comes_back_as_it_is(ball, working, equator):
 
 
 def test_blobs_are_removed_and_the_rest_kept(ball, working, equator):
-    """A second loop round the north pole is removed; the south keeps the given field."""
+    """A second loop around the north pole is removed; the south keeps the given field."""
     x, y, z = working.vertices.T
     pole = np.linalg.norm(working.vertices - [0.0, 0.0, 1.0], axis=1)
     wanted = z + 0.3 * x * y - 2.0 * np.exp(-((pole / 0.3) ** 2))

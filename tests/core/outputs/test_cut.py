@@ -190,7 +190,7 @@ def test_strands_that_snapping_would_join_stay_apart():
     near = 1e-4
     around = np.flatnonzero((mesh.faces == 4).any(axis=1)).tolist()
     loop = []
-    # A loop round the vertex, so small that all of its points would snap to the vertex.
+    # A loop around the vertex, so small that all of its points would snap to the vertex.
     for face in around:
         corner = int((mesh.faces[face] == 4).argmax())
         here = mesh.faces[face][(corner + 1) % 3]

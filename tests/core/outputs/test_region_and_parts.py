@@ -92,7 +92,7 @@ def test_curves_round_a_tube_bound_nothing_and_open_the_surface(name):
     found = next(entry for entry in named_curves() if entry.name == name)
     curve = nicmm.design_curve(found.mesh, found.points, order=found.order).curves[0]
     cut = cut_mesh(found.mesh, curve)
-    with pytest.raises(nicmm.CurveError, match="closed, but runs round a handle"):
+    with pytest.raises(nicmm.CurveError, match="closed, but runs around a handle"):
         enclosed_region(found.mesh, cut)
     parted = part_mesh(cut)
     assert parted.part.max() == 0

@@ -103,7 +103,7 @@ def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_loops_of_many_strands_are_simple(small_ball, seed):
-    """With points in random order, paths wind round one another and split the mesh often."""
+    """With points in random order, paths wind around one another and split the mesh often."""
     chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
     points = locate_control_points(small_ball, chosen, closed=True)
     working, loop = build_initial_loop(small_ball, points, "given")
@@ -261,7 +261,7 @@ class TestNoManifold:
             build_initial_loop(mesh, points, "given")
 
     def test_a_path_leaves_an_edge_of_three_faces_alone(self):
-        """A fin stands on a sheet; a path between its two sides leads round its end."""
+        """A fin stands on a sheet; a path between its two sides leads around its end."""
         x, y = (c.ravel() for c in np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"))
         corner = np.array([7 * i + j for i in range(6) for j in range(6)])
         sheet = np.concatenate([corner[:, None] + [0, 7, 8], corner[:, None] + [0, 8, 1]])

@@ -172,7 +172,7 @@ def test_a_taut_curve_has_more_tension_and_the_same_map(flat_disc, mapped):
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_a_map_has_no_say_where_it_is_neutral(flat_disc, closed):
+def test_a_neutral_map_has_no_influence(flat_disc, closed):
     """The map adds a constant to the energy, and neither slope nor matrix changes."""
     surface = surface_of(flat_disc, np.ones(len(flat_disc.vertices)), 17.0)
     nodes = nodes_at(surface, points_near(flat_disc, wobble(40)), closed)

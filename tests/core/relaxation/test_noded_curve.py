@@ -162,7 +162,7 @@ def test_a_traced_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed
 
 
 def section(mesh, closed=True):
-    """A curve round the body near a level set of the x coordinate."""
+    """A curve around the body near a level set of the x coordinate."""
     x = mesh.vertices[:, 0]
     points = [int(np.argmin(np.abs(x - x.mean()) + 10 * side)) for side in sides(mesh)]
     design = nicmm.design_curve(mesh, points, closed=closed, order="shortest", method="variational")

@@ -162,7 +162,7 @@ def test_on_a_sphere_with_faces_turned_over_it_is_the_same_curve(ball):
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_on_a_moebius_strip_a_loop_comes_to_rest_across_the_seam(seed):
+def test_on_a_moebius_strip_a_loop_converges_across_the_seam(seed):
     """It ends near the core, whose bending is π, for any orientation of the faces."""
     strip = shapes.moebius_strip(96, 7)
     swing = 0.2 * np.sin(2.5 * ANGLES) * np.abs(np.sin(2.5 * ANGLES))
@@ -238,7 +238,7 @@ def test_the_energy_never_rises(flat_disc, smoothness):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_from_any_start_it_ends_better(ball, seed):
-    """Random loops round the sphere, measured on the polyline and not at nodes."""
+    """Random loops around the sphere, measured on the polyline and not at nodes."""
     generator = np.random.default_rng(seed)
     a, b = generator.normal(scale=0.12, size=(2, 5, 1))
     wave = np.arange(2, 7)[:, None] * ANGLES

@@ -25,7 +25,7 @@ def seen_by_nodes(nodes):
 
 
 def lanes(mesh, gap, factor=1.0, closed=False):
-    """Nodes along y = 0, round a turn, and back along y = gap; thirty in each direction."""
+    """Nodes along y = 0, around a turn, and back along y = gap; thirty in each direction."""
     x = STEP * np.arange(-15, 16)
     bow = 2.0 * STEP * np.arange(1, 8)
     there = np.stack([x, 0 * x], axis=1)

@@ -70,7 +70,7 @@ def test_no_length_inside_on_any_surface(surface, closed, seed):
 @pytest.mark.slow
 def test_lower_weights_may_be_crossed():
     ball = shapes.sphere(4)
-    # The curve has to cross this belt round the equator twice.
+    # The curve has to cross this belt around the equator twice.
     belt = 0.9 * (np.abs(ball.vertices[:, 2]) < 0.2)
     chosen = nearest_vertices(ball, [[0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.6, -0.8]])
     assert_valid_design(ball, nicmm.design_curve(ball, chosen, obstacles=belt))

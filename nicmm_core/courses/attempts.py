@@ -1,0 +1,122 @@
+"""Decides whether to make another attempt at a curve, from the curves relaxed so far.
+
+A search misses courses, the more the farther the curve winds around limbs. Searches with other
+lengths find others, so the search is repeated while that pays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..relaxation.curve_nodes import CurveSurface
+from ..relaxation.noded_curve import NodedCurve
+from .comparison import distinct_by_energy, energies_of, scaled_bending
+
+STRONGLY_BENT = 14.0
+"""L ∮ κ_g² ds above which the search is repeated, a third of the value of a circle.
+
+Curves above it wind around limbs, where a search misses more courses.
+"""
+
+EXTREMELY_BENT = 80.0
+"""L ∮ κ_g² ds above which searches go on even if they gain little; twice the value of a circle."""
+
+KINKED = 200.0
+"""L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
+
+FURTHER_SEARCHES = 5
+"""Greatest number of repeated searches."""
+
+FRUITLESS_SEARCHES = 2
+"""Number of consecutive searches with little gain after which no further one is made."""
+
+LEAST_GAIN = 0.02
+"""Relative decrease of the energy below which a search counts as fruitless."""
+
+MOST_WORK = 90_000
+"""Work above which no further attempt is begun, in points times iterations of relaxations.
+
+It takes two to three seconds. Curves on needles have thousands of points.
+"""
+
+WORK_OF_SEARCH = 3_000
+"""Approximate work of a search, in the same unit, and of each point through which it leads."""
+
+
+@dataclass
+class Attempts:
+    """The attempts at one curve so far, and whether another one is worth its time.
+
+    Attributes
+    ----------
+    surface : CurveSurface
+    smoothness : float
+    n_points : int
+        Number of control points and via points.
+    searches : int
+        Number of searches for courses so far.
+    curves : list of NodedCurve
+        The relaxed curve of each attempt.
+    relaxed : list of int
+        Iterations times points of each relaxation, a measure of its duration.
+    """
+
+    surface: CurveSurface
+    smoothness: float
+    n_points: int
+    searches: int = 1
+    curves: list[NodedCurve] = field(default_factory=list)
+    relaxed: list[int] = field(default_factory=list)
+
+    def add(self, curve: NodedCurve, iterations: int) -> None:
+        """Record a relaxed curve."""
+        self.curves.append(curve)
+        self.relaxed.append(iterations * len(curve.polyline))
+
+    @property
+    def best(self) -> int:
+        """Index of the curve of least energy."""
+        return self.by_energy()[0]
+
+    def by_energy(self) -> list[int]:
+        """Indices of the curves by ascending energy, without repetitions of the same curve."""
+        return distinct_by_energy(self.surface, self.curves, self.smoothness)
+
+    def another_search_pays(self) -> bool:
+        """Whether another search is affordable and may find a far better curve.
+
+        So it is if the best curve bends, unless the last searches have gained little.
+        """
+        energies = energies_of(self.surface, self.curves, self.smoothness)
+        bending = scaled_bending(self.curves[int(np.argmin(energies))])
+        lowest = np.minimum.accumulate(energies)
+        gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
+        fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
+        promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
+        return promising and self._is_affordable(self._work / self.searches)
+
+    def tightening_pays(self) -> bool:
+        """Whether the best curve has kinks, and relaxing its start again is affordable."""
+        return self._is_kinked and self._is_affordable(self.relaxed[self.best])
+
+    def network_pays(self) -> bool:
+        """Whether the best curve has kinks, and an attempt by the network is affordable."""
+        mean = sum(self.relaxed) / len(self.relaxed)
+        return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+
+    @property
+    def _is_kinked(self) -> bool:
+        return scaled_bending(self.curves[self.best]) > KINKED
+
+    @property
+    def _work(self) -> int:
+        return self.searches * self._work_of_search + sum(self.relaxed)
+
+    @property
+    def _work_of_search(self) -> int:
+        return WORK_OF_SEARCH * (1 + self.n_points)
+
+    def _is_affordable(self, further: float) -> bool:
+        return self._work + further <= MOST_WORK
