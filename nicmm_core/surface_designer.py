@@ -37,7 +37,7 @@ from .progress import CancelledError, checkpoint, placed, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from .relaxation.noded_curve import NodedCurve
-from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, relax
+from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed, relax
 from .relaxation.simple_curve import simple_curve
 from .relaxation.warm_start import WARM
 from .request import Request, renumbered_request
@@ -148,7 +148,8 @@ class SurfaceDesigner:
         # If strands collide, an attempt without tracing every iteration would fail.
         config = replace(WARM, defer_tracing=not collisions)
         begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
-        return self._relaxed(request, begin, config, max_iterations, started)
+        relaxed = _relaxed(request, begin, config, max_iterations)
+        return self._relaxed_design(request, begin, relaxed, started)
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the curve of the network if no course is found."""
@@ -163,46 +164,62 @@ class SurfaceDesigner:
             if start is None:
                 start = self._start_by_network(request)
         with subrange(START_FRACTION, 1.0):
-            first = self._relaxed(request, start, _config(request), max_iterations, started)
+            first = _relaxed(request, start, _config(request), max_iterations)
             if max_iterations is not None or first.status is Status.CANCELLED:
-                return first
-            tried = _Tried(request, start, first)
+                return self._relaxed_design(request, start, first, started)
+            n_points = len(request.points) + sum(map(len, request.via_points.values()))
+            attempts = Attempts(start.surface, request.smoothness, n_points)
+            attempts.relaxed.append(first)
+            starts, cancelled = [start], False
             try:
-                for other, config in self._further_starts(request, tried, courses, by_course):
-                    design = self._relaxed(request, other, config, None, started)
-                    if design.status is Status.CANCELLED:
+                further = self._further_starts(request, starts, attempts, courses, by_course)
+                for other, config in further:
+                    relaxed = _relaxed(request, other, config)
+                    if relaxed.status is Status.CANCELLED:
                         raise CancelledError
-                    tried.add(other, design)
+                    starts.append(other)
+                    attempts.relaxed.append(relaxed)
             except CancelledError:
-                return replace(tried.fairest(request.alternatives), status=Status.CANCELLED)
-            return tried.fairest(request.alternatives)
+                cancelled = True
+        best, *others = [
+            self._relaxed_design(request, starts[each], attempts.relaxed[each], started)
+            for each in attempts.by_energy()[: 1 + request.alternatives]
+        ]
+        status = Status.CANCELLED if cancelled else best.status
+        return replace(best, status=status, alternatives=others)
 
     def _further_starts(
-        self, request: Request, tried: _Tried, courses: Iterator[_Start], by_course: bool
+        self,
+        request: Request,
+        starts: list[_Start],
+        attempts: Attempts,
+        courses: Iterator[_Start],
+        by_course: bool,
     ) -> Iterator[tuple[_Start, RelaxationConfig]]:
-        """What to relax next, as long as it pays; each result is in `tried` before the next one.
+        """What to relax next, as long as it pays.
 
-        The remaining `courses` of the first search are for alternatives. If no course was simple
-        (`by_course` is False), further searches would hardly find one, and take long.
+        The caller adds each start and its relaxed curve to `starts` and `attempts` before it asks
+        for the next one. The remaining `courses` of the first search are for alternatives. If no
+        course was simple (`by_course` is False), further searches would hardly find one, and take
+        long.
         """
         config = _config(request)
         further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
-        attempts = tried.attempts
         for search in further if by_course else ():
             if not attempts.another_search_pays():
                 break
             attempts.searches += 1
-            yield from ((start, config) for start in itertools.islice(search, 1))
+            yield from ((start, attempts.limited(config)) for start in itertools.islice(search, 1))
         if attempts.tightening_pays():
-            yield tried.starts[attempts.best], TIGHTENED
+            yield starts[attempts.best], attempts.limited(TIGHTENED)
         if by_course and attempts.network_pays():
             # On steps and creases, the network's path may be better than any course. It is only
             # another candidate, so its errors do not matter.
             with contextlib.suppress(NicmmError):
-                yield self._start_by_network(request), config
+                yield self._start_by_network(request), attempts.limited(config)
         if request.alternatives:
             others = itertools.chain(courses, *further)
-            new = (start for start in others if tried.is_new(start))
+            new = (start for start in others if _is_apart(start, attempts.curves))
             most = MAX_COURSES_RELAXED + 2 * request.alternatives
             yield from ((start, config) for start in itertools.islice(new, most))
 
@@ -251,25 +268,12 @@ class SurfaceDesigner:
             breaking=zeros.breaking_vertices,
         )
 
-    def _relaxed(
-        self,
-        request: Request,
-        start: _Start,
-        config: RelaxationConfig,
-        max_iterations: int | None,
-        started: float,
+    def _relaxed_design(
+        self, request: Request, start: _Start, relaxed: Relaxed, started: float
     ) -> Design:
-        """Relax a start and return the result as a design."""
-        if max_iterations is not None:
-            config = replace(config, most_iterations=max_iterations)
-
-        def watch(done: float, points: FloatArray) -> bool:
-            checkpoint(1.0 - (1.0 - done) ** LIMIT_TO_USUAL_ITERATIONS, lambda: points)
-            return True
-
-        surface, unit = start.surface, start.unit
-        relaxed = relax(surface, start.curve, request.smoothness, config, watch)
-        feature = 0.0 if surface.feature_map is None else 0.5 * relaxed.feature / unit
+        """The design whose curve has been relaxed from a start."""
+        unit = start.unit
+        feature = 0.0 if start.surface.feature_map is None else 0.5 * relaxed.feature / unit
         # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
         energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
         collisions = COLLISIONS if relaxed.collided else max(start.collisions - 1, 0)
@@ -336,35 +340,24 @@ def _config(request: Request) -> RelaxationConfig:
     return RelaxationConfig() if request.alignment is None else GUIDED
 
 
-class _Tried:
-    """Starts of one request and the designs to which they have relaxed."""
+def _relaxed(
+    request: Request, start: _Start, config: RelaxationConfig, max_iterations: int | None = None
+) -> Relaxed:
+    """Relax a start."""
+    if max_iterations is not None:
+        config = replace(config, most_iterations=max_iterations)
 
-    def __init__(self, request: Request, start: _Start, design: Design) -> None:
-        n_points = len(request.points) + sum(map(len, request.via_points.values()))
-        self.attempts = Attempts(start.surface, request.smoothness, n_points)
-        self.starts: list[_Start] = []
-        self._designs: list[Design] = []
-        self.add(start, design)
+    def watch(done: float, points: FloatArray) -> bool:
+        checkpoint(1.0 - (1.0 - done) ** LIMIT_TO_USUAL_ITERATIONS, lambda: points)
+        return True
 
-    def add(self, start: _Start, design: Design) -> None:
-        """Record a start and its design."""
-        assert design.resumable is not None  # `nicmm` relaxes every curve
-        self.attempts.add(design.resumable.curve, design.iterations)
-        self.starts.append(start)
-        self._designs.append(design)
+    return relax(start.surface, start.curve, request.smoothness, config, watch)
 
-    def is_new(self, start: _Start) -> bool:
-        """Whether a course is apart from the curves of all designs."""
-        assert isinstance(start.curve, NodedCurve)
-        return is_apart(start.surface, start.curve, self.attempts.curves)
 
-    def fairest(self, alternatives: int) -> Design:
-        """The design of least energy; its alternatives differ from it and from each other."""
-        best, *others = self.attempts.by_energy()[: 1 + alternatives]
-        return replace(
-            self._designs[best],
-            alternatives=[self._designs[each] for each in others],
-        )
+def _is_apart(start: _Start, curves: list[NodedCurve]) -> bool:
+    """Whether a course is somewhere apart from each of some curves."""
+    assert isinstance(start.curve, NodedCurve)
+    return is_apart(start.surface, start.curve, curves)
 
 
 class _FieldWatch:

@@ -6,12 +6,13 @@ lengths find others, so the search is repeated while that pays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
+from ..relaxation.relaxing import RelaxationConfig, Relaxed
 from .comparison import distinct_by_energy, energies_of, scaled_bending
 
 STRONGLY_BENT = 14.0
@@ -35,13 +36,13 @@ FRUITLESS_SEARCHES = 2
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_WORK = 90_000
-"""Work above which no further attempt is begun, in points times iterations of relaxations.
+MOST_WORK = 1_500
+"""Cap on the work of all attempts after the first, in moves of all nodes (`Work`).
 
-It takes two to three seconds. Curves on needles have thousands of points.
+It takes two to three seconds.
 """
 
-WORK_OF_SEARCH = 3_000
+WORK_OF_SEARCH = 40
 """Approximate work of a search, in the same unit, and of each point through which it leads."""
 
 
@@ -57,23 +58,20 @@ class Attempts:
         Number of control points and via points.
     searches : int
         Number of searches for courses so far.
-    curves : list of NodedCurve
-        The relaxed curve of each attempt.
-    relaxed : list of int
-        Iterations times points of each relaxation, a measure of its duration.
+    relaxed : list of Relaxed
+        The result of each attempt.
     """
 
     surface: CurveSurface
     smoothness: float
     n_points: int
     searches: int = 1
-    curves: list[NodedCurve] = field(default_factory=list)
-    relaxed: list[int] = field(default_factory=list)
+    relaxed: list[Relaxed] = field(default_factory=list)
 
-    def add(self, curve: NodedCurve, iterations: int) -> None:
-        """Record a relaxed curve."""
-        self.curves.append(curve)
-        self.relaxed.append(iterations * len(curve.polyline))
+    @property
+    def curves(self) -> list[NodedCurve]:
+        """The relaxed curves."""
+        return [each.noded_curve for each in self.relaxed]
 
     @property
     def best(self) -> int:
@@ -99,20 +97,28 @@ class Attempts:
 
     def tightening_pays(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
-        return self._is_kinked and self._is_affordable(self.relaxed[self.best])
+        return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
 
     def network_pays(self) -> bool:
         """Whether the best curve has kinks, and an attempt by the network is affordable."""
-        mean = sum(self.relaxed) / len(self.relaxed)
+        mean = self._work_of_relaxations / len(self.relaxed)
         return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+
+    def limited(self, config: RelaxationConfig) -> RelaxationConfig:
+        """Settings with which another relaxation does at most the work that is left."""
+        return replace(config, work=min(config.work, MOST_WORK - self._work))
 
     @property
     def _is_kinked(self) -> bool:
         return scaled_bending(self.curves[self.best]) > KINKED
 
     @property
-    def _work(self) -> int:
-        return self.searches * self._work_of_search + sum(self.relaxed)
+    def _work(self) -> float:
+        return self.searches * self._work_of_search + self._work_of_relaxations
+
+    @property
+    def _work_of_relaxations(self) -> float:
+        return sum(each.work for each in self.relaxed)
 
     @property
     def _work_of_search(self) -> int:

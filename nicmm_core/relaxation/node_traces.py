@@ -30,6 +30,12 @@ LONGEST_BYPASS = 6.0
 It is relative to the greatest distance between two nodes without a trace.
 """
 
+BYPASS_RADII = (0.1, 0.3, 1.0)
+"""Radii, relative to the longest bypass, within which paths are searched for, in turn.
+
+Most paths are far shorter than the longest one.
+"""
+
 
 @dataclass(frozen=True)
 class NodeTraces:
@@ -239,22 +245,28 @@ def _along_edges(
     corner = mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]
     start, end = corner[node], corner[nodes.following[node]]
     low, high, weight = start.copy(), start.copy(), np.zeros(len(node))
-    if len(node):
+    left = np.arange(len(node))
+    for radius in BYPASS_RADII:
+        if not len(left):
+            break
+        sources, source = np.unique(start[left], return_inverse=True)
         length, previous = csgraph.dijkstra(
             surface.edge_graph,
             directed=False,
-            indices=start,
-            limit=LONGEST_BYPASS * float(nodes.step_lengths[node].max()),
+            indices=sources,
+            limit=radius * LONGEST_BYPASS * float(nodes.step_lengths[node].max()),
             return_predecessors=True,
         )
-        for number in np.flatnonzero(np.isfinite(length[np.arange(len(node)), end])).tolist():
-            here, arc = int(end[number]), length[number]
+        found = np.isfinite(length[source, end[left]])
+        for number, row in zip(left[found].tolist(), source[found].tolist(), strict=True):
+            here, arc = int(end[number]), length[row]
             wanted = share[number] * arc[here]
             while arc[here] > wanted:
-                high[number], here = here, int(previous[number, here])
+                high[number], here = here, int(previous[row, here])
             low[number] = here
             step = arc[high[number]] - arc[here]
             weight[number] = (wanted - arc[here]) / step if step > 0.0 else 0.0
+        left = left[~found]
     around = [
         mesh.faces_with(np.array([one, other]))[0]
         for one, other in zip(low.tolist(), high.tolist(), strict=True)

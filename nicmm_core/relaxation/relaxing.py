@@ -152,6 +152,8 @@ class Relaxed:
     status : Status
         `CONVERGED`, `ITERATION_LIMIT` or `CANCELLED`; `UNRELAXED` if strands of the start are too
         close together to place nodes on it without contact. The curve is then the start itself.
+    work : float
+        Number of moves of all nodes in all attempts, a measure of the duration (`Work`).
     collided : bool
         Whether the curve crossed itself after an attempt with deferred tracing.
     """
@@ -162,6 +164,7 @@ class Relaxed:
     feature: float
     iterations: int
     status: Status
+    work: float
     collided: bool = False
 
 
@@ -199,13 +202,13 @@ def relax(
         first, start = start, start.surface_curve(surface.mesh)
     else:
         first = noded_curve(surface, start, config.levels[0])
-    iterations, collided = 0, False
+    iterations, work, collided = 0, 0.0, False
     for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
         attempt = _Attempt(
             surface, smoothness, config, watch, traces_every_iteration, first, iterations
         )
         curve = attempt.run()
-        iterations = attempt.iterations
+        iterations, work = attempt.iterations, work + attempt.work.spent
         good = curve is not None and is_simple(surface, curve)
         if good or attempt.status is Status.CANCELLED:
             break
@@ -217,7 +220,7 @@ def relax(
         curve, result = first, start
         status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
     bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
-    return Relaxed(result, curve, bending, feature, iterations, status, collided)
+    return Relaxed(result, curve, bending, feature, iterations, status, work, collided)
 
 
 def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:

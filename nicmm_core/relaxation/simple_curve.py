@@ -30,6 +30,9 @@ ROUNDS = 4
 RINGS = (2, 4, 8)
 """Numbers of rings of faces around two nodes in which a path between them is searched for."""
 
+Paths = dict[tuple[int, int], SurfacePoints]
+"""Paths along edges by the numbers of their two nodes."""
+
 Neighbourhoods = Callable[[IntArray], Iterator[IntArray]]
 """Yields growing sets of faces around the faces of two nodes, (2,)."""
 
@@ -71,10 +74,11 @@ def simple_curve(
     places = SurfacePoints(faces, barycentric)
     if neighbourhoods is None:
         neighbourhoods = _rings(surface.mesh)
+    numbers, paths = np.arange(len(places)), Paths()
     for _ in range(ROUNDS):
         checkpoint()
         bare = noded(surface, places, control_nodes, closed)
-        curve = _joined(surface, bare, normals, neighbourhoods)
+        curve = _joined(surface, bare, normals, neighbourhoods, numbers, paths)
         if curve is None:
             return None
         crossings = crossing_segments(surface.mesh.faces, curve.polyline, closed)
@@ -83,7 +87,7 @@ def simple_curve(
         outside = _outside_loops(curve, crossings)
         if outside.all():
             return None
-        places = places[outside]
+        places, numbers = places[outside], numbers[outside]
         normals = None if normals is None else normals[outside]
         control_nodes = (np.cumsum(outside) - 1)[control_nodes]
     return None
@@ -94,26 +98,33 @@ def _joined(
     curve: NodedCurve,
     normals: FloatArray | None,
     neighbourhoods: Neighbourhoods,
+    numbers: IntArray,
+    paths: Paths,
 ) -> NodedCurve | None:
-    """The curve through the nodes of a curve, simple or not; None if a gap remains."""
+    """The curve through the nodes of a curve, simple or not; None if a gap remains.
+
+    New paths along edges are added to `paths`, with the numbers of the nodes, (n,).
+    """
     nodes = curve.nodes
     traced = nodes
     if normals is not None:
         traced = Nodes(nodes.places, nodes.closed, nodes.positions, normals, nodes.phi_fea)
     polyline, node_place, lost = straight_traces(surface, curve, traced)
-    paths: dict[int, SurfacePoints] = {}
+    bypasses: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()
         following = (node + 1) % len(lost)
-        path = None
-        for inside in neighbourhoods(nodes.places.faces[[node, following]]):
-            path = _path_along_edges(surface.mesh, inside, nodes, node, following)
-            if path is not None:
-                break
-        if path is None:
-            return None
-        paths[node] = path
-    return _with_paths(curve, polyline, node_place, paths)
+        pair = int(numbers[node]), int(numbers[following])
+        if pair not in paths:
+            for inside in neighbourhoods(nodes.places.faces[[node, following]]):
+                path = _path_along_edges(surface.mesh, inside, nodes, node, following)
+                if path is not None:
+                    paths[pair] = path
+                    break
+            else:
+                return None
+        bypasses[node] = paths[pair]
+    return _with_paths(curve, polyline, node_place, bypasses)
 
 
 def _outside_loops(curve: NodedCurve, crossings: IntArray) -> BoolArray:
