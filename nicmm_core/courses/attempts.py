@@ -85,7 +85,7 @@ class Attempts:
     def another_search_pays(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
-        So it is if the best curve bends, unless the last searches have gained little.
+        A search is worthwhile if the best curve bends, unless the last ones have gained little.
         """
         energies = energies_of(self.surface, self.curves, self.smoothness)
         bending = scaled_bending(self.curves[int(np.argmin(energies))])
