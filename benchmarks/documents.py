@@ -5,6 +5,7 @@ Each block of figures is enclosed by `<!-- figures: NAME -->` and `<!-- /figures
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
@@ -14,7 +15,7 @@ import numpy as np
 
 from tests.oracles.corpus import DECLINED, DUE, GOOD, WRONG
 
-from . import courses, report, sharp_edges
+from . import courses, ninth_channel, pretrained_start, report, sharp_edges, transfer
 from .evidence import ROOT, Record, Results
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -224,6 +225,113 @@ def _degraded(results: Results) -> str:
     )
 
 
+def _degraded_start(results: Results) -> str:
+    pairs = [pair for mesh in results["meshes"] for pair in mesh["degraded"]]
+    medians = {
+        start: [np.median([pair[start][0] for pair in group]) for group in _by(pairs, "n").values()]
+        for start in ("from_nothing", "from_clean")
+    }
+    near, far = min(medians["from_nothing"]), max(medians["from_nothing"])
+    return _item(
+        "The course depends on how the surface is triangulated, though not on the numbering: on "
+        f"degraded meshes the curve is {near:.1f} to {far:.1f} % of the diagonal away from that of "
+        f"the clean mesh, by severity (mean distance, median of {len(results['meshes'])} meshes). "
+        f"Started from the clean mesh's curve, it stays within {max(medians['from_clean']):.1f} % "
+        "(`python -m benchmarks degraded_start`). So there are several courses of about the same "
+        "energy."
+    )
+
+
+def _obstacles(results: Results) -> str:
+    found = [each["detour"] for each in results["sets"] if each["detour"] is not None]
+    good = sum(not each["entered"] and not each["faults"] for each in found)
+    text = (
+        "`python -m benchmarks obstacles` paints discs of "
+        f"{200 * results['radius']:g} % of the diagonal on the free curve of "
+        f"{len(results['sets'])} third-party meshes: {good} curves go around the disc, each as one "
+        "simple loop without any length inside"
+    )
+    if good < len(found):
+        text += f"; {len(found) - good} do not"
+    text += "."
+    if len(found) < len(results["sets"]):
+        closed_off = len(results["sets"]) - len(found)
+        text += f" On {closed_off} of the meshes the disc closes off a limb, and the error says so."
+    return _paragraph(text)
+
+
+def _cuts(results: Results) -> str:
+    cuts = [each for each in results["answers"] if "refused" not in each]
+    sound = sum(not each["faults"] for each in cuts)
+    meshes = len({(each["meshes"], each["mesh"]) for each in cuts})
+    return _item(
+        "A manifold stays a manifold: faces do not overlap, there are no holes, and boundaries do "
+        f"not move (`python -m benchmarks cuts`: {sound} of {len(cuts)} cuts on {meshes} "
+        "third-party meshes)."
+    )
+
+
+def _ninth_channel(results: Results) -> str:
+    """The losses on sets with maps, and what the channel contributes."""
+    runs, iterations = results["runs"], results["iterations"]
+    names = {
+        ninth_channel.SEEN: "`nicmm-maps.npz`",
+        ninth_channel.NEUTRAL: "the same with a neutral φ_fea everywhere",
+        ninth_channel.WITHOUT_MAPS: "`nicmm.npz`, trained without maps",
+    }
+    means = {
+        label: np.array(run["mean_losses"])[[0, 10, iterations]] for label, run in runs.items()
+    }
+    rows = [(names[label], *(f"{mean:.3f}" for mean in means[label])) for label in runs]
+    seen, neutral = means[ninth_channel.SEEN], means[ninth_channel.NEUTRAL]
+    other = means[ninth_channel.WITHOUT_MAPS]
+    text = (
+        f"So training on sets with maps changes the mean energy to {seen[0] / other[0]:.2f} of "
+        f"that of a network trained without maps at the start, and to {seen[2] / other[2]:.2f} "
+        f"after {iterations} iterations. The channel itself contributes little: with the neutral "
+        f"value everywhere the energies are {neutral[0] / seen[0]:.2f} and "
+        f"{neutral[2] / seen[2]:.2f} times as high. A network that processes one vertex at a time "
+        "learns the average effect of maps on the energy, and the local information of φ_fea is "
+        "already in φ₀, whose path runs around obstacles and along lanes."
+    )
+    header = ("network", "forward pass", "after 10 iterations", f"after {iterations}")
+    return f"{report.table(header, rows)}\n\n{_paragraph(text)}"
+
+
+def _transfer(results: Results) -> str:
+    """The losses of the shipped weights on meshes outside their training set."""
+    runs, iterations = results["runs"], results["iterations"]
+    names = {
+        transfer.UNTRAINED: "before training, which returns φ₀",
+        transfer.ONE_MESH: f"pretrained on one mesh ({results['training_seconds']:.0f} s)",
+        transfer.SHIPPED: "`nicmm.npz`",
+    }
+    rows = [
+        (name, f"{runs[label]['mean_losses'][0]:.3f}", f"{np.mean(runs[label]['last_losses']):.3f}")
+        for label, name in names.items()
+    ]
+    header = ("network", "forward pass", f"after {iterations} iterations")
+    return report.table(header, rows)
+
+
+def _pretrained_start(results: Results) -> str:
+    """The final bending by start, over all kinds of curves."""
+    pooled = pretrained_start.relaxed_from(results["sets"])
+    rows = []
+    for label, relaxed in pooled.items():
+        mean, error = pretrained_start.gain(pooled, label)
+        ratio = "1" if label == pretrained_start.NO_NETWORK else f"{np.exp(mean):.3f} ± {error:.3f}"
+        iterations = np.mean([one["iterations"] for one in relaxed])
+        milliseconds = 1000.0 * np.mean([one["seconds"] for one in relaxed])
+        repaired = 100.0 * np.mean([one["repaired"] for one in relaxed])
+        rows.append((label, ratio, f"{repaired:.0f} %", f"{iterations:.1f}", f"{milliseconds:.0f}"))
+    header = (
+        "start", "final bending relative to φ₀, geometric mean", "topology repaired",
+        "iterations, mean", "CPU ms of a design",
+    )  # fmt: skip
+    return f"{report.table(header, rows)}\n\n{_paragraph(pretrained_start.findings(pooled))}"
+
+
 def _by(items: Iterable[Results], key: str) -> dict[str, list[Results]]:
     groups: dict[str, list[Results]] = defaultdict(list)
     for item in items:
@@ -279,13 +387,20 @@ def _no(count: int, be: str = " was") -> str:
 
 
 def _item(text: str) -> str:
-    return textwrap.fill(
-        text, 118, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False
-    )
+    return _wrapped(text, "- ", "  ")
 
 
 def _paragraph(text: str) -> str:
-    return textwrap.fill(text, 118, break_on_hyphens=False)
+    return _wrapped(text)
+
+
+def _wrapped(text: str, first: str = "", others: str = "") -> str:
+    """Text in lines of 118 characters, without breaks inside of code."""
+    whole = re.sub(r"`[^`]*`", lambda code: code[0].replace(" ", "\0"), text)
+    lines = textwrap.fill(
+        whole, 118, initial_indent=first, subsequent_indent=others, break_on_hyphens=False
+    )
+    return lines.replace("\0", " ")
 
 
 SMALL = 20_000
@@ -302,6 +417,12 @@ FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
     "sharp_edges": (_sharp_edges, "sharp_edges"),
     "cancellation": (_cancellation, "cancellation"),
     "degraded": (_degraded, "degraded"),
+    "degraded_start": (_degraded_start, "degraded_start"),
+    "obstacles": (_obstacles, "obstacles"),
+    "cuts": (_cuts, "cuts"),
+    "ninth_channel": (_ninth_channel, "ninth_channel"),
+    "transfer": (_transfer, "transfer"),
+    "pretrained_start": (_pretrained_start, "pretrained_start"),
     "corpus": (_corpus, "corpus"),
     "messes": (_messes, "messes"),
     "fuzz": (_fuzz, "fuzz"),

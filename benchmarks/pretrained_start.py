@@ -99,10 +99,10 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """Cost of each start, and bending of the relaxed curves."""
     by_kind = {
-        kind: _relaxed_from([each for each in results["sets"] if each["curve"] == kind])
+        kind: relaxed_from([each for each in results["sets"] if each["curve"] == kind])
         for kind in dict.fromkeys(each["curve"] for each in results["sets"])
     }
-    pooled = _relaxed_from(results["sets"])
+    pooled = relaxed_from(results["sets"])
     figure = report.figure(
         "pretrained_start.png",
         "Share of the sets whose final bending is at most the given multiple of the best known",
@@ -126,7 +126,7 @@ def section(results: Results) -> str:
         "that from φ₀, and its standard error. *Fairer* and *less fair* mean by more than "
         f"{100 * CLEARLY:.0f} %. In all ratios a bending below {NEARLY_STRAIGHT} counts as "
         f"{NEARLY_STRAIGHT}.\n\n"
-        f"{_findings(pooled)}\n\n{figure}"
+        f"{findings(pooled)}\n\n{figure}"
     )
 
 
@@ -137,7 +137,7 @@ def draw(results: Results, folder: Path) -> None:
         "L ∫ κ_g² ds relative to the best known",
         "share of the sets",
     )
-    for label, ratios in _to_best(_relaxed_from(results["sets"])).items():
+    for label, ratios in _to_best(relaxed_from(results["sets"])).items():
         shares = (np.arange(len(ratios)) + 1.0) / len(ratios)
         axes.step(np.sort(ratios), shares, where="post", label=label)
     axes.set_xscale("log")
@@ -244,7 +244,8 @@ def _instead_of_the_network(field: Field) -> Iterator[list[tuple[Mesh, ZeroSet]]
         yield level_sets
 
 
-def _relaxed_from(sets: Sequence[Results]) -> RelaxedFrom:
+def relaxed_from(sets: Sequence[Results]) -> RelaxedFrom:
+    """The relaxed curve of each set, by start."""
     return {label: [each["relaxed"][label] for each in sets] for label in sets[0]["relaxed"]}
 
 
@@ -272,7 +273,7 @@ def _to_best(relaxed: RelaxedFrom) -> dict[str, FloatArray]:
     return {label: values / best for label, values in ends.items()}
 
 
-def _gain(relaxed: RelaxedFrom, label: str) -> tuple[float, float]:
+def gain(relaxed: RelaxedFrom, label: str) -> tuple[float, float]:
     """Mean log ratio of the final bending to that from φ₀, and its standard error."""
     ends = _ends(relaxed)
     logarithm = np.log(ends[label] / ends[NO_NETWORK])
@@ -290,7 +291,7 @@ def _table(by_kind: Mapping[str, RelaxedFrom]) -> str:
     for kind, of_kind in by_kind.items():
         to_best, ends = _to_best(of_kind), _ends(of_kind)
         for label, relaxed in of_kind.items():
-            mean, error = _gain(of_kind, label)
+            mean, error = gain(of_kind, label)
             against = ends[label] / ends[NO_NETWORK]
             wins = (against < 1.0 - CLEARLY).sum(), (against > 1.0 + CLEARLY).sum()
             iterations = [one["iterations"] for one in relaxed]
@@ -320,7 +321,7 @@ def _percent(flags: Sequence[bool] | BoolArray) -> str:
     return f"{100 * np.mean(flags):.0f} %"
 
 
-def _findings(pooled: RelaxedFrom) -> str:
+def findings(pooled: RelaxedFrom) -> str:
     """What the table shows for all kinds of curves together, in words."""
     means = {
         label: np.mean([one["iterations"] for one in relaxed]) for label, relaxed in pooled.items()
@@ -338,7 +339,7 @@ def _findings(pooled: RelaxedFrom) -> str:
         f"{seconds[SHIPPED] / seconds[NO_NETWORK]:.2f} times its time (means). "
     )
     for label in (SHIPPED, DISTURBED):
-        mean, error = _gain(pooled, label)
+        mean, error = gain(pooled, label)
         text += (
             f"From “{label}” the final bending is {np.exp(mean):.3f} times that from φ₀ (standard "
             f"error {error:.3f})"
@@ -346,8 +347,8 @@ def _findings(pooled: RelaxedFrom) -> str:
         if abs(mean) <= 2.0 * error:
             text += ", which is not a significant difference"
         text += ". "
-    shipped, error = _gain(pooled, SHIPPED)
-    chance, other_error = _gain(pooled, DISTURBED)
+    shipped, error = gain(pooled, SHIPPED)
+    chance, other_error = gain(pooled, DISTURBED)
     if shipped + 2.0 * np.hypot(error, other_error) < chance:
         return text + "So pretraining leads to fairer courses than a random change of φ₀ does."
     return text + (
