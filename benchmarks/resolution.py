@@ -106,8 +106,8 @@ def draw(results: Results, folder: Path) -> None:
     plots.plain_ticks(right.yaxis)
     for axes in (left, right):
         axes.set_xscale("log")
-        plots.plain_ticks(axes.xaxis)
-        axes.set_xticks(sorted({each["vertices"] for each in answers}))
+        sizes = sorted({each["vertices"] for each in answers})
+        axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
         axes.tick_params(axis="x", which="major", labelrotation=30)
         axes.xaxis.set_minor_locator(NullLocator())
         axes.legend()
