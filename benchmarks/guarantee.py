@@ -86,7 +86,7 @@ def measure(scale: Scale) -> Results:
         print(f"  {of_mesh['collection']}, {of_mesh['mesh']}: {words}", flush=True)
     return {
         "seed": SEED,
-        "sets": SETS,
+        "sets": _sets(scale),
         "method": METHOD,
         "samplings": list(SAMPLINGS),
         "compared_every": _compared_every(scale),
@@ -149,13 +149,13 @@ def draw(results: Results, folder: Path) -> None:
 
 def _jobs(scale: Scale) -> Iterator[Job]:
     """Meshes with their requests; the points depend only on the seed and the name of the mesh."""
-    every = _compared_every(scale)
+    every, sets = _compared_every(scale), _sets(scale)
     for label, meshes in _collections(scale):
         for number, (name, mesh) in enumerate(meshes):
             generator = np.random.default_rng([SEED, zlib.crc32(name.encode())])
             requests = [
                 Request(points, closed, "shortest")
-                for points in point_sets(mesh, SETS, generator)
+                for points in point_sets(mesh, sets, generator)
                 for closed in (True, False)
             ]
             yield Job(label, name, mesh, requests, compares=number % every == 0)
@@ -171,6 +171,11 @@ def _collections(scale: Scale) -> Iterator[tuple[str, Iterable[tuple[str, nicmm.
     yield "SHREC16, two Loop subdivisions", collections.shrec16(scale.choose(384, 38))
     yield "closed manifold", collections.clean(scale.choose(36, 3))
     yield "people, animals and a cortex", collections.bodies(scale.choose(11, 1))
+
+
+def _sets(scale: Scale) -> int:
+    """Number of sets of control points per mesh."""
+    return 1 if scale is Scale.SMOKE else SETS
 
 
 def _compared_every(scale: Scale) -> int:

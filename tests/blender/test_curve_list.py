@@ -57,7 +57,6 @@ def pull(mesh_object, share=0.2):
     bpy.context.view_layer.update()
 
 
-@pytest.mark.slow
 def assert_same_curve(one, other):
     """Assert that the points of each polyline lie on the other polyline."""
     for points, line in ((one, other), (other, one)):
