@@ -85,12 +85,14 @@ def section(results: Results) -> str:
         "rest: median", "90 %", "greatest", "near the dab: median",
     )  # fmt: skip
     return (
-        f"Seed {results['seed']}, {results['meshes']}, closed curves through 3–5 random vertices, "
-        f"shortest order. A round dab with a radius of {100 * RADIUS:g} % of the diagonal is "
-        "painted beside the curve, and the design goes on from it with `start=`. The rest is the "
-        f"part of the curve at least {100 * FAR:g} % of the diagonal away from the dab. Distances "
-        "are the greatest ones from the curve before to the curve after, relative to the "
-        "diagonal.\n\n" + report.table(header, rows) + "\n\nThe paper does not measure this."
+        "The table shows how much of a curve moves when a small region is painted far from it, "
+        "starting from the curve before (`start=`). Each row is a kind of map. A round dab with a "
+        f"radius of {100 * RADIUS:g} % of the diagonal is painted beside a closed curve through "
+        "3–5 random vertices in the shortest order, with several dabs per mesh "
+        f"({results['meshes']}; seed {results['seed']}). The *rest* is the part of the curve at "
+        f"least {100 * FAR:g} % of the diagonal away from the dab. Distances are the greatest ones "
+        "from the curve before to the curve after, relative to the diagonal. The paper has no "
+        "corresponding measurement.\n\n" + report.table(header, rows)
     )
 
 

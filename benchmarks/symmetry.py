@@ -74,15 +74,15 @@ def section(results: Results) -> str:
         "median", "75 %", "90 %", "greatest",
     )  # fmt: skip
     return (
-        f"Seed {results['seed']}, {bodies} generated bodies that are symmetric about a plane, with "
-        f"{results['limbs'][0]}–{results['limbs'][1]} pairs of limbs; closed curves through two "
-        "mirror pairs of vertices, shortest order, and open ones that visit them from one side to "
-        "the other. The distance is the greatest one between the curve and its mirror image, "
-        "relative to the diagonal.\n\n"
+        "The table shows whether symmetric requests on symmetric bodies have symmetric curves. "
+        "Each row is a kind of curve; the distance is the greatest one between a curve and its "
+        f"mirror image, relative to the diagonal. There are {bodies} generated bodies (seed "
+        f"{results['seed']}) that are symmetric about a plane, with {results['limbs'][0]}–"
+        f"{results['limbs'][1]} pairs of limbs. Closed curves pass two mirror pairs of vertices in "
+        "the shortest order; open ones visit them from one side to the other.\n\n"
         + report.table(header, rows)
-        + "\n\nA curve that is not its own mirror image ties with that image: both have the same "
-        "energy, and the mirrored request on the mirrored mesh gives the mirrored curve "
-        "(`courses`). The paper does not measure symmetry."
+        + "\n\nThe fairest curve need not be its own mirror image; it and its mirror image then "
+        "have the same energy. The paper has no corresponding measurement."
     )
 
 
