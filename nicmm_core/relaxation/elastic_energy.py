@@ -245,7 +245,7 @@ def elastic_system(
         bands[0] += pull * drift
         slope += pull * nodes.phi_fea
     # JᵀJ lacks a part of the second derivative of the length: the stiffness of a taut string.
-    lengths = np.maximum(nodes.step_lengths, tolerances.TINY)
+    lengths = np.maximum(nodes.step_lengths, tolerances.SAME_POSITION * surface.mesh.diagonal)
     if not nodes.closed:
         lengths[nodes.last] = np.inf
     stiffness = tension / lengths
@@ -311,6 +311,8 @@ def damped_step(system: ElasticSystem, free: BoolArray, damping: float | FloatAr
 
 def predicted_decrease(system: ElasticSystem, move: FloatArray) -> float:
     """Decrease of the linearised energy by given moves along the conormals, (n,)."""
+    if not move.any():  # the matrix need not be finite
+        return 0.0
     return -float(move @ (2.0 * system.slope + _product(system, move)))
 
 

@@ -417,3 +417,16 @@ def test_touching_strands_raise_the_energy_by_the_share_that_contact_has(flat_di
     assert elastic_energy(free, Balance(2.0, weights.contact)) == elastic_energy(
         free, Balance(2.0, 0.0)
     )
+
+
+def test_coinciding_nodes_do_not_overflow(flat_disc):
+    """Two neighbouring nodes at the same place have a finite system."""
+    mesh, places = scaled(flat_disc, 1e-2), wobble(48, 1e-2)
+    places[7] = places[8]
+    surface, nodes = surface_of(mesh), nodes_on(mesh, places)
+    weights = balance(surface, nodes, 1.0, apart=False)
+    with np.errstate(over="raise", invalid="raise"):
+        system = elastic_system(surface, nodes, weights)
+        move = damped_step(system, np.ones(48, dtype=bool), 1e-3)
+        assert np.isfinite(move).all()
+        assert np.isfinite(predicted_decrease(system, move))
