@@ -37,7 +37,7 @@ LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
 MOST_WORK = 1_500
-"""Cap on the work of all attempts after the first, in moves of all nodes (`Work`).
+"""Work of all attempts together above which no further one is begun, in moves of nodes (`Work`).
 
 It takes two to three seconds.
 """
