@@ -21,7 +21,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from . import documents, evidence, report
+from . import documents, evidence, progress, report
 from .scale import Scale
 
 MEASUREMENTS = (
@@ -104,9 +104,12 @@ def main() -> int:
 
 def measure_one(name: str, scale: Scale) -> None:
     """Run a measurement, save its data, draw its plots and print its section."""
-    started = time.perf_counter()
+    code = evidence.code_behind(name)
+    before, started = progress.seconds_before(name, scale), time.perf_counter()
     results = importlib.import_module(f"benchmarks.{name}").measure(scale)
-    record = evidence.save(name, results, time.perf_counter() - started, scale)
+    seconds = time.perf_counter() - started + before
+    record = evidence.save(name, code, results, seconds, scale)
+    progress.forget(name, scale)
     report.draw(name, record, scale)
     print(report.section_text(name, record), flush=True)
     if scale is Scale.FULL:
@@ -117,8 +120,9 @@ def measure_all(scale: Scale, hours: float | None, jobs: int) -> list[str]:
     """Run all stale measurements and return the names of those that failed.
 
     Timed measurements run first, one at a time, while the machine is otherwise idle. The others
-    follow, `jobs` at a time. Each measurement saves its data when it ends, so a second call
-    continues where an interrupted one stopped.
+    follow, `jobs` at a time. Each measurement saves its data when it ends, and the long ones keep
+    what they have measured so far (`progress`), so a second call continues where an interrupted
+    one stopped.
     """
     full = scale is Scale.FULL
     stale = [name for name in MEASUREMENTS if not full or evidence.what_changed(name)]

@@ -29,6 +29,7 @@ from tests.oracles.mesh_files import COLLECTIONS, mesh_files
 
 from . import report
 from .evidence import Results
+from .progress import resumed
 from .scale import Scale
 
 PATIENCE = 1200.0
@@ -46,7 +47,9 @@ TITLE = "Requests on every mesh"
 def measure(scale: Scale) -> Results:
     """Request curves on all meshes, one collection after the other."""
     found = []
-    for one in isolated(outcome, _items(scale), PATIENCE):
+    for one in resumed(
+        "corpus", scale, _items(scale), lambda rest: isolated(outcome, rest, PATIENCE)
+    ):
         found.append(_answer(one))
         if found[-1]["verdict"] in (DECLINED, WRONG):
             print(f"  {_line(found[-1])}", flush=True)

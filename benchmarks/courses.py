@@ -30,6 +30,7 @@ from nicmm_core.relaxation.noded_curve import NodedCurve
 from . import collections, report
 from .evidence import Results
 from .parallel import in_processes
+from .progress import resumed
 from .samples import random_sets
 from .scale import Scale
 
@@ -120,7 +121,10 @@ def measure(scale: Scale) -> Results:
         for closed in (True, False)
     )
     requests = []
-    for request in in_processes(_compared, jobs, 1 if scale is Scale.SMOKE else WORKERS):
+    workers = 1 if scale is Scale.SMOKE else WORKERS
+    for request in resumed(
+        "courses", scale, jobs, lambda rest: in_processes(_compared, rest, workers)
+    ):
         requests.append(request)
         best = min(map(min, request["energies"].values()))
         ratio = request["energies"][DEFAULT][0] / best

@@ -40,9 +40,9 @@ QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
 
 WEIGHTS = "nicmm_core/network/weights"
 PRESENTATION = tuple(
-    f"benchmarks/{name}.py" for name in ("__init__", "evidence", "report", "scale")
+    f"benchmarks/{name}.py" for name in ("__init__", "evidence", "progress", "report", "scale")
 )
-"""Modules that only present results; they are left out of the fingerprints."""
+"""Modules that only keep or present results; they are left out of the fingerprints."""
 
 LINE = 100
 """Number of characters up to which a value in a data file is written on one line."""
@@ -55,15 +55,18 @@ def folder_of(scale: Scale) -> Path:
     return DATA if scale is Scale.FULL else QUICK_OUTPUT / "data"
 
 
-def save(name: str, results: Results, seconds: float, scale: Scale) -> Record:
-    """Write the data file of a measurement and return its content as read back."""
+def save(name: str, code: dict[str, str], results: Results, seconds: float, scale: Scale) -> Record:
+    """Write the data file of a measurement and return its content as read back.
+
+    `code` is `code_behind` when the measurement began; the files may have changed since.
+    """
     record = {
         "command": f"python -m benchmarks {name}"
         + ("" if scale is Scale.FULL else f" --{scale.value}"),
         "date": datetime.date.today().isoformat(),
         "machine": machine(),
         "seconds": round(seconds),
-        "code": code_behind(name),
+        "code": code,
         "meshes": meshes_behind(name),
         "results": results,
     }

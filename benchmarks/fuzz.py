@@ -13,6 +13,7 @@ from tests.oracles.isolation import Isolated, isolated
 
 from . import report
 from .evidence import Results
+from .progress import resumed
 from .scale import Scale
 
 SLOW = 10.0
@@ -42,7 +43,9 @@ def measure(scale: Scale) -> Results:
     outcomes: Counter[tuple[str, str]] = Counter()
     findings: list[str] = []
     slowest = 0.0
-    for done in isolated(answer, range(cases), PATIENCE, MEMORY):
+    for done in resumed(
+        "fuzz", scale, range(cases), lambda rest: isolated(answer, rest, PATIENCE, MEMORY)
+    ):
         kind = done.result.kind if done.result else "?"
         outcomes[kind, done.result.outcome if done.result else "lost"] += 1
         slowest = max(slowest, done.seconds)

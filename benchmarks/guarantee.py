@@ -25,6 +25,7 @@ from .elastic_curve import NODES, elastic_curve
 from .evidence import Results
 from .measures import SAMPLES, bending, squared_curvature
 from .parallel import in_processes
+from .progress import resumed
 from .samples import point_sets
 from .scale import Scale
 
@@ -80,7 +81,10 @@ class Job:
 def measure(scale: Scale) -> Results:
     """Design closed and open curves on every collection, and judge them."""
     meshes = []
-    for of_mesh in in_processes(_judged, _jobs(scale), 1 if scale is Scale.SMOKE else WORKERS):
+    workers = 1 if scale is Scale.SMOKE else WORKERS
+    for of_mesh in resumed(
+        "guarantee", scale, _jobs(scale), lambda rest: in_processes(_judged, rest, workers)
+    ):
         meshes.append(of_mesh)
         words = report.listed(f"{KIND[one['closed']]} {_words(one)}" for one in of_mesh["curves"])
         print(f"  {of_mesh['collection']}, {of_mesh['mesh']}: {words}", flush=True)

@@ -15,6 +15,7 @@ from tests.oracles.messes import MOST_POINTS, MOST_WELDED, SEED, WRONG, answer, 
 
 from . import report
 from .evidence import Results
+from .progress import resumed
 from .scale import Scale
 
 PATIENCE = 60.0
@@ -38,7 +39,12 @@ def measure(scale: Scale) -> Results:
     outcomes: Counter[str] = Counter()
     findings: list[str] = []
     seconds = []
-    for done in isolated_beside(answer, range(count), PATIENCE, WORKERS):
+    for done in resumed(
+        "messes",
+        scale,
+        range(count),
+        lambda rest: isolated_beside(answer, rest, PATIENCE, WORKERS),
+    ):
         outcomes[done.result.outcome if done.result else WRONG] += 1
         seconds.append(done.seconds)
         faults = done.result.faults if done.result else [done.failure]

@@ -97,7 +97,7 @@ def fake(monkeypatch, begun, fails=(), interrupted=()):
         if name in interrupted:
             raise KeyboardInterrupt
         if name not in fails:
-            evidence.save(name, {}, 7200.0, scale)
+            evidence.save(name, evidence.code_behind(name), {}, 7200.0, scale)
         return name not in fails
 
     monkeypatch.setattr(command, "run_apart", run_apart)
@@ -107,7 +107,7 @@ def test_stale_says_what_changed(kept, monkeypatch, capsys):
     assert command.list_stale() == 1
     assert capsys.readouterr().out == "messes: never measured\nfuzz: never measured\n"
     for name in command.MEASUREMENTS:
-        evidence.save(name, {}, 1.0, Scale.FULL)
+        evidence.save(name, evidence.code_behind(name), {}, 1.0, Scale.FULL)
     assert command.list_stale() == 0
     assert capsys.readouterr().out == ""
     read = changed(RELAXATION, "\nMORE = 1\n")
