@@ -2,15 +2,14 @@
 
 import dataclasses
 import importlib
+import inspect
 import pkgutil
 import re
-import sys
-from pathlib import Path
+from itertools import chain
 
 import matplotlib.image
 import pytest
 
-import nicmm_core
 from benchmarks import evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
@@ -19,7 +18,6 @@ from nicmm_core.network.finetuning import FinetuningConfig
 pytestmark = pytest.mark.slow
 
 FEW_ITERATIONS = 40
-CORE = evidence.ROOT / "nicmm_core"
 
 
 @pytest.fixture(autouse=True)
@@ -42,36 +40,46 @@ def quick_output(tmp_path, monkeypatch):
     return tmp_path / "quick"
 
 
+def functions_in(module):
+    """Functions and methods that a module defines."""
+    for value in vars(module).values():
+        if getattr(value, "__module__", None) != module.__name__:
+            continue
+        for member in vars(value).values() if inspect.isclass(value) else [value]:
+            member = getattr(member, "fget", getattr(member, "func", member))
+            member = inspect.unwrap(member) if callable(member) else member
+            if inspect.isfunction(member) and member.__code__.co_filename == module.__file__:
+                yield member
+
+
+def fail(*_arguments, **_keywords):
+    raise AssertionError("This measurement must not call the folders in WITHOUT")
+
+
 @pytest.fixture
-def rooms_entered():
-    """Folders of the core in which a function was called; imports alone do not count."""
-    for module in pkgutil.walk_packages(nicmm_core.__path__, "nicmm_core."):
-        if not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
-    files = set()
+def close():
+    """Make every function in some folders of the core fail; imports alone do not count."""
+    codes = {}
 
-    def note(frame, event, _argument):
-        if event == "call":
-            files.add(frame.f_code.co_filename)
+    def close_folders(names):
+        for name in names:
+            package = importlib.import_module(f"nicmm_core.{name}")
+            found = pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
+            for function in chain(*(functions_in(importlib.import_module(m.name)) for m in found)):
+                if not function.__code__.co_freevars:
+                    codes[function] = function.__code__
+                    function.__code__ = fail.__code__
+            assert codes
 
-    def rooms():
-        paths = [Path(name) for name in files if name.startswith(str(CORE))]
-        return {path.relative_to(CORE).parts[0] for path in paths}
-
-    sys.setprofile(note)
-    yield rooms
-    sys.setprofile(None)
+    yield close_folders
+    for function, code in codes.items():
+        function.__code__ = code
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)
-def test_measurement_keeps_its_data_and_writes_its_section(
-    name, tmp_path, quick_output, rooms_entered
-):
-    without = getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ())
-    if not without:
-        sys.setprofile(None)
+def test_measurement_keeps_its_data_and_writes_its_section(name, tmp_path, quick_output, close):
+    close(getattr(importlib.import_module(f"benchmarks.{name}"), "WITHOUT", ()))
     measure_one(name, Scale.SMOKE)
-    sys.setprofile(None)
 
     assert not (tmp_path / "full").exists()
     record = evidence.load(name, Scale.SMOKE)
@@ -84,5 +92,3 @@ def test_measurement_keeps_its_data_and_writes_its_section(
     for figure in written:
         height, width = matplotlib.image.imread(quick_output / "figures" / figure).shape[:2]
         assert min(height, width) > 100
-    assert not rooms_entered() & set(without)
-    assert set(without) <= {path.name for path in CORE.iterdir() if path.is_dir()}
