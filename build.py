@@ -323,7 +323,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
     test = commands.add_parser("test", help="run every check")
     test.add_argument(
-        "--quick", action="store_true", help="leave out the slow tests: an answer in 90 s"
+        "--quick", action="store_true", help="leave out the slow tests: about two minutes"
     )
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"

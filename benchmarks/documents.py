@@ -66,7 +66,7 @@ def _fairness(results: Results) -> str:
             f"within {most:.2f} and 90 % within {nearly_all:.2f}"
         )
     return _paragraph(
-        "The curves pass the control points to the last digit. On every "
+        "The curves pass through the control points to the last digit. On every "
         f"{results['compared_every']}th mesh, the bending L ∫ κ_g² ds (length L, geodesic "
         "curvature κ_g) was divided by that of the fairest explicit elastic curve known through "
         "the same points: " + "; ".join(words) + "."

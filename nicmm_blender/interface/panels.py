@@ -43,7 +43,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
             setattr(operator, name, getattr(properties, name))
         menus.draw_edit(layout, context)
         if context.mode == "EDIT_MESH":
-            layout.label(text="The tool works in Object Mode", icon="INFO")
+            layout.label(text="The Surface Curve tool does not work in Edit Mode", icon="INFO")
 
     def _draw_conversion(self, layout, properties) -> None:
         layout.separator()

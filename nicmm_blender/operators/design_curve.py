@@ -9,7 +9,7 @@ from bpy.props import StringProperty
 from .. import settings
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data, selection
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted
 from ..scene.surface import active_modifiers_text, read
 from . import polls
 from .long_solves import LongSolves
@@ -105,7 +105,7 @@ class NICMM_OT_design_curve(
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
         if self.alternatives:
-            summary += f"; {len(design.alternatives)} alternatives"
+            summary += f"; {counted(len(design.alternatives), 'alternative')}"
         if design.status == nicmm.Status.CONVERGED:
             self.report({"INFO"}, summary)
         else:
@@ -115,7 +115,8 @@ class NICMM_OT_design_curve(
 
 def _summary(mesh_object, design, order: str, curve_settings) -> str:
     curve = design.curves[0]
-    summary = f"Curve through {len(curve.control_index)} points {order}, {design.seconds:.1f} s"
+    points = counted(len(curve.control_index), "control point")
+    summary = f"Curve through {points} {order}, {design.seconds:.1f} s"
     shown = "" if curve_settings.use_modifiers else active_modifiers_text(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 

@@ -14,7 +14,7 @@ import bpy
 
 from .. import preferences
 from ..scene import design_request
-from ..scene.messages import InputError
+from ..scene.messages import InputError, user_message
 from . import time_slices
 from .partial_curve import PartialCurve
 from .viewports import NAVIGATION
@@ -172,13 +172,15 @@ def with_error_reports(operator, work):
         )
     try:
         return work()
-    except nicmm.MissingPackageError as error:
+    except nicmm.MissingPackageError:
         return _cancelled(
             operator,
-            f"{error}. Blender's Python is {sys.executable}; a zip of NICMM Curves built with "
-            "--with-torch contains PyTorch",
+            f"The method NICMM (Paper) needs PyTorch, which Blender's Python ({sys.executable}) "
+            "cannot import. Install a zip built with --with-torch, or choose the method NICMM",
         )
-    except (InputError, nicmm.NicmmError) as error:
+    except nicmm.NicmmError as error:
+        return _cancelled(operator, user_message(error))
+    except InputError as error:
         return _cancelled(operator, str(error))
 
 

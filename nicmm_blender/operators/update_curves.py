@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted
 from ..scene.surface import read
 from .long_solves import LongSolves
 
@@ -67,10 +67,10 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
                 failed.append(f'"{name}": {error}')
         if len(failed) == len(requests):
             raise InputError("; ".join(failed))
-        done = f"{len(requests) - len(failed)} of {len(requests)} curves updated"
+        done = f"{len(requests) - len(failed)} of {counted(len(requests), 'curve')} updated"
         moved = sum(request.moved for request in requests)
         if moved:
-            failed.append(f"{moved} control points moved because their triangles were deleted")
+            failed.append(f"{counted(moved, 'control point')} moved because triangles were deleted")
         if failed:
             self.report({"WARNING"}, f"{done}; {'; '.join(failed)}")
         else:

@@ -12,7 +12,7 @@ import numpy as np
 from ...nicmm_core.options import FEWEST_OPEN
 from ..scene import curve_record, design_request, mesh_data, surface_cache
 from ..scene.curve_record import CurveSettings
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
 from . import curve_object, writing
 
@@ -156,7 +156,8 @@ def open_curve(
     if edited is not None:
         points, moved = curve_record.current_control_points(edited, mesh_object, surface)
         if moved:
-            remarks.append(f"the mesh has changed: {moved} points moved to the nearest positions")
+            points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
+            remarks.append(f"the mesh has changed: {points_moved}")
         else:
             kept = {"smoothness": before.smoothness} if keeps_course else {}
             if replace(settings, method=before.method, **kept) == before:
@@ -181,7 +182,7 @@ def curves_of(answers: list) -> list:
         if isinstance(answer, Exception):
             raise answer
         if not answer.curves:
-            raise InputError(str(answer.status))
+            raise InputError(sentence(str(answer.status)))
     return [curve for answer in answers for curve in answer.curves]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import bmesh
 
 from ..scene import curve_record
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted, sentence
 from . import curve_object, mesh_cut, sticky_curves
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
@@ -48,7 +48,7 @@ def apply(context, mesh_object, surface, curves, settings, curve_settings) -> st
             new_object, mesh_object, surface, curves, curve_settings, drawn_as(settings)
         )
         curve_object.place(context, mesh_object, new_object)
-        return f"{sum(len(curve.faces) for curve in curves)} points"
+        return counted(sum(len(curve.faces) for curve in curves), "curve point")
     if len(curves) != 1:
         raise InputError(
             f"There are {len(curves)} curves, and only one can be cut. Set Output to Curve to see "
@@ -122,7 +122,7 @@ def replace(designed, request, answer) -> None:
     if isinstance(answer, Exception):
         raise InputError(str(answer)) from answer
     if not answer.curves:
-        raise InputError(str(answer.status))
+        raise InputError(sentence(str(answer.status)))
     redraw(designed, request.surface, answer.curves)
     curve_record.write_record(
         designed,
@@ -196,7 +196,7 @@ def _region(context, mesh_object, surface, curve, settings) -> str:
         settings.region_as, f'in the vertex group "{group.name}"' if group else ""
     )
     words = _custom_normals_note(mesh_object) if settings.region_cut else ""
-    return f"{len(chosen)} faces inside the curve are {what}{words}"
+    return f"{counted(len(chosen), 'face')} of the region {_are(len(chosen))} {what}{words}"
 
 
 def _parts(context, mesh_object, surface, curve, settings) -> str:
@@ -227,7 +227,12 @@ def _parts(context, mesh_object, surface, curve, settings) -> str:
         sizes = _corner_counts(normals, cutting)
         mesh_object.data.normals_split_custom_set(values[np.repeat(~inside, sizes)].tolist())
         other_data.normals_split_custom_set(values[np.repeat(inside, sizes)].tolist())
-    return f'{int(inside.sum())} faces inside the curve are now the object "{other.name}"'
+    count = int(inside.sum())
+    return f'{counted(count, "face")} of the region {_are(count)} now the object "{other.name}"'
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
 
 
 def _take_inside(edited, other_data) -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors for the user, with the core's messages reworded for Blender."""
+"""Messages for the user: errors, the core's messages reworded for Blender, counted things."""
+
+import re
 
 
 class InputError(Exception):
@@ -7,7 +9,7 @@ class InputError(Exception):
 
 
 def user_message(error: Exception, obstacle_group: str = "", vertices=None) -> str:
-    """Reword a message of the core: points are counted from one, and the obstacle map is named.
+    """Reword a message of the core: points are counted from 1, and the obstacle map is named.
 
     `vertices` are the vertex indices of the control points, or None if they are not at vertices.
     """
@@ -18,8 +20,24 @@ def user_message(error: Exception, obstacle_group: str = "", vertices=None) -> s
             text = text.replace(str(point), f"point {point.index + 1}{at}")
     text = text.replace("control_points has 1 point,", "there is 1 point,")
     text = text.replace("control_points has", "there are").replace("control_points", "the points")
+    text = re.sub(r"in the order \[([\d, ]+)\]", _counted_from_one, text)
     if "too few; a closed curve" in text:
         text += ". Turn Closed off for an open curve, which needs 2"
     if type(error).__name__ == "UnreachableError" and obstacle_group:
         text += f' (obstacles: the vertex group "{obstacle_group}")'
+    return sentence(text)
+
+
+def sentence(text: str) -> str:
+    """A message with a capital letter at its start."""
     return text[:1].upper() + text[1:]
+
+
+def counted(count: int, noun: str) -> str:
+    """A number of things, such as "1 curve" or "3 curves"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _counted_from_one(order: re.Match[str]) -> str:
+    numbers = [str(int(each) + 1) for each in order[1].split(",")]
+    return f"in the order {', '.join(numbers)}"

@@ -10,7 +10,7 @@ from itertools import chain
 import matplotlib.image
 import pytest
 
-from benchmarks import evidence, report
+from benchmarks import elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core.network.finetuning import FinetuningConfig
@@ -18,11 +18,13 @@ from nicmm_core.network.finetuning import FinetuningConfig
 pytestmark = pytest.mark.slow
 
 FEW_ITERATIONS = 40
+FEW_STEPS = 4
 
 
 @pytest.fixture(autouse=True)
-def short_finetuning(monkeypatch):
-    """Limit fine-tuning to a few iterations by default, because it takes most of the time."""
+def short_computations(monkeypatch):
+    """Limit fine-tuning and reference curves to a few steps, because they take most of the time."""
+    monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
     defaults = tuple(
         FEW_ITERATIONS if field.name == "iterations" else field.default
         for field in dataclasses.fields(FinetuningConfig)

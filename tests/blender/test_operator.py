@@ -1,5 +1,6 @@
 """The operator in the installed extension, compared with the core."""
 
+import re
 import sys
 from importlib import import_module
 
@@ -332,6 +333,24 @@ def test_separate_parts_are_reported(empty_scene):
     report = reported_error(order="GIVEN")
     first, other = (f"oint {n + 1} (vertex {ends[n]})" for n in (0, 2))
     assert f"P{first} and p{other} lie on different components" in report
+
+
+def test_an_order_that_works_is_counted_from_one_like_the_points(empty_scene):
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8)
+    grid = bpy.context.active_object
+    corners = scenes.nearest_vertices(grid, [(-1, -1, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0)])
+    with pytest.raises(empty_scene.core.NicmmError) as impossible:
+        design(empty_scene.core, grid, corners)
+    (order,) = re.findall(r"in the order \[([\d, ]+)\]", str(impossible.value))
+    named = ", ".join(str(int(each) + 1) for each in order.split(","))
+    report = reported_error(points=", ".join(map(str, corners)), order="GIVEN")
+    assert f"visit the points in the order {named}, which works" in report
+
+
+@pytest.mark.parametrize("count, text", [(0, "0 faces"), (1, "1 face"), (2, "2 faces")])
+def test_things_are_counted(empty_scene, count, text):
+    messages = import_module(f"{empty_scene.name}.nicmm_blender.scene.messages")
+    assert messages.counted(count, "face") == text
 
 
 @pytest.mark.slow
