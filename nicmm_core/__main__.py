@@ -115,7 +115,8 @@ def _flag(option: Option) -> dict[str, Any]:
     if option.kind is Kind.CHOICE:
         return {"choices": option.names, "default": option.default, "help": words}
     if option.kind is Kind.WEIGHTS:
-        return {"choices": AUTOMATIC, "help": f"sharp edges, or high curvature: {words}"}
+        source = "computed from sharp edges or from curvature"
+        return {"choices": AUTOMATIC, "help": f"{source}. {option.description}"}
     if option.kind is Kind.POINTS:
         return {
             "action": "append",

@@ -37,11 +37,9 @@ from .geometry.surface_points import SurfacePoints, check_connected, locate_cont
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.free_surface import check_reachable, free_faces
-from .repair.mapped_mesh import MappedMesh
-from .repaired_surface import RepairedSurface, design_on_original, start_on
+from .repaired_surface import Manifold, RepairedSurface, design_on_original, start_on
 from .request import Request, same_request
 from .status import Status
-from .surface_designer import SurfaceDesigner
 
 PARTS = (
     "control_points, or via points, lie on parts of the mesh that share only single vertices; a "
@@ -148,13 +146,13 @@ class Designer:
                     self.mesh, points, options["via_points"], order, closed
                 )
                 request = Request(points=points, **options)
-                mapped, designer, there = self._on_manifold(request)
-                if isinstance(start, Design) and _answers(start, mapped, there):
+                manifold, there = self._on_manifold(request)
+                if isinstance(start, Design) and _answers(start, manifold, there):
                     return replace(start, seconds=time.perf_counter() - started)
-                begin = None if start is None else start_on(mapped, start)
-                with placed(lambda points: points + mapped.origin):
-                    found = designer.design(there, started, begin, max_iterations)
-                    return design_on_original(mapped, found)
+                begin = None if start is None else start_on(manifold, start)
+                with placed(manifold.in_original):
+                    found = manifold.designer.design(there, started, begin, max_iterations)
+                    return design_on_original(manifold, found)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -168,8 +166,8 @@ class Designer:
         finally:
             self._lock.release()
 
-    def _on_manifold(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request]:
-        """The first manifold that connects the points, its designer, and the request on it."""
+    def _on_manifold(self, request: Request) -> tuple[Manifold, Request]:
+        """The first manifold that connects the points, and the request on it."""
         surface = self._surface_off_obstacles(request)
         found = surface.find(request)
         if found is not None:
@@ -194,13 +192,13 @@ class Designer:
         return last.surface
 
 
-def _answers(design: Design, mapped: MappedMesh, request: Request) -> bool:
-    """Whether a design is already the complete answer to a request on a mapped mesh."""
+def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
+    """Whether a design is already the complete answer to a request on a manifold."""
     resumable = design.resumable
     return (
         resumable is not None
         and design.status not in (Status.ITERATION_LIMIT, Status.CANCELLED)
-        and same_mesh(resumable.mesh, mapped.mesh)
+        and same_mesh(resumable.mesh, manifold.mesh)
         and same_request(request, resumable.request)
     )
 

@@ -82,8 +82,8 @@ def cancelled_design(seconds: float) -> Design:
 
     def no_field() -> FloatArray:
         raise CurveError(
-            "design.field belongs to no curve: the progress function cancelled the design before "
-            "there was one; ask for it again"
+            "design.field is not available: the design was cancelled before there was a curve; "
+            "design the curve again without cancelling"
         )
 
     return Design(

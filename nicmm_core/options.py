@@ -118,7 +118,7 @@ OPTIONS: tuple[Option, ...] = (
             Choice(
                 "nicmm-paper",
                 "NICMM (Paper)",
-                "The method exactly as the paper describes it. Needs PyTorch",
+                "The method of the paper, which trains a network for each curve. Needs PyTorch",
             ),
             Choice("variational", "Variational", "The same energy without a network"),
         ),

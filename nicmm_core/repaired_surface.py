@@ -1,12 +1,15 @@
 """Finds a manifold for each request, and maps requests, starts and designs between it and the mesh.
 
-A mesh without defects is used directly. Otherwise `repair.nonmanifold` has several methods to make
-a manifold, which are tried in turn until the points of the request are connected.
+For a mesh with defects, `repair.nonmanifold` has several methods to make a manifold, which are
+tried in turn until the points of the request are connected. The curve is designed on a canonical
+copy of their component (`geometry.numbering`), which depends only on the surface, so neither the
+numbering nor the position or size of the mesh affects the curve.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,12 +20,50 @@ from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh
 from .geometry.mesh import Mesh, same_mesh
+from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, in_faces
+from .path.via_points import with_via_points
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import REPAIRS, repaired
-from .request import Request
+from .request import Request, renumbered_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
+
+LARGEST_COPY = 200_000
+"""Number of faces of a component above which curves are designed on the component itself.
+
+A canonical copy of it would take a large part of the time of a curve.
+"""
+
+
+@dataclass(frozen=True)
+class Manifold:
+    """The surface on which the curve of a request is designed.
+
+    Attributes
+    ----------
+    repaired : MappedMesh
+        A manifold made from the faces of the given mesh.
+    copy : Renumbered or None
+        Canonical copy of the component of the request; None if the component is large.
+    designer : SurfaceDesigner
+        Designer on the copy, or on the repaired mesh if there is no copy.
+    """
+
+    repaired: MappedMesh
+    copy: Renumbered | None
+    designer: SurfaceDesigner
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the designer."""
+        return self.designer.mesh
+
+    def in_original(self, positions: FloatArray) -> FloatArray:
+        """Map positions on the mesh of the designer, (n, 3), to the given mesh."""
+        if self.copy is not None:
+            positions = self.copy.in_original(positions)
+        return positions + self.repaired.origin
 
 
 class RepairedSurface:
@@ -40,40 +81,62 @@ class RepairedSurface:
 
     def __init__(self, mesh: Mesh, usable: IntArray) -> None:
         self._mesh, self._usable = mesh, usable
-        self._made: list[tuple[MappedMesh, SurfaceDesigner] | None] = []
+        self._made: list[MappedMesh | None] = []
+        self._manifolds: dict[tuple[int, int], Manifold] = {}
 
     @property
     def first(self) -> MappedMesh:
         """The manifold in which the straightest pairs of faces are joined at non-manifold edges."""
         first = self._repair(0)
         assert first is not None  # only later methods may return None
-        return first[0]
+        return first
 
     @property
     def most_connected(self) -> MappedMesh:
         """The manifold on which most of the surface is connected."""
         made = [self._repair(number) for number in range(REPAIRS)]
-        return [one[0] for one in made if one is not None][-1]
+        return [one for one in made if one is not None][-1]
 
-    def find(self, request: Request) -> tuple[MappedMesh, SurfaceDesigner, Request] | None:
+    def find(self, request: Request) -> tuple[Manifold, Request] | None:
         """Find a manifold on which the points of a request are connected.
 
-        Returns the manifold, its designer and the request mapped to it, or None if the points are
-        connected on no manifold.
+        Returns the manifold and the request mapped to it, or None if the points are connected on no
+        manifold.
+
+        Raises
+        ------
+        ControlPointError, UnreachableError
+            If via points coincide with control points or lie on another component.
         """
         for number in range(REPAIRS):
             found = self._repair(number)
-            there = None if found is None else request_on(found[0], request)
+            there = None if found is None else request_on(found, request)
             if found is not None and there is not None:
-                return *found, there
+                if there.via_points:
+                    with_via_points(
+                        found.mesh, there.points, there.via_points, there.order, there.closed
+                    )
+                manifold = self._manifold(found, number, there)
+                copy = manifold.copy
+                return manifold, there if copy is None else renumbered_request(copy, there)
         return None
 
-    def _repair(self, number: int) -> tuple[MappedMesh, SurfaceDesigner] | None:
-        """The manifold made by one method, with its designer; None if `repaired` returns None."""
+    def _repair(self, number: int) -> MappedMesh | None:
+        """The manifold made by one method; None if `repaired` returns None."""
         while len(self._made) <= number:
-            mapped = repaired(self._mesh, len(self._made), self._usable)
-            self._made.append(None if mapped is None else (mapped, SurfaceDesigner(mapped.mesh)))
+            self._made.append(repaired(self._mesh, len(self._made), self._usable))
         return self._made[number]
+
+    def _manifold(self, mapped: MappedMesh, number: int, request: Request) -> Manifold:
+        """The component of a request on the manifold made by one method."""
+        component = int(mapped.mesh.face_component[request.points.faces[0]])
+        large = np.count_nonzero(mapped.mesh.face_component == component) > LARGEST_COPY
+        key = number, -1 if large else component
+        if key not in self._manifolds:
+            copy = None if large else renumbered(mapped.mesh, component, exact=mapped.differs)
+            mesh = mapped.mesh if copy is None else copy.mesh
+            self._manifolds[key] = Manifold(mapped, copy, SurfaceDesigner(mesh))
+        return self._manifolds[key]
 
 
 def request_on(mapped: MappedMesh, request: Request) -> Request | None:
@@ -96,24 +159,24 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
     )
 
 
-def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | SurfaceCurve:
-    """Map a start to a mapped mesh.
+def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | SurfaceCurve:
+    """Map a start to a manifold.
 
     Returns
     -------
     Resumable or SurfaceCurve
-        The start on the mapped mesh. Each point of a SurfaceCurve is given in the face of the
-        segment that begins there.
+        The start on the mesh of the manifold's designer. Each point of a SurfaceCurve is given in
+        the face of the segment that begins there.
 
     Raises
     ------
     CurveError
         If the start is not one curve through its control points on the original, enters faces that
-        curves may not enter, or cannot be mapped at a non-manifold edge.
+        curves may not enter, cannot be mapped at a non-manifold edge, or lies on another component.
     """
     if isinstance(start, Design):
         resumable = start.resumable
-        if resumable is not None and same_mesh(resumable.mesh, mapped.mesh):
+        if resumable is not None and same_mesh(resumable.mesh, manifold.mesh):
             return resumable
         if len(start.curves) != 1:
             raise CurveError(
@@ -121,7 +184,7 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
                 "exactly one curve"
             )
         start = start.curves[0]
-    original = mapped.original
+    original = manifold.repaired.original
     curve, segment_faces = checked_curve(original, start)
     index = curve.control_index
     first = int(index.argmin()) if curve.closed and len(index) else 0
@@ -144,13 +207,21 @@ def start_on(mapped: MappedMesh, start: Design | SurfaceCurve) -> Resumable | Su
     curve = replace(curve, faces=points.faces, barycentric=points.barycentric)
     if not curve.closed:
         curve = _between_ends(original, curve)
-    mapped_curve = mapped.curve_from_original(curve)
+    mapped_curve = manifold.repaired.curve_from_original(curve)
     if mapped_curve is None:
         raise CurveError(
             "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
             f"non-manifold edge{WITHOUT_START}"
         )
-    return mapped_curve
+    if manifold.copy is None:
+        return mapped_curve
+    on_copy = manifold.copy.curve_to_copy(mapped_curve)
+    if on_copy is None:
+        raise CurveError(
+            "start lies on another connected part of the surface than the control_points"
+            f"{WITHOUT_START}"
+        )
+    return on_copy
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
@@ -160,17 +231,29 @@ def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
     return curve_on_mesh(mesh, False, curve.faces[kept], curve.barycentric[kept], index - index[0])
 
 
-def design_on_original(mapped: MappedMesh, design: Design) -> Design:
-    """Map a design from a mapped mesh to the original."""
-    if not mapped.differs:
-        return design
+def design_on_original(manifold: Manifold, design: Design) -> Design:
+    """Map a design from a manifold to the given mesh."""
+    mapped, copy = manifold.repaired, manifold.copy
+    if copy is not None:
+        design = _mapped(design, copy.curve_to_original, copy.field_to_original)
+    if mapped.differs:
+        design = _mapped(design, mapped.curve_to_original, mapped.field_to_original)
+    return design
+
+
+def _mapped(
+    design: Design,
+    curve: Callable[[SurfaceCurve], SurfaceCurve],
+    field: Callable[[FloatArray], FloatArray],
+) -> Design:
+    """A design whose curves and level set are mapped to another mesh by two functions."""
     return replace(
         design,
-        curves=[mapped.curve_to_original(curve) for curve in design.curves],
-        alternatives=[design_on_original(mapped, other) for other in design.alternatives],
-        find_field=partial(_field_on_original, mapped, design),
+        curves=[curve(each) for each in design.curves],
+        alternatives=[_mapped(other, curve, field) for other in design.alternatives],
+        find_field=partial(_mapped_field, design, field),
     )
 
 
-def _field_on_original(mapped: MappedMesh, design: Design) -> FloatArray:
-    return mapped.field_to_original(design.field)
+def _mapped_field(design: Design, field: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    return field(design.field)

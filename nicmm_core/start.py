@@ -179,8 +179,8 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
     if distance.max() > longest:
         worst = PointName("control_points", int(visited[distance.argmax()]))
         raise CurveError(
-            f"{worst} is {distance.max():g} from where start passes it, more than {longest:g}, "
-            f"which is {LONGEST_MOVE:g} of the curve's length{WITHOUT_START}",
+            f"{worst} is {distance.max() / curve.length:.0%} of the curve's length away from its "
+            f"position on start; the limit is {LONGEST_MOVE:.0%}{WITHOUT_START}",
             worst,
         )
 
@@ -242,7 +242,7 @@ def _with_other_points(
     same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal
     if not same.any():
         raise CurveError(
-            f"start passes {len(curve.control_nodes)} control points, {len(there)} are requested, "
+            f"start has {len(curve.control_nodes)} control points, {len(there)} are requested, "
             f"and none of them is where it was{WITHOUT_START}"
         )
     arcs[same] = at_controls[nearest[same]]

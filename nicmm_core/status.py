@@ -10,8 +10,8 @@ class Status(enum.Enum):
 
     CONVERGED = "converged: one curve through all control points"
     ITERATION_LIMIT = (
-        "stopped at the iteration limit before the energy converged; the curve is usable, a finer "
-        "mesh, one without defects, or other control points may make it fairer"
+        "stopped at the iteration limit before the energy converged; the curve is usable; a finer "
+        "mesh, a mesh without defects or other control points may give a fairer one"
     )
     DIVERGED = (
         "the energy became infinite or NaN; the best earlier curve is returned; look for faces "
@@ -27,7 +27,7 @@ class Status(enum.Enum):
     )
     NOT_ONE_CURVE = (
         "the level set is not one simple curve through all control points; the mesh may be too "
-        "coarse there: subdivide it, or use the method 'nicmm', which always gives one"
+        "coarse there; subdivide it, or use the method 'nicmm'"
     )
 
     def __str__(self) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from .coarsening.coarse_start import CoarseStarts
 from .courses.attempts import FURTHER_SEARCHES, Attempts
 from .courses.comparison import is_apart
-from .courses.course_surface import CourseSurfaces
+from .courses.course_surface import CourseSurface
 from .design_result import Design
 from .errors import NicmmError
 from .geometry.array_types import FloatArray, IntArray
@@ -32,15 +32,14 @@ from .maps.guidance import component_unit
 from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
-from .path.via_points import with_via_points
-from .progress import CancelledError, checkpoint, placed, subrange
+from .progress import CancelledError, checkpoint, subrange
 from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed, relax
 from .relaxation.simple_curve import simple_curve
 from .relaxation.warm_start import WARM
-from .request import Request, renumbered_request
+from .request import Request
 from .start import Resumable, moved_start
 from .status import Status
 
@@ -153,10 +152,6 @@ class SurfaceDesigner:
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the curve of the network if no course is found."""
-        if request.via_points:  # raises an error if they are not on the component of the points
-            with_via_points(
-                self.mesh, request.points, request.via_points, request.order, request.closed
-            )
         with subrange(0.0, START_FRACTION):
             courses = self._course_starts(request)
             start = next(courses, None)
@@ -230,7 +225,7 @@ class SurfaceDesigner:
             for found in self._coarse_starts.courses(request, seed):
                 yield _Start(found.curve, found.visited, there, unit)
             return
-        for course in self._courses.under(request.points).courses(request, seed):
+        for course in self._courses.courses(request, seed):
             checkpoint()
             curve = simple_curve(
                 self._surface,
@@ -253,15 +248,13 @@ class SurfaceDesigner:
                 unit=self._unit(request),
                 breaking=coarse.breaking_vertices,
             )
-        there = self._courses.under(request.points).copy
-        with placed(there.in_original):
-            found = infer(there.mesh, renumbered_request(there, request))
+        found = infer(self.mesh, request)
         problem, zeros = found.problem, found.zeros
         # A zero set may touch itself where the mesh is too coarse; the path does not.
-        one = zeros.is_simple_curve(there.mesh, request.closed)
-        curve = zeros.curves[0] if one else path_curve(there.mesh, problem.working, problem.loop)
+        one = zeros.is_simple_curve(self.mesh, request.closed)
+        curve = zeros.curves[0] if one else path_curve(self.mesh, problem.working, problem.loop)
         return _Start(
-            curve=there.curve_to_original(curve),
+            curve=curve,
             visited=problem.loop.order,
             surface=self._curve_surface(request),
             unit=problem.unit,
@@ -328,8 +321,8 @@ class SurfaceDesigner:
         return curve_surface(self.mesh)
 
     @cached_property
-    def _courses(self) -> CourseSurfaces:
-        return CourseSurfaces(self.mesh)
+    def _courses(self) -> CourseSurface:
+        return CourseSurface(self.mesh)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:

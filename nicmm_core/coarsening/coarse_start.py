@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..courses.course_surface import CourseSurfaces, edges_crossed
+from ..courses.course_surface import CourseSurface, edges_crossed
 from ..errors import MeshError, NicmmError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
+from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import infer
 from ..progress import checkpoint, placed, subrange
@@ -66,11 +67,19 @@ class CoarseStart:
 
 @dataclass(frozen=True)
 class _CoarseSurface:
-    """A coarse mesh, prepared for curves and for the search for courses."""
+    """A coarse mesh, and canonical copies of its components to search for courses."""
 
     coarse: CoarseMesh
     surface: CurveSurface
-    courses: CourseSurfaces
+    copies: dict[int, tuple[Renumbered, CourseSurface]] = field(default_factory=dict)
+
+    def copy_under(self, points: SurfacePoints) -> tuple[Renumbered, CourseSurface]:
+        """The copy of the component on which points lie."""
+        component = int(self.coarse.mesh.face_component[points.faces[0]])
+        if component not in self.copies:
+            copy = renumbered(self.coarse.mesh, component)
+            self.copies[component] = copy, CourseSurface(copy.mesh)
+        return self.copies[component]
 
 
 class CoarseStarts:
@@ -98,9 +107,11 @@ class CoarseStarts:
             return
         with contextlib.suppress(NicmmError):
             on_coarse = _on_coarse(self._mesh, level.coarse, request)
-            for course in level.courses.under(on_coarse.points).courses(on_coarse, seed):
+            copy, surface = level.copy_under(on_coarse.points)
+            for course in surface.courses(renumbered_request(copy, on_coarse), seed):
                 checkpoint()
-                nodes = noded(level.surface, course.places, course.control_nodes, request.closed)
+                places = copy.original_points(course.places)
+                nodes = noded(level.surface, places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
                 curve = nodes_on_fine_mesh(self._fine, level.coarse, nodes, controls)
                 if curve is not None:
@@ -149,7 +160,7 @@ class CoarseStarts:
         """The network's curve on one coarse mesh, mapped to the fine mesh; None if it fails."""
         coarse = level.coarse
         on_coarse = _on_coarse(self._mesh, coarse, request)
-        copy = level.courses.under(on_coarse.points).copy
+        copy, _ = level.copy_under(on_coarse.points)
         with subrange(COARSE_SHARE, 0.9), placed(copy.in_original):
             zeros = infer(copy.mesh, renumbered_request(copy, on_coarse)).zeros
         if not zeros.is_simple_curve(copy.mesh, request.closed):
@@ -166,9 +177,7 @@ class CoarseStarts:
         key = component, count
         if key not in self._made:
             coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
-            self._made[key] = _CoarseSurface(
-                coarse, curve_surface(coarse.mesh), CourseSurfaces(coarse.mesh)
-            )
+            self._made[key] = _CoarseSurface(coarse, curve_surface(coarse.mesh))
         return self._made[key]
 
 

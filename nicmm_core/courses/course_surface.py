@@ -1,8 +1,4 @@
-"""Searches a mesh for courses of a curve, on a canonical copy that is refined if it is coarse.
-
-The copy depends only on the surface and not on the numbering of its vertices
-(`geometry.numbering`), so the courses do not depend on the numbering either.
-"""
+"""Searches a connected mesh for courses of a curve; a coarse mesh is refined first."""
 
 from __future__ import annotations
 
@@ -16,14 +12,13 @@ from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import unsigned_normals
-from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.refinement import Refined, refined
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import component_unit
 from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
-from ..request import Request, renumbered_request
+from ..request import Request
 from .course_search import find_courses
 from .hop_graph import CELLS, HopGraph, build_hop_graph, distances_along_edges
 
@@ -70,56 +65,32 @@ def edges_crossed(mesh: Mesh, component: int) -> float:
     return float(sides.sum()) / np.pi * np.sqrt(area / CELLS) / area
 
 
-class CourseSurfaces:
-    """The components of a mesh, each prepared for the search when it is first used.
+class CourseSurface:
+    """Searches a mesh for courses; computes once what depends only on the surface.
 
     Parameters
     ----------
     mesh : Mesh
+        A connected mesh. The courses depend on its numbering and its coordinates, so pass a
+        canonical copy (`geometry.numbering`).
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-        self._surfaces: dict[int, CourseSurface] = {}
-
-    def under(self, points: SurfacePoints) -> CourseSurface:
-        """The component on which points lie."""
-        component = int(self._mesh.face_component[points.faces[0]])
-        if component not in self._surfaces:
-            self._surfaces[component] = CourseSurface(self._mesh, component)
-        return self._surfaces[component]
-
-
-class CourseSurface:
-    """Searches a component of a mesh for courses; computes once what depends only on the surface.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    component : int
-    """
-
-    def __init__(self, mesh: Mesh, component: int = 0) -> None:
-        self._mesh, self._component = mesh, component
-
-    @cached_property
-    def copy(self) -> Renumbered:
-        """The canonical copy of the component, which depends only on the surface."""
-        return renumbered(self._mesh, self._component)
 
     @cached_property
     def _refined(self) -> Refined:
         times = 0
-        while len(self.copy.mesh.vertices) * 4**times < FEWEST_VERTICES:
+        while len(self._mesh.vertices) * 4**times < FEWEST_VERTICES:
             times += 1
-        return refined(self.copy.mesh, times)
+        return refined(self._mesh, times)
 
     @cached_property
     def _surface(self) -> CurveSurface:
         mesh = self._refined.mesh
-        if len(mesh.faces) == len(self.copy.mesh.faces):
-            return curve_surface(self.copy.mesh)
-        normals = self._refined.interpolation @ unsigned_normals(self.copy.mesh)
+        if len(mesh.faces) == len(self._mesh.faces):
+            return curve_surface(self._mesh)
+        normals = self._refined.interpolation @ unsigned_normals(self._mesh)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         own = curve_surface(mesh)
         # Vertex normals have arbitrary signs, so interpolated ones may cancel.
@@ -144,17 +115,15 @@ class CourseSurface:
         ControlPointError, UnreachableError
             If via points coincide with control points or lie on another component.
         """
-        there = renumbered_request(self.copy, request)
-        mesh = self.copy.mesh
-        on_refined = self._refined.in_parts(there.points)
+        on_refined = self._refined.in_parts(request.points)
         along = distances_along_edges(self._surface, on_refined)
         size = len(self._refined.mesh.vertices)
         visited = np.arange(len(on_refined))
-        if there.order == "shortest":
-            visited = shortest_order(along[:, size:], there.closed)
-        if there.via_points:
+        if request.order == "shortest":
+            visited = shortest_order(along[:, size:], request.closed)
+        if request.via_points:
             waypoints = with_via_points(
-                mesh, there.points, there.via_points, there.order, there.closed
+                self._mesh, request.points, request.via_points, request.order, request.closed
             )
             fixed = waypoints.is_control
             on_refined = self._refined.in_parts(waypoints.points)
@@ -166,19 +135,18 @@ class CourseSurface:
             return
         found = find_courses(
             self._graph,
-            self._with_maps(there),
+            self._with_maps(request),
             on_refined,
             along,
             fixed,
-            there.closed,
-            there.smoothness,
-            any_order=there.order == "shortest" and not there.via_points,
+            request.closed,
+            request.smoothness,
+            any_order=request.order == "shortest" and not request.via_points,
             seed=seed,
         )
         for nodes, visit in found:
-            on_copy = self._refined.in_parents(nodes.places)
+            places = self._refined.in_parents(nodes.places)
             control = np.flatnonzero(visit >= 0)
-            places = self.copy.original_points(on_copy)
             yield Course(places, control, visited[visit[control]])
 
     @cached_property
@@ -186,7 +154,7 @@ class CourseSurface:
         return build_hop_graph(self._surface)
 
     def _with_maps(self, request: Request) -> CurveSurface:
-        """The surface with the maps of a request on the copy."""
+        """The surface with the maps of a request."""
 
         def at_vertices(values: FloatArray | None) -> FloatArray | None:
             return None if values is None else self._refined.interpolation @ values

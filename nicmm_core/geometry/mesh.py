@@ -86,7 +86,7 @@ class Mesh:
     @cached_property
     def face_normals(self) -> FloatArray:
         """Unit normal of each face, shape (F, 3); zero if the face has no area."""
-        normals = _area_vectors(self.vertices, self.faces)
+        normals = area_vectors(self.vertices, self.faces)
         for block in blocks(len(normals)):
             length = _lengths(normals[block])
             normals[block] /= np.where(length > 0.0, length, 1.0)[:, None]
@@ -239,10 +239,10 @@ def real_array(values: ArrayLike) -> FloatArray:
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
-    return 0.5 * _lengths(_area_vectors(vertices, faces))
+    return 0.5 * _lengths(area_vectors(vertices, faces))
 
 
-def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Normals whose lengths are twice the areas of the faces, shape (F, 3)."""
     vectors = np.empty(faces.shape)
     for block in blocks(len(faces)):

@@ -1,30 +1,39 @@
 """Canonical copies of components: numbered by position, in the coordinates of the principal frame.
 
 Which of several paths of about the same length is found depends on the order in which vertices and
-faces are visited. In the copy, both are sorted by position in the principal frame of the component.
-Each axis of this frame points to where the surface reaches farther, even if the frame is then
-left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has the same copy
-up to rounding and scale. Surfaces without a unique principal frame, such as a ball, are an
-exception. Other components of the mesh make no difference.
+faces are visited, and on the last bit of their coordinates. In the copy, vertices and faces are
+sorted by position in the principal frame of the component, its area is 1, and coordinates are
+rounded. Each axis of this frame points to where the surface reaches farther, even if the frame is
+then left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has exactly
+the same copy, unless a coordinate is within a rounding error of the middle between two multiples of
+`RESOLUTION`. Surfaces without a unique principal frame, such as a ball, are an exception. Other
+components of the mesh make no difference.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
-from .mesh import LARGEST, Mesh, blocks
+from .mesh import LARGEST, Mesh, area_vectors, blocks
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
 RESOLUTION = 1e-7
-"""Unit to which coordinates are rounded before they are compared, in square roots of the area.
+"""Unit to which coordinates are rounded, in square roots of the area.
 
 It is far coarser than rounding errors.
+"""
+
+SOUND = 0.05
+"""Greatest change of the normal of a face, weighted by its area, by which coordinates are rounded.
+
+Relative to the area. If the change of any face is greater, coordinates are not rounded.
 """
 
 FARTHEST = 2.0**60
@@ -43,7 +52,7 @@ class Renumbered:
     original : Mesh
         The given mesh.
     mesh : Mesh
-        The copy.
+        The copy; its area is 1.
     number : (V,) int array
         Index in the copy of each original vertex, or -1 if it belongs to no face of the component.
     face : (F',) int array
@@ -54,6 +63,8 @@ class Renumbered:
         Origin of the copy's coordinates, in the space of the original.
     axes : (3, 3) float array
         Axes of the copy's coordinates, one in each column.
+    unit : float
+        Length in the original of a unit of length in the copy.
     """
 
     original: Mesh
@@ -63,16 +74,22 @@ class Renumbered:
     corner: IntArray
     centre: FloatArray
     axes: FloatArray
+    unit: float
 
     def in_original(self, positions: FloatArray) -> FloatArray:
-        """Map positions on the copy, (n, 3), to the original."""
-        return positions @ self.axes.T + self.centre
+        """Map positions on the copy, (n, 3), to the original, up to the rounding of coordinates."""
+        return self.unit * positions @ self.axes.T + self.centre
+
+    @cached_property
+    def _place(self) -> IntArray:
+        """Face of the copy of each original face, or -1, (F,)."""
+        place = np.full(len(self.original.faces), -1)
+        place[self.face] = np.arange(len(self.face))
+        return place
 
     def points_to_copy(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the component to the copy, each in the first face that contains it."""
-        place = np.empty(len(self.original.faces), dtype=np.int64)
-        place[self.face] = np.arange(len(self.face))
-        faces = place[points.faces]
+        faces = self._place[points.faces]
         weights = np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
         return in_first_faces(self.mesh, SurfacePoints(faces, weights))
 
@@ -91,6 +108,24 @@ class Renumbered:
         np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
         return SurfacePoints(self.face[points.faces], barycentric)
 
+    def field_to_original(self, values: FloatArray) -> FloatArray:
+        """Map lengths at the vertices of the copy, (V',), to the vertices of the original, (V,).
+
+        Vertices outside the component get the greatest value.
+        """
+        result = np.full(len(self.number), values.max())
+        inside = self.number >= 0
+        result[inside] = values[self.number[inside]]
+        return self.unit * result
+
+    def curve_to_copy(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+        """Map a curve on the original to the copy; None if it is on another component."""
+        faces = self._place[curve.faces]
+        if (faces < 0).any():
+            return None
+        weights = np.take_along_axis(curve.barycentric, self.corner[faces], axis=1)
+        return curve_on_mesh(self.mesh, curve.closed, faces, weights, curve.control_index)
+
     def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a curve on the copy to the original."""
         there = self.original_points(SurfacePoints(curve.faces, curve.barycentric))
@@ -99,13 +134,23 @@ class Renumbered:
         )
 
 
-def renumbered(mesh: Mesh, component: int = 0) -> Renumbered:
-    """Make the canonical copy of a component of a mesh."""
+def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbered:
+    """Make the canonical copy of a component of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    component : int
+    exact : bool
+        Whether coordinates are not rounded, as for copies of a vertex that must stay apart.
+    """
     inside = np.flatnonzero(mesh.face_component == component)
     given, areas = mesh.faces[inside], mesh.face_areas[inside]
     vertex = np.unique(given)
+    unit = max(float(np.sqrt(areas.sum())), TINY)
     centre, axes, places = _in_frame(mesh.vertices, given, areas)
-    order = np.lexsort(_rounded(places[vertex], areas).T[::-1])
+    rounded = _rounded(places[vertex], unit)
+    order = np.lexsort(rounded.T[::-1])
     number = np.full(len(mesh.vertices), -1)
     number[vertex[order]] = np.arange(len(order))
     corner = np.tile(np.arange(3), (len(given), 1))
@@ -115,14 +160,25 @@ def renumbered(mesh: Mesh, component: int = 0) -> Renumbered:
     corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
     faces = np.take_along_axis(number[given], corner, axis=1)
     face = np.lexsort(np.sort(faces, axis=1).T[::-1])
-    copy = Mesh(places[vertex[order]].clip(-LARGEST, LARGEST), faces[face])
-    return Renumbered(mesh, copy, number, inside[face], corner[face], centre, axes)
+    vertices = (places[vertex[order]] / unit).clip(-LARGEST, LARGEST)
+    coordinates = RESOLUTION * rounded[order]
+    if not exact and _is_sound(vertices, coordinates, faces):
+        vertices = coordinates
+    copy = Mesh(vertices, faces[face])
+    return Renumbered(mesh, copy, number, inside[face], corner[face], centre, axes, unit)
+
+
+def _is_sound(vertices: FloatArray, rounded: FloatArray, faces: IntArray) -> bool:
+    """Whether the normals of all faces, weighted by their areas, hardly change by rounding."""
+    before, after = area_vectors(vertices, faces), area_vectors(rounded, faces)
+    change, area = np.linalg.norm(after - before, axis=1), np.linalg.norm(before, axis=1)
+    return bool((change <= SOUND * area).all())
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
     """Coordinates of the vertices in the principal frame, in units of `RESOLUTION`, (V, 3)."""
     places = _in_frame(mesh.vertices, mesh.faces, mesh.face_areas)[2]
-    return _rounded(places, mesh.face_areas)
+    return _rounded(places, max(float(np.sqrt(mesh.face_areas.sum())), TINY))
 
 
 def _in_frame(
@@ -138,11 +194,11 @@ def _in_frame(
     return frame.centre, axes, places
 
 
-def _rounded(places: FloatArray, face_areas: FloatArray) -> IntArray:
-    """Coordinates rounded to integers in units of `RESOLUTION`."""
-    unit = max(RESOLUTION * float(np.sqrt(face_areas.sum())), TINY)
+def _rounded(places: FloatArray, unit: float) -> IntArray:
+    """Coordinates rounded to integers, in units of `RESOLUTION` times the unit of the copy."""
     with np.errstate(over="ignore"):
-        return np.round((places / unit).clip(-FARTHEST, FARTHEST)).astype(np.int64)
+        scaled = places / max(RESOLUTION * unit, TINY)
+        return np.round(scaled.clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 @dataclass(frozen=True)

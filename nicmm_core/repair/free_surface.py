@@ -56,8 +56,8 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
     free = np.flatnonzero(~blocked)
     if not len(free):
         raise UnreachableError(
-            "obstacles cover the whole surface; paint less with weight 1, or use a smaller "
-            "clearance"
+            "obstacles cover the whole surface; paint a smaller area with weight 1, or use a "
+            "smaller clearance"
         )
     return free
 
@@ -90,7 +90,7 @@ def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:
             if not len(point):
                 raise UnreachableError(
                     f"{name} lies inside an obstacle of weight 1, or closer to one than the "
-                    "clearance; move it, or paint less",
+                    "clearance; move it, or paint a smaller area",
                     name,
                 )
             component[name] = set(free.mesh.face_component[point.faces].tolist())
