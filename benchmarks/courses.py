@@ -83,7 +83,7 @@ UNCHANGED = Similarity(np.eye(3))
 
 @dataclass(frozen=True)
 class Answer:
-    """A curve, in units of the unchanged mesh times a factor, and its points on that mesh."""
+    """A curve in units of its own, a factor for lengths on the unchanged mesh, and points there."""
 
     curve: NodedCurve
     factor: float
@@ -289,8 +289,9 @@ def _portfolio(job: Job) -> tuple[dict[str, list[Answer]], int]:
 def _answer(design: nicmm.Design, change: Similarity = UNCHANGED) -> Answer:
     """A design on a mesh after a similarity."""
     assert design.resumable is not None  # `nicmm` relaxes every curve
-    points = change.undone(design.curves[0].points)
-    return Answer(design.resumable.curve, change.factor, points)
+    curve, whole = design.resumable.curve, design.curves[0]
+    factor = curve.length / whole.length * change.factor
+    return Answer(curve, factor, change.undone(whole.points))
 
 
 @contextmanager

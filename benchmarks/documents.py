@@ -130,12 +130,12 @@ def _courses(results: Results) -> str:
         )
         + "\n"
         + _item(
-            "The course depends only on the surface, because the search runs on a copy in its "
-            "principal frame. Curves that moved by more than "
+            "The curve depends only on the surface, because it is designed on a copy that is "
+            "numbered by position in the principal frame. Curves that moved by more than "
             f"{100 * courses.MOVED:g} % of the diagonal when the mesh was changed, although the "
             f"energies differ by more than {100 * courses.TIE:g} %: {far}. "
             f"{100 * np.mean(np.array(every) < 1e-6):.0f} % of all {len(every)} curves stay the "
-            "same within 1e-6; the others differ by rounding."
+            "same within 1e-6."
         )
     )
 

@@ -15,7 +15,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import design, shapes, surface_designer
+from nicmm_core import design, repaired_surface, shapes, surface_designer
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
@@ -43,11 +43,17 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "checks, manifold": [
         (design, "checked_options"),
         (design, "locate_control_points"),
-        (design.Designer, "_on_manifold"),
+        (repaired_surface, "repaired"),
+        (repaired_surface, "request_on"),
+    ],
+    "canonical copy": [
+        (repaired_surface, "renumbered"),
+        (repaired_surface, "renumbered_request"),
+        (coarse_start, "renumbered"),
+        (design, "design_on_original"),
     ],
     "normals": [(surface_designer, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
-    "copy in principal frame": [(course_surface, "renumbered")],
     "hop graph": [(course_surface, "build_hop_graph")],
     "distances, order of the points": [
         (course_surface, "distances_along_edges"),

@@ -134,7 +134,7 @@ def test_alternatives_are_whole_curves_that_differ(body, closed):
     design = nicmm.design_curve(body, chosen, closed=closed, alternatives=2)
     assert closed <= len(design.alternatives) <= 2
     every = [design, *design.alternatives, plain]
-    scale = min(one.curves[0].length for one in every)
+    scale = min(one.resumable.curve.length for one in every)
     energies = []
     for one in every:
         assert_valid_design(body, one, body.vertices[chosen], closed)
