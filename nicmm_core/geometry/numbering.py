@@ -146,11 +146,12 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     """
     inside = np.flatnonzero(mesh.face_component == component)
     given, areas = mesh.faces[inside], mesh.face_areas[inside]
-    vertex = np.unique(given)
+    vertex = np.flatnonzero(np.bincount(given.ravel(), minlength=len(mesh.vertices)))
     unit = max(float(np.sqrt(areas.sum())), TINY)
     centre, axes, places = _in_frame(mesh.vertices, given, areas)
     rounded = _rounded(places[vertex], unit)
     order = np.lexsort(rounded.T[::-1])
+    checkpoint()
     number = np.full(len(mesh.vertices), -1)
     number[vertex[order]] = np.arange(len(order))
     corner = np.tile(np.arange(3), (len(given), 1))
@@ -159,7 +160,9 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     first = np.take_along_axis(number[given], corner, axis=1).argmin(axis=1)
     corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
     faces = np.take_along_axis(number[given], corner, axis=1)
-    face = np.lexsort(np.sort(faces, axis=1).T[::-1])
+    low, middle, high = np.sort(faces, axis=1).T
+    face = np.lexsort((high, low * len(order) + middle))
+    checkpoint()
     vertices = (places[vertex[order]] / unit).clip(-LARGEST, LARGEST)
     coordinates = RESOLUTION * rounded[order]
     if not exact and _is_sound(vertices, coordinates, faces):
