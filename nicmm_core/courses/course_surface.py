@@ -13,7 +13,7 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import unsigned_normals
 from ..geometry.refinement import Refined, refined
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, in_first_faces, joined
 from ..maps.guidance import component_unit
 from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
@@ -26,6 +26,12 @@ MOST_CROSSED = 40.0
 """Value of `edges_crossed` above which no courses are searched for.
 
 On meshes of needles, moving a node crosses thousands of faces.
+"""
+
+POINT_RESOLUTION = 1e-6
+"""Unit to which barycentric coordinates of points are rounded for the search.
+
+So rounding errors, of a point given by its position, do not decide between two courses.
 """
 
 FEWEST_VERTICES = 1_000
@@ -115,6 +121,7 @@ class CourseSurface:
         ControlPointError, UnreachableError
             If via points coincide with control points or lie on another component.
         """
+        request = _with_rounded_points(self._mesh, request)
         on_refined = self._refined.in_parts(request.points)
         along = distances_along_edges(self._surface, on_refined)
         size = len(self._refined.mesh.vertices)
@@ -162,3 +169,22 @@ class CourseSurface:
         obstacles, alignment = at_vertices(request.obstacles), at_vertices(request.alignment)
         unit = component_unit(self._refined.mesh, 0)
         return with_maps(self._surface, obstacles, alignment, unit)
+
+
+def _with_rounded_points(mesh: Mesh, request: Request) -> Request:
+    """The request with points whose coordinates are rounded; unchanged if points would coincide."""
+    points = _rounded(mesh, request.points)
+    via_points = {key: _rounded(mesh, via) for key, via in request.via_points.items()}
+    together = joined([points, *via_points.values()])
+    places = np.column_stack([together.faces, together.barycentric])
+    if len(np.unique(places, axis=0)) < len(places):
+        return request
+    return replace(request, points=points, via_points=via_points)
+
+
+def _rounded(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:
+    """Points with rounded barycentric coordinates, each in the first face that contains it."""
+    weights = np.round(points.barycentric / POINT_RESOLUTION) * POINT_RESOLUTION
+    rows, greatest = np.arange(len(weights)), weights.argmax(axis=1)
+    weights[rows, greatest] += 1.0 - weights.sum(axis=1)
+    return in_first_faces(mesh, SurfacePoints(points.faces, weights))

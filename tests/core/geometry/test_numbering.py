@@ -147,6 +147,21 @@ def test_motions_and_mirrors_do_not_decide_the_course(mirror):
     assert max(moved) < 1e-12
 
 
+@pytest.mark.slow
+def test_numbers_do_not_decide_the_course_through_points_inside_faces():
+    """Their coordinates differ by rounding errors, so the curves do too, but not the courses."""
+    moved = []
+    for seed in range(4):
+        mesh = shapes.creature(seed, resolution=32, faces=4000)
+        points = random_surface_points(mesh, 4, seed).positions(mesh)
+        curve = nicmm.design_curve(mesh, points, order="shortest").curves[0]
+        other, _ = shuffled(mesh, seed + 1)
+        turned = nicmm.Mesh(other.vertices @ rotation(seed).T, other.faces)
+        again = nicmm.design_curve(turned, points @ rotation(seed).T, order="shortest").curves[0]
+        moved.append(apart(curve.points, again.points @ rotation(seed)) / mesh.diagonal)
+    assert max(moved) < 1e-6
+
+
 def test_other_components_make_no_difference(body):
     alone = renumbered(body)
     far = body.vertices[:, [1, 2, 0]] * 3.0 + 50.0
