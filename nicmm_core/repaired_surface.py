@@ -82,7 +82,8 @@ class RepairedSurface:
     def __init__(self, mesh: Mesh, usable: IntArray) -> None:
         self._mesh, self._usable = mesh, usable
         self._made: list[MappedMesh | None] = []
-        self._manifolds: dict[tuple[int, int], Manifold] = {}
+        self._manifolds: dict[tuple[int, int], Manifold] = {}  # by method and component
+        self._whole: dict[int, SurfaceDesigner] = {}  # for components without a copy
 
     @property
     def first(self) -> MappedMesh:
@@ -130,13 +131,15 @@ class RepairedSurface:
     def _manifold(self, mapped: MappedMesh, number: int, request: Request) -> Manifold:
         """The component of a request on the manifold made by one method."""
         component = int(mapped.mesh.face_component[request.points.faces[0]])
-        large = np.count_nonzero(mapped.mesh.face_component == component) > LARGEST_COPY
-        key = number, -1 if large else component
-        if key not in self._manifolds:
-            copy = None if large else renumbered(mapped.mesh, component, exact=mapped.differs)
-            mesh = mapped.mesh if copy is None else copy.mesh
-            self._manifolds[key] = Manifold(mapped, copy, SurfaceDesigner(mesh))
-        return self._manifolds[key]
+        if (number, component) not in self._manifolds:
+            if np.count_nonzero(mapped.mesh.face_component == component) > LARGEST_COPY:
+                whole = self._whole.setdefault(number, SurfaceDesigner(mapped.mesh))
+                made = Manifold(mapped, None, whole)
+            else:
+                copy = renumbered(mapped.mesh, component, exact=mapped.differs)
+                made = Manifold(mapped, copy, SurfaceDesigner(copy.mesh))
+            self._manifolds[number, component] = made
+        return self._manifolds[number, component]
 
 
 def request_on(mapped: MappedMesh, request: Request) -> Request | None:
