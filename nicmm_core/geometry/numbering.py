@@ -6,7 +6,7 @@ sorted by position in the principal frame of the component, its area is 1, and c
 rounded. Each axis of this frame points to where the surface reaches farther, even if the frame is
 then left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has exactly
 the same copy, unless a coordinate is within a rounding error of the middle between two multiples of
-`RESOLUTION`. Surfaces without a unique principal frame, such as a ball, are an exception. Other
+the resolution. Surfaces without a unique principal frame, such as a ball, are an exception. Other
 components of the mesh make no difference.
 """
 
@@ -24,20 +24,20 @@ from .mesh import LARGEST, Mesh, area_vectors, blocks
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
-RESOLUTION = 1e-7
-"""Unit to which coordinates are rounded, in square roots of the area.
+RESOLUTIONS = (1e-7, 1e-9)
+"""Units to which coordinates are rounded, in square roots of the area.
 
-It is far coarser than rounding errors.
+Both are far coarser than rounding errors. The second is for meshes with needles.
 """
 
 SOUND = 0.05
 """Greatest change of the normal of a face, weighted by its area, by which coordinates are rounded.
 
-Relative to the area. If the change of any face is greater, coordinates are not rounded.
+Relative to the area. If the change of any face is greater, the resolution is too coarse.
 """
 
 FARTHEST = 2.0**60
-"""Bound at which coordinates are clipped, in units of `RESOLUTION`."""
+"""Bound at which rounded coordinates are clipped, in units of the resolution."""
 
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface counts as symmetric in that direction."""
@@ -149,8 +149,9 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     vertex = np.flatnonzero(np.bincount(given.ravel(), minlength=len(mesh.vertices)))
     unit = max(float(np.sqrt(areas.sum())), TINY)
     centre, axes, places = _in_frame(mesh.vertices, given, areas)
-    rounded = _rounded(places[vertex], unit)
-    order = np.lexsort(rounded.T[::-1])
+    places = (places / unit).clip(-LARGEST, LARGEST)
+    places[vertex], integers = _rounded_soundly(places, vertex, given, exact)
+    order = np.lexsort(integers.T[::-1])
     checkpoint()
     number = np.full(len(mesh.vertices), -1)
     number[vertex[order]] = np.arange(len(order))
@@ -163,25 +164,35 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     low, middle, high = np.sort(faces, axis=1).T
     face = np.lexsort((high, low * len(order) + middle))
     checkpoint()
-    vertices = (places[vertex[order]] / unit).clip(-LARGEST, LARGEST)
-    coordinates = RESOLUTION * rounded[order]
-    if not exact and _is_sound(vertices, coordinates, faces):
-        vertices = coordinates
-    copy = Mesh(vertices, faces[face])
+    copy = Mesh(places[vertex[order]], faces[face])
     return Renumbered(mesh, copy, number, inside[face], corner[face], centre, axes, unit)
 
 
-def _is_sound(vertices: FloatArray, rounded: FloatArray, faces: IntArray) -> bool:
-    """Whether the normals of all faces, weighted by their areas, hardly change by rounding."""
-    before, after = area_vectors(vertices, faces), area_vectors(rounded, faces)
-    change, area = np.linalg.norm(after - before, axis=1), np.linalg.norm(before, axis=1)
-    return bool((change <= SOUND * area).all())
+def _rounded_soundly(
+    places: FloatArray, vertex: IntArray, faces: IntArray, exact: bool
+) -> tuple[FloatArray, IntArray]:
+    """Coordinates of some vertices, (n, 3), rounded as coarsely as the faces allow; as integers.
+
+    They are not rounded if the faces allow no resolution, or if `exact` is set.
+    """
+    before = area_vectors(places, faces)
+    greatest = SOUND * np.linalg.norm(before, axis=1)
+    rounded = places.copy()
+    for resolution in RESOLUTIONS:
+        checkpoint()
+        integers = _integers(places[vertex], resolution)
+        rounded[vertex] = resolution * integers
+        change = area_vectors(rounded, faces) - before
+        if not exact and (np.linalg.norm(change, axis=1) <= greatest).all():
+            return rounded[vertex], integers
+    return places[vertex], integers
 
 
 def frame_coordinates(mesh: Mesh) -> IntArray:
-    """Coordinates of the vertices in the principal frame, in units of `RESOLUTION`, (V, 3)."""
+    """Rounded coordinates of the vertices in the principal frame, as integers, (V, 3)."""
     places = _in_frame(mesh.vertices, mesh.faces, mesh.face_areas)[2]
-    return _rounded(places, max(float(np.sqrt(mesh.face_areas.sum())), TINY))
+    unit = max(float(np.sqrt(mesh.face_areas.sum())), TINY)
+    return _integers(places / unit, RESOLUTIONS[0])
 
 
 def _in_frame(
@@ -197,11 +208,10 @@ def _in_frame(
     return frame.centre, axes, places
 
 
-def _rounded(places: FloatArray, unit: float) -> IntArray:
-    """Coordinates rounded to integers, in units of `RESOLUTION` times the unit of the copy."""
+def _integers(places: FloatArray, resolution: float) -> IntArray:
+    """Coordinates rounded to integers, in units of a resolution."""
     with np.errstate(over="ignore"):
-        scaled = places / max(RESOLUTION * unit, TINY)
-        return np.round(scaled.clip(-FARTHEST, FARTHEST)).astype(np.int64)
+        return np.round((places / resolution).clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 @dataclass(frozen=True)
