@@ -39,6 +39,12 @@ Relative to the area. If the change of any face is greater, the resolution is to
 FARTHEST = 2.0**60
 """Bound at which rounded coordinates are clipped, in units of the resolution."""
 
+DISTINCT = 1e-3
+"""Least difference of the variances along two principal axes, relative to the total variance.
+
+If they are closer, both axes depend on rounding errors and not only on the surface.
+"""
+
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface counts as symmetric in that direction."""
 
@@ -257,10 +263,29 @@ def principal_frame(
     centre = share @ offset
     offset -= centre
     squares, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
+    axes = _settled(squares, axes)
     deviation = float(np.sqrt(squares.sum()))
     along = offset @ axes / max(deviation, TINY)
     skewness = share @ (along * along * along)
     return PrincipalFrame(centre, deviation, axes, skewness)
+
+
+def _settled(squares: FloatArray, axes: FloatArray) -> FloatArray:
+    """Principal axes, (3, 3), from ascending variances, (3,), and eigenvectors in the columns.
+
+    If variances are equal, any axes in the space of their eigenvectors are principal axes. Those
+    nearest to the coordinate axes are taken, so the numbering of the mesh makes no difference.
+    """
+    apart = np.diff(squares) > DISTINCT * squares.sum()
+    result = np.empty((3, 3))
+    for space in np.split(np.arange(3), np.flatnonzero(apart) + 1):
+        projector = axes[:, space] @ axes[:, space].T
+        for column in space:
+            longest = np.linalg.norm(projector, axis=0).round(6).argmax()
+            axis = projector[:, longest] / np.linalg.norm(projector[:, longest])
+            result[:, column] = axis
+            projector = projector - np.outer(axis, axis @ projector)
+    return result
 
 
 def uniform_hash(coordinates: IntArray) -> FloatArray:
