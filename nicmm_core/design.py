@@ -32,12 +32,12 @@ from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
-from .geometry.mesh import Mesh, same_mesh
+from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.free_surface import check_reachable, free_faces
-from .repaired_surface import Manifold, RepairedSurface, design_on_original, start_on
+from .repaired_surface import Manifold, RepairedSurface, design_on_original, is_on, start_on
 from .request import Request, same_request
 from .status import Status
 
@@ -198,7 +198,7 @@ def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
     return (
         resumable is not None
         and design.status not in (Status.ITERATION_LIMIT, Status.CANCELLED)
-        and same_mesh(resumable.mesh, manifold.mesh)
+        and is_on(manifold, resumable)
         and same_request(request, resumable.request)
     )
 

@@ -162,6 +162,16 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
     )
 
 
+def is_on(manifold: Manifold, start: Resumable) -> bool:
+    """Whether a start lies on the given mesh of a manifold and on the mesh of its designer."""
+    given = start.given
+    return (
+        given is not None
+        and same_mesh(given, manifold.repaired.original)
+        and same_mesh(start.mesh, manifold.mesh)
+    )
+
+
 def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | SurfaceCurve:
     """Map a start to a manifold.
 
@@ -178,9 +188,8 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
         curves may not enter, cannot be mapped at a non-manifold edge, or lies on another component.
     """
     if isinstance(start, Design):
-        resumable = start.resumable
-        if resumable is not None and same_mesh(resumable.mesh, manifold.mesh):
-            return resumable
+        if start.resumable is not None and is_on(manifold, start.resumable):
+            return start.resumable
         if len(start.curves) != 1:
             raise CurveError(
                 f"start has {len(start.curves)} curves ({start.status.name}); pass a design with "
@@ -241,7 +250,17 @@ def design_on_original(manifold: Manifold, design: Design) -> Design:
         design = _mapped(design, copy.curve_to_original, copy.field_to_original)
     if mapped.differs:
         design = _mapped(design, mapped.curve_to_original, mapped.field_to_original)
-    return design
+    return _given_on(mapped.original, design)
+
+
+def _given_on(mesh: Mesh, design: Design) -> Design:
+    """The design, which continues only on a mesh that equals the mesh of the caller."""
+    resumable = design.resumable
+    return replace(
+        design,
+        resumable=None if resumable is None else replace(resumable, given=mesh),
+        alternatives=[_given_on(mesh, other) for other in design.alternatives],
+    )
 
 
 def _mapped(

@@ -45,15 +45,17 @@ class Resumable:
     Attributes
     ----------
     mesh : Mesh
-        The manifold on which the curve lies.
+        The mesh on which the curve was designed, a canonical copy or a manifold.
     request : Request
-        The request that the curve answers, on this manifold.
+        The request that the curve answers, on this mesh.
     curve : NodedCurve
     visited : (k,) int array
         For each control node, the index of its control point in the request.
     collisions : int
         Number of the following designs in which strands are assumed to collide, so that every
         iteration is traced.
+    given : Mesh or None
+        The mesh of the caller. Meshes that differ in position or numbering have equal copies.
     """
 
     mesh: Mesh
@@ -61,6 +63,7 @@ class Resumable:
     curve: NodedCurve
     visited: IntArray
     collisions: int = 0
+    given: Mesh | None = None
 
 
 def moved_start(

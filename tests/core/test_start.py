@@ -375,7 +375,9 @@ class TestRefusals:
 
     def test_a_jump(self, ball):
         start = nicmm.design_curve(ball, on_ball(ball))
-        self.refused(ball, on_ball(ball, 0.8), r"control_points\[1\] is .* from where", start=start)
+        self.refused(
+            ball, on_ball(ball, 0.8), r"control_points\[1\] is .* away from its", start=start
+        )
         more = nicmm.SurfacePoints(
             np.append(on_ball(ball).faces, on_ball(ball, 3.0).faces[1]),
             np.append(on_ball(ball).barycentric, on_ball(ball, 3.0).barycentric[1:2], axis=0),
