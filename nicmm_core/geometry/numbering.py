@@ -155,7 +155,8 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     vertex = np.flatnonzero(np.bincount(given.ravel(), minlength=len(mesh.vertices)))
     unit = max(float(np.sqrt(areas.sum())), TINY)
     centre, axes, places = _in_frame(mesh.vertices, given, areas)
-    places = (places / unit).clip(-LARGEST, LARGEST)
+    with np.errstate(over="ignore"):
+        places = (places / unit).clip(-LARGEST, LARGEST)
     places[vertex], integers = _rounded_soundly(places, vertex, given, exact)
     order = np.lexsort(integers.T[::-1])
     checkpoint()
@@ -198,7 +199,7 @@ def frame_coordinates(mesh: Mesh) -> IntArray:
     """Rounded coordinates of the vertices in the principal frame, as integers, (V, 3)."""
     places = _in_frame(mesh.vertices, mesh.faces, mesh.face_areas)[2]
     unit = max(float(np.sqrt(mesh.face_areas.sum())), TINY)
-    return _integers(places / unit, RESOLUTIONS[0])
+    return _integers(places, RESOLUTIONS[0] * unit)
 
 
 def _in_frame(
@@ -217,7 +218,7 @@ def _in_frame(
 def _integers(places: FloatArray, resolution: float) -> IntArray:
     """Coordinates rounded to integers, in units of a resolution."""
     with np.errstate(over="ignore"):
-        return np.round((places / resolution).clip(-FARTHEST, FARTHEST)).astype(np.int64)
+        return np.round((places / max(resolution, TINY)).clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 @dataclass(frozen=True)
