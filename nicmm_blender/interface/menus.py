@@ -53,6 +53,13 @@ def draw_conversions(menu, context) -> None:
         text="Convert Designed Curve",
         icon=icons.CONVERT,
     )
+
+
+def draw_for_curve(menu, context) -> None:
+    """Draw all entries for the active designed curve."""
+    if not curve_record.has_record(context.active_object):
+        return
+    draw_conversions(menu, context)
     draw_edit(menu.layout, context)
     draw_next_course(menu.layout, context)
 
@@ -68,7 +75,7 @@ MENUS = (
     ("VIEW3D_MT_edit_mesh_context_menu", draw_in_context_menu),
     ("VIEW3D_MT_curve_add", draw_in_menu),
     ("VIEW3D_MT_object_convert", draw_conversions),
-    ("VIEW3D_MT_object_context_menu", draw_conversions),
+    ("VIEW3D_MT_object_context_menu", draw_for_curve),
 )
 
 
