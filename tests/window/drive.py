@@ -294,6 +294,16 @@ def draw(blender: Blender) -> None:
     blender.click(inserted[nearest], "ctrl")
     count_points(blender, 5)
 
+    step("Next Course, and undo")
+    before = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.do('with helper.in_view():\n    bpy.ops.nicmm.next_course("INVOKE_DEFAULT", True)')
+    blender.wait(f"helper.state() != {before!r}", "another course")
+    count_points(blender, 5)
+    blender.shot("4-next-course")
+    blender.key("ctrl+z")
+    blender.wait(f"helper.state() == {before!r}", "undo of Next Course")
+
     step("A point on an eye, which is another part of the mesh: nothing changes")
     before = state(blender)
     (eye,) = blender.do("value = helper.pixels(helper.in_front([(0.35, 0.24)]))")
@@ -720,8 +730,8 @@ def convert_to_sticky_curves(blender: Blender) -> None:
     """Object > Convert > Convert Designed Curve > Sticky Curves, by the keys."""
     blender.move(blender.do("value = helper.pixels([0, -0.8, 0])")[0])
     blender.do('with helper.in_view():\n    bpy.ops.wm.call_menu(name="VIEW3D_MT_object_convert")')
-    # The entries of the extension are the last two; choose the second entry of the submenu.
-    for key in ("Up", "Up", "Right", "Down", "Return"):
+    # The entry of the extension is the last one; choose the second entry of the submenu.
+    for key in ("Up", "Right", "Down", "Return"):
         time.sleep(1.0)
         blender.key(key)
 
