@@ -18,6 +18,7 @@ from .operators import (
     live_update,
     long_solves,
     maps,
+    next_course,
     time_slices,
     update_curves,
 )
@@ -40,6 +41,7 @@ MODULES = (
     design_curve,
     convert_curve,
     update_curves,
+    next_course,
     maps,
     live_update,
     curve_settings,

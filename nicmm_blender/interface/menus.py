@@ -5,6 +5,7 @@ import bpy
 
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
+from ..operators.next_course import NICMM_OT_next_course
 from ..scene import curve_record
 from ..tool import modes
 from ..tool.edit_operator import NICMM_OT_edit_curve
@@ -29,6 +30,12 @@ def draw_edit(layout, context) -> None:
     layout.operator(NICMM_OT_edit_curve.bl_idname, text=text, icon=icons.EDIT)
 
 
+def draw_next_course(layout, context) -> None:
+    """Draw the entry for another course of the active curve, in the modes in which it works."""
+    if context.mode in modes.TOOLS:
+        layout.operator(NICMM_OT_next_course.bl_idname, icon=icons.NEXT_COURSE)
+
+
 def draw_in_context_menu(menu, context) -> None:
     """Draw the entries in vertex select mode only; all select modes share one context menu."""
     if context.tool_settings.mesh_select_mode[0]:
@@ -46,7 +53,15 @@ def draw_conversions(menu, context) -> None:
         text="Convert Designed Curve",
         icon=icons.CONVERT,
     )
+
+
+def draw_for_curve(menu, context) -> None:
+    """Draw all entries for the active designed curve."""
+    if not curve_record.has_record(context.active_object):
+        return
+    draw_conversions(menu, context)
     draw_edit(menu.layout, context)
+    draw_next_course(menu.layout, context)
 
 
 def _begin(menu) -> None:
@@ -60,7 +75,7 @@ MENUS = (
     ("VIEW3D_MT_edit_mesh_context_menu", draw_in_context_menu),
     ("VIEW3D_MT_curve_add", draw_in_menu),
     ("VIEW3D_MT_object_convert", draw_conversions),
-    ("VIEW3D_MT_object_context_menu", draw_conversions),
+    ("VIEW3D_MT_object_context_menu", draw_for_curve),
 )
 
 

@@ -32,6 +32,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
         if curve is not None:
             layout.label(text=curve.name, icon=icons.EDIT)
             curve_settings.draw(layout, curve)
+            menus.draw_next_course(layout, context)
             menus.draw_edit(layout, context)
             if curve == context.active_object:
                 self._draw_conversion(layout, properties)

@@ -4,6 +4,7 @@
 import bpy
 
 from ..operators import curve_settings
+from ..operators.next_course import NICMM_OT_next_course
 from ..outputs import edited_curve
 from ..scene import mesh_data
 from . import modes
@@ -54,6 +55,7 @@ class _SurfaceCurve:
         curve = edited_curve.active(context)
         if curve is not None:
             curve_settings.draw_in_header(layout, curve)
+            layout.operator(NICMM_OT_next_course.bl_idname)
             return
         properties = context.scene.nicmm_curves
         for name in ("closed", "smoothness"):

@@ -5,12 +5,12 @@ import importlib
 import inspect
 import pkgutil
 import re
-from itertools import chain
+from itertools import chain, islice
 
 import matplotlib.image
 import pytest
 
-from benchmarks import elastic_curve, evidence, report
+from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core.network.finetuning import FinetuningConfig
@@ -19,12 +19,15 @@ pytestmark = pytest.mark.slow
 
 FEW_ITERATIONS = 40
 FEW_STEPS = 4
+FEW_MESHES = 6
 
 
 @pytest.fixture(autouse=True)
 def short_computations(monkeypatch):
-    """Limit fine-tuning and reference curves to a few steps, because they take most of the time."""
+    """Few steps of fine-tuning and of reference curves, and few meshes, which take most time."""
     monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
+    few = list(islice(corpus.defective_meshes(), FEW_MESHES))
+    monkeypatch.setattr(corpus, "defective_meshes", lambda: iter(few))
     defaults = tuple(
         FEW_ITERATIONS if field.name == "iterations" else field.default
         for field in dataclasses.fields(FinetuningConfig)

@@ -107,10 +107,11 @@ def test_entries_of_menus_call_operators_as_the_window_does(empty_scene):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 3))
     bpy.ops.nicmm.design_curve()
-    for draw in (menus.draw_in_menu, menus.draw_conversions):
+    entries = ((menus.draw_in_menu, 2), (menus.draw_conversions, 1), (menus.draw_for_curve, 3))
+    for draw, count in entries:
         layout = Layout()
         draw(SimpleNamespace(layout=layout), bpy.context)
-        assert len(layout.entries) == 2
+        assert len(layout.entries) == count
         assert {how for _, how in layout.entries} == {"INVOKE_REGION_WIN"}
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drives the editing tool in a Blender window by mouse and keys; takes a picture of each step.
+"""Drives the tool in a Blender window with mouse and keys, and takes a picture of each step.
 
     python3 build.py package
     python3 tests/window/drive.py dist/ZIP --shots FOLDER [--blender COMMAND] [--size 1422x800]
@@ -30,7 +30,7 @@ PATIENCE = 60.0
 """Seconds that a step may take; software OpenGL is slow."""
 
 HOLD = 1.5
-"""Seconds that a key is held about a click."""
+"""Seconds that a key is held before and after a click."""
 
 CROP = "1422x800+0+0"
 """The part of the screen in pictures, 16:9."""
@@ -106,7 +106,7 @@ class Blender:
                 return value
             time.sleep(0.2)
         self.shot("failed")
-        raise SystemExit(f"waited in vain: {what}\n{self.log()}")
+        raise SystemExit(f"timed out while waiting for: {what}\n{self.log()}")
 
     def mouse(self, *arguments) -> None:
         subprocess.run(["xdotool", *map(str, arguments)], env=self.environment, check=True)
@@ -176,7 +176,7 @@ def pixel_of(blender: Blender, number: int):
 
 
 def drag(blender: Blender, start, steps: int, step, name: str = "") -> None:
-    """Press at a pixel and move the mouse; a picture before the release, if it has a name."""
+    """Press at a pixel and move the mouse; take a picture before the release if it has a name."""
     blender.move(start)
     blender.mouse("mousedown", 1)
     time.sleep(0.3)
@@ -231,7 +231,7 @@ def install(blender: Blender, archive: Path) -> None:
 
 
 def draw(blender: Blender) -> None:
-    """Five clicks, a drag, and everything else of Blender between them."""
+    """Five clicks, drags, inserting, removing, and another course."""
     step("Suzanne, and the tool in the toolbar")
     print(f"   {blender.do('value = helper.suzanne()')} triangles")
     blender.do("helper.look()")
@@ -255,18 +255,18 @@ def draw(blender: Blender) -> None:
     blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
     report_moves(blender)
     before = state(blender)
-    step("Esc and right click during a drag leave everything as it was")
+    step("Esc and right click during a drag change nothing")
     for cancel in ("key Escape", "click 3"):
         drag(blender, pixel_of(blender, DRAGGED), 10, (4.0, -4.0))
         blender.mouse(*cancel.split())
         time.sleep(0.5)
         blender.mouse("mouseup", 1)
         time.sleep(0.5)
-        check(state(blender) == before, f"{cancel} leaves everything as it was")
+        check(state(blender) == before, f"{cancel} changes nothing")
         check(blender.do("value = len(bpy.data.curves)") == 1, "no data are left behind")
     blender.key("Escape")
     time.sleep(0.5)
-    check(state(blender) == before, "Esc otherwise loses nothing")
+    check(state(blender) == before, "Esc at another time loses nothing")
 
     step("Drag another over the brow to the crown, where the curve is designed from scratch")
     drag(blender, pixel_of(blender, JUMPING), 10, (6.0, -8.0), "3-drag")
@@ -294,6 +294,16 @@ def draw(blender: Blender) -> None:
     blender.click(inserted[nearest], "ctrl")
     count_points(blender, 5)
 
+    step("Next Course, and undo")
+    before = state(blender)
+    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
+    blender.do('with helper.in_view():\n    bpy.ops.nicmm.next_course("INVOKE_DEFAULT", True)')
+    blender.wait(f"helper.state() != {before!r}", "another course")
+    count_points(blender, 5)
+    blender.shot("4-next-course")
+    blender.key("ctrl+z")
+    blender.wait(f"helper.state() == {before!r}", "undo of Next Course")
+
     step("A point on an eye, which is another part of the mesh: nothing changes")
     before = state(blender)
     (eye,) = blender.do("value = helper.pixels(helper.in_front([(0.35, 0.24)]))")
@@ -318,7 +328,7 @@ def report_moves(blender: Blender) -> None:
 
 
 def live_between(blender: Blender) -> None:
-    """Between clicks everything else of Blender works, and one undo history holds all of it."""
+    """Between clicks everything else in Blender works, and all of it is in one undo history."""
     step("Between clicks: the navigation gizmo, the header, save, Tab, playback, undo and redo")
     count = blender.do("value = helper.count()")
     region = blender.do(
@@ -379,11 +389,11 @@ def live_between(blender: Blender) -> None:
     count_points(blender, count + 1)
     time.sleep(0.6)
     blender.key("ctrl+z")
-    blender.wait(f"helper.state() == {before!r}", "undo after all that")
+    blender.wait(f"helper.state() == {before!r}", "undo after these steps")
 
 
 def picking(blender: Blender) -> None:
-    """What the eye expects: ridges, X-ray, other curves, other objects."""
+    """Clicks act on what is visible: hidden parts, X-ray, other curves, other objects."""
     step("From the side: hidden parts are dimmed")
     blender.do("helper.look(1.0, -0.55, 0.25)")
     blender.shot("7-hidden-parts")
@@ -406,7 +416,7 @@ def picking(blender: Blender) -> None:
     check(second != first, "another curve")
     time.sleep(0.6)
     (on_first,) = blender.do(
-        # The foremost place beside the middle is seen, and far from the second curve.
+        # The foremost point beside the middle is visible, and far from the second curve.
         f"line = bpy.data.objects[{first!r}].data.splines[0].points\n"
         "beside = [point.co for point in line if abs(point.co[0]) > 0.4]\n"
         "value = helper.pixels([list(min(beside, key=lambda place: place[1])[:3])])"
@@ -417,7 +427,7 @@ def picking(blender: Blender) -> None:
     blender.click(on_first)
     blender.wait(f"helper.curve().name == {first!r}", "the curve under the mouse is active")
 
-    step("X-ray: a point on the other side is met")
+    step("X-ray: a point on the other side can be clicked")
     blender.do("helper.look(0.0, 1.0, 0.1)")
     time.sleep(0.5)
     count = blender.do("value = helper.count()")
@@ -431,7 +441,7 @@ def picking(blender: Blender) -> None:
     before = state(blender)
     blender.click(pixel_of(blender, 3), "ctrl")
     time.sleep(1.0)
-    check(state(blender) == before, "without X-ray it is not met")
+    check(state(blender) == before, "without X-ray it cannot be clicked")
     blender.do("helper.look()")
 
     step("A click beside the mesh selects")
@@ -445,7 +455,7 @@ def picking(blender: Blender) -> None:
 
 def ridge(blender: Blender) -> None:
     """A tube whose centre line is hidden by a ridge, and views of other kinds."""
-    step("A tube just over a ridge is met where it is seen")
+    step("A tube just over a ridge can be clicked where it is visible")
     blender.do("helper.ridge()")
     choose_tool(blender)
     blender.do("helper.look(0.0, -1.0, 0.25, 6.0)")
@@ -459,7 +469,7 @@ def ridge(blender: Blender) -> None:
     time.sleep(0.5)
     blender.shot("13-ridge-hover")
     blender.click(pixel)
-    blender.wait(f"helper.curve() and helper.curve().name == {name!r}", "the tube is met")
+    blender.wait(f"helper.curve() and helper.curve().name == {name!r}", "the tube is activated")
 
     step("Orthographic view, camera, local view, quad view")
     for change, back in (
@@ -598,7 +608,7 @@ def large(blender: Blender) -> None:
     print(f"   {blender.do('value = helper.suzanne(6)')} triangles")
     blender.do("helper.look()")
     pixels = blender.do(f"value = helper.pixels(helper.in_front({PLACES}))")
-    time.sleep(10.0)  # drawn
+    time.sleep(10.0)  # until Blender has drawn it
     for number, pixel in enumerate(pixels[:3], start=1):
         blender.click(pixel)
         gaps, started, shown = [], time.monotonic(), False
@@ -629,7 +639,7 @@ def large(blender: Blender) -> None:
         pressed = time.monotonic()
         blender.key("Escape")
         blender.wait("not helper.is_modal()", "Esc")
-        print(f"   Esc is heard within {time.monotonic() - pressed:.1f} s")
+        print(f"   Esc takes effect within {time.monotonic() - pressed:.1f} s")
         left = blender.do("value = helper.count()")
         check(left == count, f"Esc leaves {count} points ({left})")
 
@@ -651,7 +661,7 @@ def convert(blender: Blender) -> None:
     choose_tool(blender)
     (on_curve,) = blender.do(
         "line = bpy.data.objects['Suzanne Curve'].data.splines[0].points\n"
-        # The foremost place beside the middle is seen, and far from the second curve.
+        # The foremost point beside the middle is visible, and far from the second curve.
         "beside = [point.co for point in line if abs(point.co[0]) > 0.4]\n"
         "value = helper.pixels([list(min(beside, key=lambda place: place[1])[:3])])"
     )
@@ -663,7 +673,7 @@ def convert(blender: Blender) -> None:
     time.sleep(1.5)
     blender.shot("9-edited-again")
 
-    step("Sticky curves by the menu")
+    step("Sticky curves from the menu")
     open_again(blender, path)
     convert_to_sticky_curves(blender)
     blender.wait("any(o.type == 'CURVES' for o in bpy.data.objects)", "a sticky curve")
@@ -707,7 +717,7 @@ PARTS = {
     "keys": keys,
     "large": large,
 }
-"""Parts of the drive; `live` and `picking` go on with the curve of `draw`."""
+"""Parts of the drive; `live` and `picking` continue with the curve of `draw`."""
 
 
 def open_again(blender: Blender, path: str) -> None:
@@ -717,11 +727,11 @@ def open_again(blender: Blender, path: str) -> None:
 
 
 def convert_to_sticky_curves(blender: Blender) -> None:
-    """Object > Convert > Convert Designed Curve > Sticky Curves, by the keys."""
+    """Object > Convert > Convert Designed Curve > Sticky Curves, with the keys."""
     blender.move(blender.do("value = helper.pixels([0, -0.8, 0])")[0])
     blender.do('with helper.in_view():\n    bpy.ops.wm.call_menu(name="VIEW3D_MT_object_convert")')
-    # The entries of the extension are the last two; choose the second entry of the submenu.
-    for key in ("Up", "Up", "Right", "Down", "Return"):
+    # The entry of the extension is the last one; choose the second entry of the submenu.
+    for key in ("Up", "Right", "Down", "Return"):
         time.sleep(1.0)
         blender.key(key)
 

@@ -3,7 +3,7 @@
 
 Commands are Python files in a folder, executed one after another by a timer in Blender's main
 thread. The result or the error of each is written beside it as JSON. Mouse and keys are sent from
-outside, as by a user.
+outside, like those of a user.
 """
 
 import hashlib
@@ -88,14 +88,14 @@ class Helper:
 
     @staticmethod
     def in_front(pairs):
-        """Where Suzanne is met from the front at x and z."""
+        """Points of Suzanne that are visible from the front, at x and z."""
         monkey = bpy.data.objects["Suzanne"]
         found = [monkey.ray_cast((x, -5.0, z), (0.0, 1.0, 0.0)) for x, z in pairs]
         return [list(location) for _hit, location, _normal, _face in found]
 
     @staticmethod
     def figure():
-        """Suzanne with a subdivision and an armature that an action bends up to frame 20."""
+        """Suzanne with a subdivision, and an armature that an action bends until frame 20."""
         for found in list(bpy.data.objects):
             bpy.data.objects.remove(found)
         bpy.ops.mesh.primitive_monkey_add()
@@ -186,7 +186,7 @@ class Helper:
 
     @staticmethod
     def top_of_tube():
-        """A place on the tube that the viewport shows, in the local space of the roof."""
+        """A visible point of the tube, in the local space of the roof."""
         return [[0.2, 0.0, 1.02]]
 
     @classmethod
@@ -240,7 +240,7 @@ class Helper:
 
     @staticmethod
     def shown_in_front(pairs):
-        """Where the shown surface of Suzanne is met from the front at x and z."""
+        """Points of the shown surface that are visible from the front, at x and z."""
         graph = bpy.context.evaluated_depsgraph_get()
         monkey = bpy.data.objects["Suzanne"]
         found = [monkey.ray_cast((x, -5.0, z), (0.0, 1.0, 0.0), depsgraph=graph) for x, z in pairs]
@@ -268,7 +268,7 @@ class Helper:
 
     @staticmethod
     def live_works():
-        """Whether Live has work."""
+        """Whether Live has work to do."""
         live = import_module(f"{MODULE}.operators.live_update")
         return bpy.app.timers.is_registered(live.tick)
 
@@ -314,7 +314,7 @@ class Helper:
 
     @staticmethod
     def forget():
-        """Forget what the core knows of meshes."""
+        """Drop the cached designers."""
         import_module(f"{MODULE}.scene.designers").forget()
 
     @staticmethod
@@ -325,7 +325,7 @@ class Helper:
 
     @staticmethod
     def tool():
-        """The tool of the present mode."""
+        """The tool of the current mode."""
         context = bpy.context
         found = context.workspace.tools.from_space_view3d_mode(context.mode, create=False)
         return "" if found is None else found.idname
