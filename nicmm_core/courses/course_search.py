@@ -17,7 +17,8 @@ from ..path.leg_search import length_factor
 from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
-from ..relaxation.node_traces import traces_between_nodes, with_midpoints
+from ..relaxation.even_nodes import resampled
+from ..relaxation.node_traces import traces_between_nodes
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .hop_graph import HopGraph, with_control_points
 from .leg_combinations import (
@@ -60,7 +61,14 @@ Short waves are almost independent at neighbouring cells, which gives the most d
 MOST_LEGS = 60
 """Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
-STAGES = (TogetherConfig(iterations=12), TogetherConfig(iterations=14))
+STAGES = (
+    (TogetherConfig(iterations=12),),
+    (TogetherConfig(iterations=6), TogetherConfig(iterations=8)),
+)
+"""Passes of the joint relaxation: of all candidates, and of the finalists.
+
+Before each pass but the first, nodes are placed evenly along the traces. While nodes move, only
+their distances count, which are too short around the edges of thin parts."""
 
 
 def find_courses(
@@ -132,19 +140,19 @@ def find_courses(
     visit[at_points] = np.tile(number, len(choice))
     nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
     nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
-    for stage, config in enumerate(STAGES):
+    for stage, passes in enumerate(STAGES):
         if stage:
             best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
             nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
-            nodes, visit = _denser(surface, nodes, visit)
+            nodes, visit = _resampled(surface, nodes, visit, 2)
         with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):
-            nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
+            nodes, visit = _relaxed(surface, nodes, visit, smoothness, passes)
         nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
     for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
         for _ in range(2):
             yield own, visited
-            own, visited = _denser(surface, own, visited)
+            own, visited = _resampled(surface, own, visited, 2)
 
 
 def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:
@@ -173,12 +181,28 @@ def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray
     return np.sqrt(2.0 / (WAVES * len(distances))) * waves
 
 
-def _denser(surface: CurveSurface, nodes: Nodes, visit: IntArray) -> tuple[Nodes, IntArray]:
-    """The curves with twice as many nodes, and the control point at each node."""
-    finer, stays = with_midpoints(surface, nodes, visit >= 0)
-    among = np.full(len(stays), -1)
-    among[stays] = visit[visit >= 0]
-    return finer, among
+def _relaxed(
+    surface: CurveSurface,
+    nodes: Nodes,
+    visit: IntArray,
+    smoothness: float,
+    passes: tuple[TogetherConfig, ...],
+) -> tuple[Nodes, IntArray]:
+    """The curves relaxed in one or more passes, and the control point at each node."""
+    for number, config in enumerate(passes):
+        if number:
+            nodes, visit = _resampled(surface, nodes, visit, 1)
+        with subrange(number / len(passes), (number + 1) / len(passes)):
+            nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
+    return nodes, visit
+
+
+def _resampled(
+    surface: CurveSurface, nodes: Nodes, visit: IntArray, times: int
+) -> tuple[Nodes, IntArray]:
+    """The curves with `times` as many nodes, and the control point at each node."""
+    found, former = resampled(surface, nodes, visit >= 0, times)
+    return found, np.where(former < 0, -1, visit[former])
 
 
 def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:

@@ -17,7 +17,8 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import Nodes, nodes_at
-from ..relaxation.node_traces import NodeTraces, places_along, traced_segments, with_midpoints
+from ..relaxation.even_nodes import resampled
+from ..relaxation.node_traces import NodeTraces, places_along, traced_segments
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, without_rounding_errors
@@ -100,7 +101,7 @@ def nodes_on_routes(graph: CourseGraph, routes: list[Routes], smoothness: float)
     clamped = np.zeros((len(paths), count), dtype=bool)
     clamped[:, [0, 1, -2, -1]] = True
     nodes = relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
-    return with_midpoints(surface, nodes, clamped.ravel())[0]
+    return resampled(surface, nodes, clamped.ravel(), 2)[0]
 
 
 def _is_end(count: int, paths: list[IntArray]) -> BoolArray:

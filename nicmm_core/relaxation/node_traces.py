@@ -19,7 +19,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
 from ..geometry.tracing import Traces, strictly_inside, trace_between
 from ..geometry.vectors import lengths, unit
-from .curve_nodes import CurveSurface, Nodes, nodes_at
+from .curve_nodes import CurveSurface, Nodes
 
 DETOUR = 3.0
 """Greatest length of a trace between two nodes, relative to their distance; longer ones fail."""
@@ -102,42 +102,6 @@ def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     meet = segments_meet(segments.start, segments.end, one, other)
     pairs = np.stack([segments.node[one[meet]], segments.node[other[meet]]], axis=1)
     return np.unique(np.sort(pairs, axis=1), axis=0)
-
-
-def with_midpoints(
-    surface: CurveSurface, nodes: Nodes, fixed: BoolArray
-) -> tuple[Nodes, BoolArray]:
-    """Double the number of nodes by a new node halfway along each trace.
-
-    Where a trace fails, the new node lies halfway along a path of edges.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-    fixed : (n,) bool array
-        Which nodes are fixed.
-
-    Returns
-    -------
-    Nodes
-        m = 2 n nodes, or one fewer for each open curve.
-    (m,) bool array
-        Which of these nodes are fixed; new nodes are not.
-    """
-    begins = nodes.with_step
-    traces = traces_between_nodes(surface, nodes)
-    middle = places_along(surface, nodes, traces, begins, np.full(len(begins), 0.5))
-    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
-    faces[begins], barycentric[begins] = middle.faces, middle.barycentric
-    both = np.stack([nodes.places.faces, faces], axis=1).ravel()
-    weights = np.stack([nodes.places.barycentric, barycentric], axis=1).reshape(-1, 3)
-    stays = np.stack([fixed, np.zeros_like(fixed)], axis=1).ravel()
-    kept = np.ones(len(both), dtype=bool)
-    if not nodes.closed:
-        kept[2 * nodes.last + 1] = False
-    places = SurfacePoints(both[kept], weights[kept])
-    return nodes_at(surface, places, nodes.closed, nodes.curves), stays[kept]
 
 
 def places_along(

@@ -19,8 +19,9 @@ from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .elastic_energy import balance, curve_energies, damped_step, elastic_system
+from .even_nodes import respaced
 from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
-from .noded_curve import moved_along_conormals, shifted
+from .noded_curve import moved_along_conormals
 from .strand_contact import close_pairs, contacts_of_pairs
 
 
@@ -51,13 +52,6 @@ class TogetherConfig:
     least_decrease: float = 1e-3
     quiet: int = 2
     contact: bool = True
-
-
-NODES_PER_RADIAN = 1.0
-"""Additional nodes per radian by which the normals turn, as around the edge of a thin part."""
-
-SHORT_MOVE = 1e-3
-"""Move, in mean distances between nodes, below which respacing leaves a node in place."""
 
 
 def relax_together(
@@ -92,7 +86,7 @@ def relax_together(
     for iteration in range(config.iterations):
         checkpoint(iteration / config.iterations)
         if iteration % config.respacing == 0:
-            nodes = _respaced(surface, nodes, fixed)
+            nodes = respaced(surface, nodes, fixed)
             pairs = close_pairs(nodes) if config.contact else None
         # Nodes may coincide where a route could not be placed; such a curve does not move.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -168,37 +162,3 @@ def _renumbered(pairs: IntArray, left: IntArray, size: int) -> IntArray:
     place = np.searchsorted(left, curve).clip(max=len(left) - 1)
     kept = left[place] == curve
     return (pairs + ((place - curve) * size)[:, None])[kept]
-
-
-def _respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
-    """Nodes moved along their curves, so that they are evenly spaced between fixed nodes.
-
-    They are closer together where the normals turn (`NODES_PER_RADIAN`).
-    """
-    size = len(nodes.positions) // nodes.curves
-    mean = nodes.by_curve(nodes.step_lengths).mean(axis=1)
-    turning = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
-    turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve
-    lengths = nodes.step_lengths + NODES_PER_RADIAN * nodes.spread(mean) * turning
-    lengths = nodes.by_curve(lengths)
-    # Weighted arc length over all curves in a row. Each curve is extended by a node at its end: the
-    # first node again if it is closed, the last one if it is open.
-    last = np.where(nodes.closed, nodes.first, nodes.last)
-    around = np.append(
-        np.arange(len(nodes.positions)).reshape(nodes.curves, size), last[:, None], 1
-    )
-    ends = np.append(nodes.by_curve(fixed), np.ones((nodes.curves, 1), dtype=bool), axis=1)
-    begins = np.cumsum(lengths.sum(axis=1)) - lengths.sum(axis=1)
-    arc = np.cumsum(np.append(np.zeros((nodes.curves, 1)), lengths, axis=1), axis=1)
-    arc = (arc + begins[:, None]).ravel()
-    place = np.arange(len(arc))
-    along = np.interp(place, place[ends.ravel()], arc[ends.ravel()])
-    along = along.reshape(nodes.curves, size + 1)[:, :-1].ravel()
-    path = nodes.positions[around.ravel()]
-    target = np.stack([np.interp(along, arc, axis) for axis in path.T], axis=1)
-    move = target - nodes.positions
-    move -= (move * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
-    length = np.linalg.norm(move, axis=1)
-    direction = move / np.maximum(length, tolerances.TINY)[:, None]
-    length[fixed | (length < SHORT_MOVE * nodes.spread(mean))] = 0.0
-    return shifted(surface, nodes, direction, length)[0]

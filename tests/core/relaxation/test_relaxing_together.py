@@ -13,7 +13,6 @@ from nicmm_core.relaxation.elastic_energy import (
     elastic_energy,
     elastic_system,
 )
-from nicmm_core.relaxation.node_traces import with_midpoints
 from nicmm_core.relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from tests.core.checks import circle, points_near, simple_curves
 
@@ -93,18 +92,6 @@ def test_energies_fall_and_fixed_nodes_stay(surface):
     assert (after <= before).all() and after[1] < 0.9 * before[1]
     fixed = fixed_nodes(3)
     np.testing.assert_array_equal(found.positions[fixed], nodes.positions[fixed])
-
-
-@pytest.mark.parametrize("closed", [True, False])
-def test_midpoints_lie_between_their_nodes(surface, closed):
-    nodes, _ = rings(surface, closed)
-    finer, fixed = with_midpoints(surface, nodes, fixed_nodes(3))
-    assert len(finer.positions) == 3 * (2 * SIZE - (not closed))
-    assert fixed.sum() == fixed_nodes(3).sum()
-    lengths = finer.step_lengths.reshape(3, -1).sum(axis=1)
-    before = nodes.step_lengths.reshape(3, -1).sum(axis=1)
-    assert (lengths >= 0.999 * before).all() and (lengths <= 1.03 * before).all()
-    assert finer.step_lengths.max() < 0.6 * nodes.step_lengths.max()
 
 
 def test_a_curve_that_crosses_itself_is_told(surface):
