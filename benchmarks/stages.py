@@ -73,7 +73,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     ],
     "crossings removed": [(course_search, "uncrossed")],
     "courses relaxed together": [(course_search, "relax_together")],
-    "courses compared, denser": [(course_search, "_best"), (course_search, "_denser")],
+    "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
     "course traced": [(surface_designer, "simple_curve")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],

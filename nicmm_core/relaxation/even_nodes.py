@@ -12,7 +12,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import lengths
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .node_traces import places_along, traces_between_nodes
+from .node_traces import NodeTraces, places_along, traces_between_nodes
 from .noded_curve import shifted
 
 NODES_PER_RADIAN = 1.0
@@ -80,28 +80,41 @@ def resampled(
         Index of the former node where a node was fixed, -1 elsewhere.
     """
     traces = traces_between_nodes(surface, nodes)
-    parts = np.append(lengths(np.diff(traces.points.positions(surface.mesh).T)), 0.0)
-    parts[traces.is_last] = 0.0
-    length = np.bincount(traces.node, parts, len(nodes.positions)).astype(np.float64)
-    length = np.where(length > 0.0, length, LENGTH_WITHOUT_TRACE * nodes.step_lengths)
-    arc, along = _even_arcs(nodes, length, fixed, times)
+    node, share = _even_places(surface, nodes, traces, fixed, times)
     size = len(nodes.positions) // nodes.curves
-    curve = np.repeat(np.arange(nodes.curves), len(along) // nodes.curves)
-    first = curve * (size + 1)  # in `arc`, which has an additional entry for each curve
-    step = (np.searchsorted(arc, along, side="right") - 1).clip(first, first + size - 1)
-    share = (along - arc[step]) / np.maximum(arc[step + 1] - arc[step], tolerances.TINY)
-    node = step - curve
-    former = np.full((nodes.curves, len(along) // nodes.curves), -1)
+    former = np.full((nodes.curves, len(node) // nodes.curves), -1)
     former[:, ::times] = np.where(fixed, np.arange(len(fixed)), -1).reshape(nodes.curves, size)
     former = former.ravel()
     stays, moves = np.flatnonzero(former >= 0), np.flatnonzero(former < 0)
     faces, barycentric = np.zeros(len(former), dtype=np.int64), np.zeros((len(former), 3))
     kept = nodes.places[former[stays]]
     faces[stays], barycentric[stays] = kept.faces, kept.barycentric
-    new = places_along(surface, nodes, traces, node[moves], share[moves].clip(0.0, 1.0))
+    new = places_along(surface, nodes, traces, node[moves], share[moves])
     faces[moves], barycentric[moves] = new.faces, new.barycentric
     places = SurfacePoints(faces, barycentric)
     return nodes_at(surface, places, nodes.closed, nodes.curves), former
+
+
+def _even_places(
+    surface: CurveSurface, nodes: Nodes, traces: NodeTraces, fixed: BoolArray, times: int
+) -> tuple[IntArray, FloatArray]:
+    """Where m new nodes lie: the node before each, (m,), and its share of the trace from there."""
+    size = len(nodes.positions) // nodes.curves
+    if surface.folded is not None:
+        # Inside a fold a trace runs backward, and nodes spaced along it would change places.
+        index = _refined(size, times, nodes.closed)
+        node = np.arange(nodes.curves)[:, None] * size + np.floor(index).astype(np.int64)
+        return node.ravel(), np.tile(index % 1.0, nodes.curves)
+    parts = np.append(lengths(np.diff(traces.points.positions(surface.mesh).T)), 0.0)
+    parts[traces.is_last] = 0.0
+    length = np.bincount(traces.node, parts, len(nodes.positions)).astype(np.float64)
+    length = np.where(length > 0.0, length, LENGTH_WITHOUT_TRACE * nodes.step_lengths)
+    arc, along = _even_arcs(nodes, length, fixed, times)
+    curve = np.repeat(np.arange(nodes.curves), len(along) // nodes.curves)
+    first = curve * (size + 1)  # in `arc`, which has an additional entry for each curve
+    step = (np.searchsorted(arc, along, side="right") - 1).clip(first, first + size - 1)
+    share = (along - arc[step]) / np.maximum(arc[step + 1] - arc[step], tolerances.TINY)
+    return step - curve, share.clip(0.0, 1.0)
 
 
 def _even_arcs(
@@ -122,7 +135,11 @@ def _even_arcs(
     begins = np.cumsum(weighted.sum(axis=1)) - weighted.sum(axis=1)
     arc = np.cumsum(np.append(np.zeros((nodes.curves, 1)), weighted, axis=1), axis=1)
     arc = (arc + begins[:, None]).ravel()
-    count = times * size if nodes.closed else times * (size - 1) + 1
-    wanted = np.arange(nodes.curves)[:, None] * (size + 1) + np.arange(count) / times
+    wanted = np.arange(nodes.curves)[:, None] * (size + 1) + _refined(size, times, nodes.closed)
     place = np.flatnonzero(ends)
     return arc, np.interp(wanted.ravel(), place, arc[place])
+
+
+def _refined(size: int, times: int, closed: bool) -> FloatArray:
+    """Fractional indices of the new nodes of a curve: each step is divided into equal parts."""
+    return np.arange(times * size if closed else times * (size - 1) + 1) / times

@@ -15,6 +15,7 @@ OPERATORS = (
     "convert_curve",
     "edit_curve",
     "update_curves",
+    "next_course",
     "new_map",
     "paint_map",
     "add_point",
