@@ -29,8 +29,11 @@ NODES_OF_A_ROUTE, FEWEST_NODES, MOST_NODES = 16, 6, 96
 The number is reduced where its sum over all legs would exceed the third value.
 """
 
-NODES = 96
-"""Number of nodes of a course, distributed over its legs by length."""
+NODES, FEWEST_SHARED = 96, 48
+"""Number of nodes of a course, and least number of those that its legs share by their lengths.
+
+Besides, every leg has `FEWEST_NODES`. With many legs, a course has more nodes.
+"""
 
 SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
 """Settings with which routes are relaxed before the test; their end directions are kept."""
@@ -249,28 +252,34 @@ def course_nodes(
     offset = np.cumsum([0] + [len(leg.cells) for leg in routes])[:-1]
     curve = offset + choice
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
-    typical = np.median(lengths[curve], axis=0)
-    counts = np.round(NODES * typical / typical.sum()).astype(np.int64).clip(FEWEST_NODES)
-    leg = np.repeat(np.arange(len(routes)), counts)
-    place = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
-    at = place * (size - 1) / counts[leg]
+    counts = _node_counts(lengths[curve])
+    course = np.repeat(np.arange(len(choice)), counts.sum(axis=1))
+    count = np.repeat(counts.ravel(), counts.ravel())
+    leg = np.repeat(np.tile(np.arange(len(routes)), len(choice)), counts.ravel())
+    place = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts.ravel(), counts.ravel())
+    at = place * (size - 1) / count
     node = np.floor(at).astype(np.int64)
-    places = places_along(
-        surface,
-        nodes,
-        traces,
-        (curve[:, leg] * size + node).ravel(),
-        np.tile(at - node, len(choice)),
-    )
-    starts = np.tile(place == 0, len(choice))
+    places = places_along(surface, nodes, traces, curve[course, leg] * size + node, at - node)
+    starts = place == 0
     own = nodes.places[(curve * size).ravel()]
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[starts], barycentric[starts] = own.faces, own.barycentric
     if not closed:
         last = nodes.places[curve[:, -1] * size + size - 1]
-        after = np.arange(1, len(choice) + 1) * len(leg)
+        after = np.arange(1, len(choice) + 1) * (len(leg) // len(choice))
         faces = np.insert(faces, after, last.faces)
         barycentric = np.insert(barycentric, after, last.barycentric, axis=0)
         starts = np.insert(starts, after, True)
     places = SurfacePoints(faces, barycentric)
     return nodes_at(surface, places, closed, len(choice)), starts
+
+
+def _node_counts(lengths: FloatArray) -> IntArray:
+    """Numbers of nodes of the legs of courses, (c, l), from the lengths of the legs, (c, l).
+
+    All courses have the same number of nodes.
+    """
+    shared = max(NODES - FEWEST_NODES * lengths.shape[1], FEWEST_SHARED)
+    total = np.cumsum(lengths, axis=1)
+    ends = np.round(shared * total / np.maximum(total[:, -1:], tolerances.TINY)).astype(np.int64)
+    return FEWEST_NODES + np.diff(ends, axis=1, prepend=0)

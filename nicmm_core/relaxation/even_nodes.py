@@ -102,9 +102,9 @@ def _even_places(
     size = len(nodes.positions) // nodes.curves
     if surface.folded is not None:
         # Inside a fold a trace runs backward, and nodes spaced along it would change places.
-        index = _refined(size, times, nodes.closed)
-        node = np.arange(nodes.curves)[:, None] * size + np.floor(index).astype(np.int64)
-        return node.ravel(), np.tile(index % 1.0, nodes.curves)
+        faces = traces.points.faces
+        folded = np.bincount(traces.node[surface.folded[faces]], minlength=len(fixed)) > 0
+        fixed = fixed | folded | nodes.before_each(folded)
     parts = np.append(lengths(np.diff(traces.points.positions(surface.mesh).T)), 0.0)
     parts[traces.is_last] = 0.0
     length = np.bincount(traces.node, parts, len(nodes.positions)).astype(np.float64)
@@ -135,11 +135,7 @@ def _even_arcs(
     begins = np.cumsum(weighted.sum(axis=1)) - weighted.sum(axis=1)
     arc = np.cumsum(np.append(np.zeros((nodes.curves, 1)), weighted, axis=1), axis=1)
     arc = (arc + begins[:, None]).ravel()
-    wanted = np.arange(nodes.curves)[:, None] * (size + 1) + _refined(size, times, nodes.closed)
+    count = times * size if nodes.closed else times * (size - 1) + 1
+    wanted = np.arange(nodes.curves)[:, None] * (size + 1) + np.arange(count) / times
     place = np.flatnonzero(ends)
     return arc, np.interp(wanted.ravel(), place, arc[place])
-
-
-def _refined(size: int, times: int, closed: bool) -> FloatArray:
-    """Fractional indices of the new nodes of a curve: each step is divided into equal parts."""
-    return np.arange(times * size if closed else times * (size - 1) + 1) / times
