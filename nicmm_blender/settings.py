@@ -24,6 +24,14 @@ AUTOMATIC = (
 """A choice of the option `order` that only the extension has, listed before those of the core."""
 
 
+CURVE = StringProperty(
+    name="Curve Object",
+    description="Name of the designed curve. Leave empty for the active one",
+    options={"HIDDEN", "SKIP_SAVE"},
+)
+"""The property of operators that names a designed curve."""
+
+
 def properties_of(options) -> dict:
     """Blender properties for core options, by property name; options for points are left out."""
     return {

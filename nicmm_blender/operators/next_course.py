@@ -8,11 +8,12 @@ operator searches for courses again, and the user chooses one of them.
 from dataclasses import replace
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import IntProperty
 
 from ..outputs import edited_curve
 from ..scene import curve_record, designers
 from ..scene.messages import InputError
+from ..settings import CURVE
 from . import polls
 from .long_solves import LongSolves
 
@@ -33,11 +34,7 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
     bl_label = "Next Course"
     bl_options = {"REGISTER", "UNDO"}
 
-    curve: StringProperty(
-        name="Curve Object",
-        description="Name of the designed curve. Leave empty for the active one",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
+    curve: CURVE
     course: IntProperty(
         name="Course",
         description="Number of the course: 1 for the fairest, 2 for the second fairest, and so on. "

@@ -139,8 +139,9 @@ def _along(spline) -> np.ndarray:
     points.foreach_get("co", places.ravel())
     if spline.use_cyclic_u:
         places = np.concatenate([places, places[:1]])
-    lengths = np.linalg.norm(np.diff(places[:, :3], axis=0), axis=1)
-    return np.append(0.0, np.cumsum(lengths)) / max(float(lengths.sum()), 1e-30)
+    lengths = np.linalg.norm(np.diff(places[:, :3].astype(np.float64), axis=0), axis=1)
+    along = np.append(0.0, np.cumsum(lengths))
+    return along / max(along[-1], 1e-30)
 
 
 def _get(points, name: str) -> np.ndarray:

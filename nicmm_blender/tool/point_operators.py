@@ -13,14 +13,9 @@ from ..outputs import edited_curve
 from ..outputs.writing import SEPARATE
 from ..scene import curve_record
 from ..scene.messages import InputError
+from ..settings import CURVE
 from . import modes
 from .point_drag import PointDrag
-
-CURVE = bpy.props.StringProperty(
-    name="Curve Object",
-    description="Name of the designed curve. Leave empty for the active one",
-    options={"HIDDEN", "SKIP_SAVE"},
-)
 
 POSITION = bpy.props.FloatVectorProperty(
     name="Position",

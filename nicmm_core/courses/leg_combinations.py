@@ -253,11 +253,11 @@ def course_nodes(
     curve = offset + choice
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     counts = _node_counts(lengths[curve])
-    course = np.repeat(np.arange(len(choice)), counts.sum(axis=1))
-    count = np.repeat(counts.ravel(), counts.ravel())
-    leg = np.repeat(np.tile(np.arange(len(routes)), len(choice)), counts.ravel())
-    place = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts.ravel(), counts.ravel())
-    at = place * (size - 1) / count
+    course = np.arange(len(choice)).repeat(counts.sum(axis=1))
+    of_legs = counts.ravel()
+    leg = np.tile(np.arange(len(routes)), len(choice)).repeat(of_legs)
+    place = np.arange(len(leg)) - (of_legs.cumsum() - of_legs).repeat(of_legs)
+    at = place * (size - 1) / of_legs.repeat(of_legs)
     node = np.floor(at).astype(np.int64)
     places = places_along(surface, nodes, traces, curve[course, leg] * size + node, at - node)
     starts = place == 0

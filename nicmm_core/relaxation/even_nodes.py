@@ -131,11 +131,13 @@ def _even_arcs(
     turning = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
     turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve
     weighted = nodes.by_curve(step_lengths + NODES_PER_RADIAN * nodes.spread(mean) * turning)
-    ends = np.append(nodes.by_curve(fixed), np.ones((nodes.curves, 1), dtype=bool), axis=1)
-    begins = np.cumsum(weighted.sum(axis=1)) - weighted.sum(axis=1)
-    arc = np.cumsum(np.append(np.zeros((nodes.curves, 1)), weighted, axis=1), axis=1)
-    arc = (arc + begins[:, None]).ravel()
+    ends = np.ones((nodes.curves, size + 1), dtype=bool)
+    ends[:, :-1] = nodes.by_curve(fixed)
+    total = weighted.sum(axis=1)
+    arcs = np.zeros((nodes.curves, size + 1))
+    weighted.cumsum(axis=1, out=arcs[:, 1:])
+    arc = (arcs + (total.cumsum() - total)[:, None]).ravel()
     count = times * size if nodes.closed else times * (size - 1) + 1
     wanted = np.arange(nodes.curves)[:, None] * (size + 1) + np.arange(count) / times
-    place = np.flatnonzero(ends)
+    place = ends.ravel().nonzero()[0]
     return arc, np.interp(wanted.ravel(), place, arc[place])
