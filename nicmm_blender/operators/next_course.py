@@ -20,9 +20,6 @@ from .long_solves import LongSolves
 ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
-SAMPLES = 500
-"""Number of points at which two curves are compared."""
-
 _found: dict = {}
 """The designs of the last search by what they depend on, so that a next call takes no time."""
 
@@ -89,18 +86,12 @@ def _key(opened) -> tuple:
 
 def _current(opened, courses: list) -> int | None:
     """The index of the course that a curve takes; None if it takes none of them."""
-    from ...nicmm_core.courses.course_search import SAME_COURSE, farthest_between
-    from ...nicmm_core.geometry.curve import resample
+    from ...nicmm_core.courses.current_course import current_course
 
     if opened.curve is None:
         return None
-    ours, *others = (
-        resample(curve.points, SAMPLES, curve.closed)[0] for curve in (opened.curve, *courses)
-    )
-    away = [farthest_between(ours, other) for other in others]
     mesh = designers.mesh_for(opened.surface.core_positions, opened.surface.faces)
-    nearest = min(range(len(away)), key=away.__getitem__)
-    return nearest if away[nearest] <= SAME_COURSE * mesh.diagonal else None
+    return current_course(mesh, opened.curve, courses)
 
 
 def register() -> None:

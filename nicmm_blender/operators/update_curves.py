@@ -8,6 +8,7 @@ from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data
 from ..scene.messages import InputError, counted
 from ..scene.surface import read
+from . import polls
 from .long_solves import LongSolves
 
 
@@ -32,7 +33,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if curve_record.mesh_of_context(context) is None:
-            cls.poll_message_set("Make a mesh or a designed curve active")
+            cls.poll_message_set(polls.NO_MESH_OR_CURVE)
             return False
         return True
 
