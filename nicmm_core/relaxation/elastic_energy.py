@@ -45,7 +45,7 @@ half the radius of a circle of the same length; long curves hardly change.
 """
 
 CONTACT = 10.0
-"""Contact energy of a curve whose strands touch everywhere, relative to its other energy."""
+"""Contact energy of a curve whose strands touch everywhere, relative to its energy without maps."""
 
 
 @dataclass(frozen=True)
@@ -91,14 +91,14 @@ def balance(
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     tension = _weight(nodes, (2.0 * np.pi / lengths) ** 2 / smoothness)
     weights = Balance(tension_factor * tension, 0.0)
+    if apart:
+        size = len(nodes.positions) // nodes.curves
+        contact = _weight(nodes, CONTACT * curve_energies(nodes, weights) / size)
+        weights = replace(weights, contact=contact)
     if surface.feature_map is not None:
         feature = surface.feature_weight / smoothness + OVER_TENSION * tension
         weights = replace(weights, feature=feature, held=nodes.ds)
-    if not apart:
-        return weights
-    size = len(nodes.positions) // nodes.curves
-    contact = _weight(nodes, CONTACT * curve_energies(nodes, weights) / size)
-    return replace(weights, contact=contact)
+    return weights
 
 
 def _weight(nodes: Nodes, values: FloatArray) -> float | FloatArray:
@@ -166,12 +166,24 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
     """
     at_nodes = _bending(nodes) + _tension(nodes, weights) * nodes.ds
     if weights.held is not None:
-        at_nodes += weights.feature * np.minimum(nodes.phi_fea, 1.0) ** 2 * weights.held
+        in_lanes = np.minimum(nodes.phi_fea, 1.0) ** 2 - 1.0
+        at_nodes += weights.feature * in_lanes * weights.held
     if np.any(weights.contact):
         contacts = contacts or contacts_between(nodes)
         overlap = np.bincount(contacts.pairs[:, 0], contacts.overlap**2, len(at_nodes))
         at_nodes += 2.0 * weights.contact * overlap
     return nodes.by_curve(at_nodes).sum(axis=1)
+
+
+def energy_scales(nodes: Nodes, weights: Balance, energies: FloatArray) -> FloatArray:
+    """Positive values, (c,), that decreases of the energies of all curves are compared with.
+
+    They are the energies themselves, (c,), unless there is a map: the term of a lane is negative.
+    Then they are the energies without maps and contact.
+    """
+    if weights.held is None:
+        return energies
+    return curve_energies(nodes, replace(weights, contact=0.0, feature=0.0, held=None))
 
 
 def _tension(nodes: Nodes, weights: Balance) -> FloatArray:

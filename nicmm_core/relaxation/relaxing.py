@@ -28,7 +28,7 @@ from ..geometry.curve import SurfaceCurve
 from ..progress import CancelledError
 from ..status import Status
 from .curve_nodes import CurveSurface, Nodes
-from .elastic_energy import balance, bending_energy, feature_energy
+from .elastic_energy import balance, bending_energy, energy_scales, feature_energy
 from .levenberg_marquardt import (
     DAMPING_FACTOR,
     Linearised,
@@ -248,6 +248,12 @@ class _State:
         return free
 
     @property
+    def energy_scale(self) -> float:
+        """Energy that decreases are compared with."""
+        energies = np.array([self.here.energy])
+        return float(energy_scales(self.here.nodes, self.stepping.weights, energies)[0])
+
+    @property
     def predicted_decrease(self) -> float:
         """Predicted decrease of the energy by the least damped step."""
         return self.here.predicted_decrease(self.free, self.stepping.config)
@@ -323,8 +329,8 @@ class _Attempt:
         least_energy = np.inf
         while True:
             state = self._state(curve, nodes, held, tension_factor)
-            before = state.here.energy
-            scale = max(bending_energy(nodes), LEAST_BENDING * before)
+            before, least_scale = state.here.energy, LEAST_BENDING * state.energy_scale
+            scale = max(bending_energy(nodes), least_scale)
             done = None
             if state.predicted_decrease > NEGLIGIBLE_PREDICTION * least * scale:
                 if self.iterations == self.last_iteration or self.work.exhausted():
@@ -342,7 +348,7 @@ class _Attempt:
                 if self.watch is not None and not self.watch(share, nodes.positions):
                     self.status = Status.CANCELLED
                     break
-                scale = max(bending_energy(nodes), LEAST_BENDING * before)
+                scale = max(bending_energy(nodes), least_scale)
                 stalled = 0 if done.energy < least_energy else stalled + 1
                 least_energy = min(least_energy, done.energy)
                 if stalled == MOST_STALLED:

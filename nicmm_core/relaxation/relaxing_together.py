@@ -18,7 +18,13 @@ from ..geometry.array_types import BoolArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .elastic_energy import balance, curve_energies, damped_step, elastic_system
+from .elastic_energy import (
+    balance,
+    curve_energies,
+    damped_step,
+    elastic_system,
+    energy_scales,
+)
 from .even_nodes import respaced
 from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
 from .noded_curve import moved_along_conormals
@@ -93,6 +99,7 @@ def relax_together(
             weights = balance(surface, nodes, smoothness, apart=config.contact)
             contacts = None if pairs is None else contacts_of_pairs(nodes, pairs)
             before = curve_energies(nodes, weights, contacts)
+            scale = energy_scales(nodes, weights, before)
             system = elastic_system(surface, nodes, weights, contacts)
             move = damped_step(system, ~fixed, damping)
         spacing = nodes.by_curve(nodes.step_lengths).sum(axis=1) / size
@@ -108,7 +115,7 @@ def relax_together(
             lower, np.maximum(damping / DAMPING_FACTOR, least), damping * DAMPING_FACTOR
         )
         decrease = np.where(lower, before - after, 0.0)
-        still = (decrease <= config.least_decrease * before) & (
+        still = (decrease <= config.least_decrease * scale) & (
             share * farthest <= 0.5 * config.longest_move
         )
         quiet = np.where(still, quiet + 1, 0)
