@@ -77,6 +77,11 @@ def same_request(one: Request, other: Request) -> bool:
     )
 
 
+def same_maps(one: Request, other: Request) -> bool:
+    """Whether two requests have the same obstacles and the same alignment."""
+    return _same(one.obstacles, other.obstacles) and _same(one.alignment, other.alignment)
+
+
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, SurfacePoints) and isinstance(other, SurfacePoints):
         return _same(one.faces, other.faces) and _same(one.barycentric, other.barycentric)

@@ -39,7 +39,7 @@ from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed, relax
 from .relaxation.simple_curve import simple_curve
 from .relaxation.warm_start import WARM
-from .request import Request
+from .request import Request, same_maps
 from .start import Resumable, moved_start
 from .status import Status
 
@@ -88,6 +88,8 @@ class SurfaceDesigner:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
+        self._units: dict[int, float] = {}  # by component
+        self._mapped: tuple[Request, CurveSurface] | None = None  # of the last request with maps
 
     def design(
         self,
@@ -165,6 +167,7 @@ class SurfaceDesigner:
             n_points = len(request.points) + sum(map(len, request.via_points.values()))
             attempts = Attempts(start.surface, request.smoothness, n_points)
             attempts.relaxed.append(first)
+            attempts.end_search()
             starts, cancelled = [start], False
             try:
                 further = self._further_starts(request, starts, attempts, courses, by_course)
@@ -195,8 +198,8 @@ class SurfaceDesigner:
 
         The caller adds each start and its relaxed curve to `starts` and `attempts` before it asks
         for the next one. The remaining `courses` of the first search are for alternatives. If no
-        course was simple (`by_course` is False), further searches would hardly find one, and take
-        long.
+        course was simple (`by_course` is False), further searches would hardly find one and take
+        long, so they are made only for alternatives.
         """
         config = _config(request)
         further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
@@ -205,6 +208,7 @@ class SurfaceDesigner:
                 break
             attempts.searches += 1
             yield from ((start, attempts.limited(config)) for start in itertools.islice(search, 1))
+            attempts.end_search()
         if attempts.tightening_pays():
             yield starts[attempts.best], attempts.limited(TIGHTENED)
         if by_course and attempts.network_pays():
@@ -310,11 +314,28 @@ class SurfaceDesigner:
 
     def _curve_surface(self, request: Request) -> CurveSurface:
         """The surface for relaxation, with the maps of a request."""
-        obstacles, alignment = request.obstacles, request.alignment
-        return with_maps(self._surface, obstacles, alignment, self._unit(request))
+        if not request.has_maps:
+            return self._surface
+        last = self._mapped
+        if last is None or not self._same_maps(last[0], request):
+            obstacles, alignment = request.obstacles, request.alignment
+            mapped = with_maps(self._surface, obstacles, alignment, self._unit(request))
+            last = self._mapped = request, mapped
+        return last[1]
+
+    def _same_maps(self, one: Request, other: Request) -> bool:
+        """Whether two requests have the same maps on the same component."""
+        return self._component(one) == self._component(other) and same_maps(one, other)
 
     def _unit(self, request: Request) -> float:
-        return component_unit(self.mesh, int(request.points.faces[0]))
+        """Square root of the area of the component of a request."""
+        component = self._component(request)
+        if component not in self._units:
+            self._units[component] = component_unit(self.mesh, component)
+        return self._units[component]
+
+    def _component(self, request: Request) -> int:
+        return int(self.mesh.face_component[request.points.faces[0]])
 
     @cached_property
     def _surface(self) -> CurveSurface:

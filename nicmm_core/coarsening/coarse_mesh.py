@@ -129,14 +129,14 @@ def build_coarse_mesh(
         If no three cells meet in a face.
     """
     inside = mesh.face_component == component
-    faces = mesh.faces[inside]
+    faces, face_areas = mesh.faces[inside], mesh.face_areas[inside]
     checkpoint()
-    thirds = np.repeat(mesh.face_areas[inside] / 3.0, 3)
+    thirds = np.repeat(face_areas / 3.0, 3)
     areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # Hashes of positions replace random numbers, so the result does not depend on the numbering.
-    places = frame_coordinates(mesh)
+    places = frame_coordinates(mesh.vertices, faces, face_areas)
     checkpoint()
     chance = uniform_hash(places)
     checkpoint()

@@ -1,6 +1,6 @@
 """Decides whether to make another attempt at a curve, from the curves relaxed so far.
 
-A search misses courses, the more the farther the curve winds around limbs. Searches with other
+The farther a curve winds around limbs, the more courses a search misses. Searches with other
 lengths find others, so the search is repeated while that pays.
 """
 
@@ -37,13 +37,13 @@ LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
 MOST_WORK = 1_500
-"""Work of all attempts together above which no further one is begun, in moves of nodes (`Work`).
+"""Work of all attempts together above which no further one is begun.
 
-It takes two to three seconds.
+In moves of all nodes (`Work`). It takes two to three seconds.
 """
 
 WORK_OF_SEARCH = 40
-"""Approximate work of a search, in the same unit, and of each point through which it leads."""
+"""Approximate work of a search, in the same unit; as much again for each control or via point."""
 
 
 @dataclass
@@ -57,9 +57,11 @@ class Attempts:
     n_points : int
         Number of control points and via points.
     searches : int
-        Number of searches for courses so far.
+        Number of searches for courses begun so far.
     relaxed : list of Relaxed
         The result of each attempt.
+    relaxed_after : list of int
+        Number of results after each completed search.
     """
 
     surface: CurveSurface
@@ -67,6 +69,7 @@ class Attempts:
     n_points: int
     searches: int = 1
     relaxed: list[Relaxed] = field(default_factory=list)
+    relaxed_after: list[int] = field(default_factory=list)
 
     @property
     def curves(self) -> list[NodedCurve]:
@@ -82,6 +85,10 @@ class Attempts:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self.surface, self.curves, self.smoothness)
 
+    def end_search(self) -> None:
+        """Record that a search has ended, whether or not it has led to another relaxed curve."""
+        self.relaxed_after.append(len(self.relaxed))
+
     def another_search_pays(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
@@ -89,7 +96,7 @@ class Attempts:
         """
         energies = energies_of(self.surface, self.curves, self.smoothness)
         bending = scaled_bending(self.curves[int(np.argmin(energies))])
-        lowest = np.minimum.accumulate(energies)
+        lowest = np.minimum.accumulate(energies)[np.array(self.relaxed_after) - 1]
         gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
         fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
         promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)

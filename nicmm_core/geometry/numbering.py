@@ -6,7 +6,7 @@ sorted by position in the principal frame of the component, its area is 1, and c
 rounded. Each axis of this frame points to where the surface reaches farther, even if the frame is
 then left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has exactly
 the same copy, unless a coordinate is within a rounding error of the middle between two multiples of
-the resolution. Surfaces without a unique principal frame, such as a ball, are an exception. Other
+the resolution. Surfaces without a unique principal frame, such as a sphere, are an exception. Other
 components of the mesh make no difference.
 """
 
@@ -31,9 +31,9 @@ Both are far coarser than rounding errors. The second is for meshes with needles
 """
 
 SOUND = 0.05
-"""Greatest change of the normal of a face, weighted by its area, by which coordinates are rounded.
+"""Greatest change of the area vector of a face by rounding, relative to the area of the face.
 
-Relative to the area. If the change of any face is greater, the resolution is too coarse.
+If the area vector of any face changes more, the resolution is too coarse.
 """
 
 FARTHEST = 2.0**60
@@ -195,10 +195,18 @@ def _rounded_soundly(
     return places[vertex], integers
 
 
-def frame_coordinates(mesh: Mesh) -> IntArray:
-    """Rounded coordinates of the vertices in the principal frame, as integers, (V, 3)."""
-    places = _in_frame(mesh.vertices, mesh.faces, mesh.face_areas)[2]
-    unit = max(float(np.sqrt(mesh.face_areas.sum())), TINY)
+def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> IntArray:
+    """Rounded coordinates in the principal frame of some faces, as integers, (V, 3).
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+    faces : (F, 3) int array
+        The faces that determine the frame and the unit, the square root of their area.
+    face_areas : (F,) float array
+    """
+    places = _in_frame(vertices, faces, face_areas)[2]
+    unit = max(float(np.sqrt(face_areas.sum())), TINY)
     return _integers(places, RESOLUTIONS[0] * unit)
 
 
@@ -223,14 +231,12 @@ def _integers(places: FloatArray, resolution: float) -> IntArray:
 
 @dataclass(frozen=True)
 class PrincipalFrame:
-    """The surface's centroid, standard deviation and principal axes.
+    """The surface's centroid and principal axes.
 
     Attributes
     ----------
     centre : (3,) float array
         Centroid of the surface.
-    deviation : float
-        Root mean square distance of the surface from the centroid.
     axes : (3, 3) float array
         Unit vectors along the axes, one in each column, with arbitrary sign.
     skewness : (3,) float array
@@ -238,7 +244,6 @@ class PrincipalFrame:
     """
 
     centre: FloatArray
-    deviation: float
     axes: FloatArray
     skewness: FloatArray
 
@@ -268,7 +273,7 @@ def principal_frame(
     deviation = float(np.sqrt(squares.sum()))
     along = offset @ axes / max(deviation, TINY)
     skewness = share @ (along * along * along)
-    return PrincipalFrame(centre, deviation, axes, skewness)
+    return PrincipalFrame(centre, axes, skewness)
 
 
 def _settled(squares: FloatArray, axes: FloatArray) -> FloatArray:

@@ -142,7 +142,7 @@ def build_problem(
     """
     phi_fea = None
     if obstacles is not None or alignment is not None:
-        width = component_unit(mesh, int(points.faces[0]))
+        width = component_unit(mesh, int(mesh.face_component[points.faces[0]]))
         phi_fea = feature_map(mesh, obstacles, alignment, width)
     with subrange(0.0, PATH_SHARE):
         working, loop = build_initial_loop(

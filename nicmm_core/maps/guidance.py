@@ -65,10 +65,9 @@ LEVELS = 5
 """Number of levels to which weights are rounded up; each level has one width."""
 
 
-def component_unit(mesh: Mesh, face: int) -> float:
-    """Square root of the area of the component that contains a face: the unit of widths."""
-    component = mesh.face_component == mesh.face_component[face]
-    return float(np.sqrt(mesh.face_areas[component].sum()))
+def component_unit(mesh: Mesh, component: int) -> float:
+    """Square root of the area of a component: the unit of widths."""
+    return float(np.sqrt(mesh.face_areas[mesh.face_component == component].sum()))
 
 
 def feature_map(
