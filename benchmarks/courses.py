@@ -19,7 +19,7 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core.courses import course_search, course_surface
-from nicmm_core.courses.course_search import farthest_between
+from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set import problem

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.courses.course_search import farthest_between
+from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.mesh import Mesh

@@ -271,7 +271,7 @@ def choose_tube(operator) -> None:
 
 def draw(layout, properties, mesh_object) -> None:
     """Draw all settings in the redo panel; `mesh_object` may be None."""
-    draw_course(layout, properties)
+    draw_design(layout, properties)
     for name in ("obstacle_group", "alignment_group"):
         if mesh_object is None:
             layout.prop(properties, name, icon="GROUP_VERTEX")
@@ -281,7 +281,7 @@ def draw(layout, properties, mesh_object) -> None:
     draw_output(layout, properties)
 
 
-def draw_course(layout, properties) -> None:
+def draw_design(layout, properties) -> None:
     """Draw the settings of the curve itself, without its maps."""
     layout.use_property_split = True
     layout.use_property_decorate = False

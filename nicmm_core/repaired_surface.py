@@ -230,8 +230,7 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
     on_copy = manifold.copy.curve_to_copy(mapped_curve)
     if on_copy is None:
         raise CurveError(
-            "start lies on another connected part of the surface than the control_points"
-            f"{WITHOUT_START}"
+            f"start and control_points lie on different components of the mesh{WITHOUT_START}"
         )
     return on_copy
 

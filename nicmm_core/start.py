@@ -239,7 +239,7 @@ def _with_other_points(
     line = _Line(mesh, curve)
     there = request.points.positions(mesh)
     arcs = np.full(len(there), np.nan)
-    at_controls = line.arc[curve.node_place[curve.control_nodes]]
+    at_controls = line.arc[curve.node_index[curve.control_nodes]]
     distance = np.linalg.norm(there[:, None] - curve.nodes.positions[curve.control_nodes], axis=2)
     nearest = distance.argmin(axis=1)
     same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal

@@ -24,6 +24,7 @@ from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
 from .level_set import variational
+from .level_set.curve_field import curve_field
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
 from .level_set.problem import Problem, requested_problem
 from .level_set.solution import Solution
@@ -33,7 +34,6 @@ from .network.single_pass import infer
 from .network.weights_file import shipped_weights
 from .path.initial_loop import path_curve
 from .progress import CancelledError, checkpoint, subrange
-from .relaxation.curve_field import curve_field
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed, relax

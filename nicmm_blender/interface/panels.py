@@ -37,7 +37,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
             if curve == context.active_object:
                 self._draw_conversion(layout, properties)
             return
-        settings.draw_course(layout, properties)
+        settings.draw_design(layout, properties)
         settings.draw_output(layout, properties)
         operator = layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
         for name in settings.PROPERTY_NAMES:

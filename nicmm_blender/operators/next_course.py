@@ -86,7 +86,7 @@ def _key(opened) -> tuple:
 
 def _current(opened, courses: list) -> int | None:
     """The index of the course that a curve takes; None if it takes none of them."""
-    from ...nicmm_core.courses.current_course import current_course
+    from ...nicmm_core.courses.comparison import current_course
 
     if opened.curve is None:
         return None

@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from ..geometry.array_types import FloatArray
+from ..geometry.curve import SurfaceCurve, resample
+from ..geometry.mesh import Mesh
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.elastic_energy import bending_energy, comparable_energies
 from ..relaxation.noded_curve import NodedCurve
-from .course_search import SAME_COURSE, farthest_between
+
+SAME_COURSE = 0.02
+"""Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
+
+SAMPLES = 500
+"""Number of points at which two curves are compared."""
 
 
 def energies_of(
@@ -43,3 +52,25 @@ def is_apart(surface: CurveSurface, curve: NodedCurve, others: Sequence[NodedCur
 def scaled_bending(curve: NodedCurve) -> float:
     """L ∮ κ_g² ds, which does not depend on the unit of length."""
     return bending_energy(curve.nodes) * curve.length
+
+
+def current_course(mesh: Mesh, curve: SurfaceCurve, courses: Sequence[SurfaceCurve]) -> int | None:
+    """Index of the curve nearest to a curve, or None if none of them takes the same course.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh on which all curves lie.
+    curve : SurfaceCurve
+    courses : sequence of SurfaceCurve
+        At least one curve through the same points, each along another course.
+    """
+    ours, *others = (resample(each.points, SAMPLES, each.closed)[0] for each in (curve, *courses))
+    distances = [farthest_between(ours, other) for other in others]
+    nearest = min(range(len(distances)), key=distances.__getitem__)
+    return nearest if distances[nearest] <= SAME_COURSE * mesh.diagonal else None
+
+
+def farthest_between(one: FloatArray, other: FloatArray) -> float:
+    """Hausdorff distance between two sets of points, (n, 3) and (m, 3)."""
+    return float(max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()))

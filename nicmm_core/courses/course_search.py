@@ -13,13 +13,14 @@ from scipy.spatial import cKDTree
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
-from ..path.leg_search import length_factor
+from ..maps.guidance import length_factor
 from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.even_nodes import resampled
 from ..relaxation.node_traces import traces_between_nodes
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
+from .comparison import SAME_COURSE
 from .hop_graph import HopGraph, with_control_points
 from .leg_combinations import (
     cheapest_combinations,
@@ -42,9 +43,6 @@ CANDIDATES, FINALISTS = 24, 6
 
 FIRST_STRIDE = 8
 """Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
-
-SAME_COURSE = 0.02
-"""Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
 
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
@@ -243,8 +241,3 @@ def _near(points: FloatArray, tree: cKDTree, limit: float) -> bool:
     """Whether every point is within a limit of the points in a tree."""
     few = tree.query(points[::FIRST_STRIDE])[0].max() <= limit
     return bool(few and tree.query(points)[0].max() <= limit)
-
-
-def farthest_between(one: FloatArray, other: FloatArray) -> float:
-    """Hausdorff distance between two sets of points, (n, 3) and (m, 3)."""
-    return float(max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()))

@@ -141,7 +141,7 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
     key = np.unique(np.concatenate([start * size + end, end * size + start]))
     start, end = key // size, key % size
     positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
-    hops = _hops(start, end, along[start, end], (positions, normals), (positions, normals))
+    hops = _hops(start, end, along[start, end], positions, normals)
     in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
     same_sheet = along[start, end] <= SAME_SHEET * in_space
     hops, key = select_hops(hops, same_sheet), key[same_sheet]
@@ -167,10 +167,10 @@ class CourseGraph:
         The hops of all m + 2 d states.
     reverse : (m + 2 d,) int array
         Index of the reverse of each state.
-    length : (m + 2 d,) float array
-        Length of the hop of each state, weighted by maps.
+    weighted_length : (m + 2 d,) float array
+        Length of the hop of each state, times the factor there.
     tension : float
-        τ.
+        τ, in 1/length².
     cost : (k, m + 2 d) float array
         Least cost of a path from each control point that ends with each state; infinite if there is
         no such path.
@@ -184,7 +184,7 @@ class CourseGraph:
     normals: FloatArray
     hops: Hops
     reverse: IntArray
-    length: FloatArray
+    weighted_length: FloatArray
     tension: float
     cost: FloatArray
     previous: IntArray
@@ -202,7 +202,7 @@ class CourseGraph:
 
     def by_state(self, start: int, end: int) -> FloatArray:
         """Least cost of a leg between two control points through each state, (m + 2 d,)."""
-        return self.cost[start] + self.cost[end][self.reverse] - self.tension * self.length
+        return self.cost[start] + self.cost[end][self.reverse] - self.tension * self.weighted_length
 
 
 def with_control_points(
@@ -240,9 +240,7 @@ def with_control_points(
     positions = np.concatenate([mesh.vertices[graph.vertex], nodes.positions])
     normals = np.concatenate([surface.vertex_normals[graph.vertex], nodes.normals])
     control, cell = _nearest(to_cells, HOPS)
-    departures = _hops(
-        n + control, cell, to_cells[control, cell], (positions, normals), (positions, normals)
-    )
+    departures = _hops(n + control, cell, to_cells[control, cell], positions, normals)
     arrivals = Hops(
         departures.end, departures.start, departures.length, -departures.arriving,
         -departures.leaving,
@@ -384,14 +382,14 @@ def _hops(
     start: IntArray,
     end: IntArray,
     along_edges: FloatArray,
-    here: tuple[FloatArray, FloatArray],
-    there: tuple[FloatArray, FloatArray],
+    positions: FloatArray,
+    normals: FloatArray,
 ) -> Hops:
-    """Hops between cells, given the positions and normals of their starts and of their ends."""
-    offset = there[0][end] - here[0][start]
+    """Hops between cells with given positions and normals."""
+    offset = positions[end] - positions[start]
     length = np.maximum(np.linalg.norm(offset, axis=1), along_edges / EDGE_DETOUR)
     return Hops(
-        start, end, length, tangents(offset, here[1][start]), tangents(offset, there[1][end])
+        start, end, length, tangents(offset, normals[start]), tangents(offset, normals[end])
     )
 
 

@@ -139,7 +139,7 @@ def crossing_routes(
         Traces between these nodes.
     """
     segments = traced_segments(graph.graph.surface.mesh, traces)
-    count = len(nodes.positions) // nodes.curves
+    count = nodes.per_curve
     legs = np.concatenate([np.full((len(leg.cells), 2), [leg.start, leg.end]) for leg in routes])
     leg = np.repeat(np.arange(len(routes)), [len(leg.cells) for leg in routes])
     one, other = overlapping_segments(segments.face, segments.start, segments.end)
@@ -248,7 +248,7 @@ def course_nodes(
         Which of their nodes are ends of legs.
     """
     surface = graph.graph.surface
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     offset = np.cumsum([0] + [len(leg.cells) for leg in routes])[:-1]
     curve = offset + choice
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)

@@ -48,7 +48,7 @@ def uncrossed(
     (c,) bool array
         Which curves do not cross themselves. Steps whose trace fails are not tested.
     """
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     order = np.arange(len(nodes.positions)).reshape(nodes.curves, size)
     crossing = np.zeros(nodes.curves, dtype=bool)
     which, now = np.arange(nodes.curves), nodes

@@ -14,10 +14,7 @@ from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
 from .surface_points import SurfacePoints, in_faces
-from .tolerances import BARYCENTRIC_SUM
-
-ROUNDING = 1e-12
-"""Barycentric coordinates up to this value are zero up to rounding."""
+from .tolerances import BARYCENTRIC_SUM, ROUNDED
 
 
 @dataclass(frozen=True)
@@ -122,7 +119,7 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArr
     if len(faces) < least:
         raise CurveError(f"curve has {len(faces)} points, too few; it needs {least}")
     off = (faces < 0) | (faces >= len(mesh.faces))
-    off |= ~(barycentric >= -ROUNDING).all(axis=1)
+    off |= ~(barycentric >= -ROUNDED).all(axis=1)
     off |= ~(np.abs(barycentric.sum(axis=1) - 1.0) <= BARYCENTRIC_SUM)
     if off.any():
         first = int(off.argmax())
@@ -130,7 +127,7 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArr
             f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
             f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
         )
-    barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDING))
+    barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDED))
     curve = replace(curve, barycentric=barycentric)
     return curve, _segment_faces(mesh, curve.closed, faces, barycentric)
 

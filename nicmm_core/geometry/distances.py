@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from ..progress import checkpoint
+from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-6
@@ -60,7 +61,7 @@ def build_distance_surface(
 def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Distance of each point to its segment, shape (p,); arguments have shape (p, 3)."""
     along = end - start
-    squared = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    squared = np.maximum((along**2).sum(axis=1), tolerances.TINY)
     share = np.clip(((points - start) * along).sum(axis=1) / squared, 0.0, 1.0)
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
@@ -126,7 +127,7 @@ def _wave_arrival(
     slope = np.zeros(len(length))
     slope[plane] = (end[plane] - start[plane]) / length[plane]
     plane &= np.abs(slope) < 1.0
-    advance = np.sqrt(np.maximum(1.0 - slope**2, np.finfo(np.float64).tiny))
+    advance = np.sqrt(np.maximum(1.0 - slope**2, tolerances.TINY))
     entry = along - slope / advance * off
     plane &= (entry >= 0.0) & (entry <= length)
     across = np.where(plane, start, 0.0) + slope * along + advance * off

@@ -42,8 +42,7 @@ PERTURBATION = 1e-3
 """Greatest move of a vertex of a degenerate face along each axis, relative to its shortest edge."""
 
 ROUNDED = 1e-12
-"""Barycentric coordinates below this value are zero up to rounding, after a point has been
-converted to a part of its face."""
+"""Barycentric coordinates and other pure numbers below this value are zero up to rounding."""
 
 SAME_COST = 1e-9
 """Differences between path costs up to this, relative to the least cost, are rounding errors."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
@@ -175,7 +176,7 @@ def _crossings(
 def _crossing_fraction(field: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
     """Position of the zero of φ on each edge, as a fraction from the first end; 0 at a vertex."""
     here, there = np.abs(field[first]), np.abs(field[second])
-    fraction = here / np.maximum(here + there, np.finfo(np.float64).tiny)
+    fraction = here / np.maximum(here + there, tolerances.TINY)
     return np.where(first == second, 0.0, fraction)
 
 

@@ -14,7 +14,7 @@ from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, is_one_curve
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
-from ..path.leg_search import length_factor
+from ..maps.guidance import length_factor
 from .contour import extract_curves
 from .problem import Problem
 from .topology import keep_topology

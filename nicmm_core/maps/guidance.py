@@ -48,6 +48,13 @@ A lane attracts a curve within about twice this distance, some 4 % of a model's 
 OBSTACLE_WIDTH = 0.015
 """The same for obstacles. They are narrower, since they need not act from a distance."""
 
+LEAST_WEIGHT = 1.0 / 3.0
+"""Least factor of a length under alignment, which limits the detour of a leg to a lane.
+
+At 0.1, distant legs are attracted to a lane, and two legs share a lane. At 0.5, legs ignore more of
+the lanes that are 5 % of the diagonal away.
+"""
+
 CUT = 3.0
 """Radius at which a Gaussian is cut off, in standard deviations."""
 
@@ -94,6 +101,11 @@ def feature_map(
         off_ridge = _off_ridge(mesh, level, width, DEPTH * unit)
         squared -= BASELINE**2 * _response(mesh, level, off_ridge, width)
     return np.sqrt(np.maximum(squared, 0.0))
+
+
+def length_factor(phi_fea: FloatArray) -> FloatArray:
+    """Factor of lengths where φ_fea has the values given, an array of any shape."""
+    return np.maximum(phi_fea**2, LEAST_WEIGHT)
 
 
 def _levels(weights: FloatArray) -> IntArray:

@@ -16,9 +16,10 @@ import numpy as np
 
 from ..errors import ArgumentError, CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import ROUNDING, SurfaceCurve, checked_curve
+from ..geometry.curve import SurfaceCurve, checked_curve
 from ..geometry.mesh import Mesh, adjacent_sides, sides_among
 from ..geometry.surface_points import SurfacePoints, weights_at
+from ..geometry.tolerances import ROUNDED
 from .chain import Chain, build_chain, points_of, superfluous_points
 from .triangulation import ConstraintError, FaceTriangulation
 
@@ -191,7 +192,7 @@ def cut_mesh(
     exact = np.zeros(len(faces), dtype=bool)
     positions = SurfacePoints(faces, barycentric).positions(mesh)
     while True:
-        margin = np.where(exact, ROUNDING, max(snap, ROUNDING))
+        margin = np.where(exact, ROUNDED, max(snap, ROUNDED))
         kept = np.flatnonzero(
             ~superfluous_points(
                 positions, barycentric, faces, curve.closed, must_keep | exact, deviation

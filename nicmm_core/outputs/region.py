@@ -1,7 +1,7 @@
 """The region that a curve encloses: the faces and vertices on one side of it.
 
 The sides are determined by the rule of `geometry.sides`, like the sign of a design's level set
-(`relaxation.curve_field`). That sign is found for vertices; here the sides are found for faces of
+(`level_set.curve_field`). That sign is found for vertices; here the sides are found for faces of
 the cut mesh, so a region that contains no input vertex is found as well.
 """
 

@@ -90,7 +90,7 @@ def build_initial_loop(
         Whether the points are visited as given or in the shortest order.
     phi_fea : (V,) float array, optional
         φ_fea at the input vertices. Lengths are weighted by its square, as in Eq. 7, but with at
-        least `leg_search.LEAST_WEIGHT`. So the path avoids obstacles and follows alignment from the
+        least `guidance.LEAST_WEIGHT`. So the path avoids obstacles and follows alignment from the
         start.
     closed : bool
         Whether the path returns from the last point to the first.

@@ -36,7 +36,7 @@ class Patch:
     positions : (n + E, 3) float array
         Positions of the nodes.
     weight : (n + E,) float array
-        Factor of lengths at each node, see `leg_search.length_factor`.
+        Factor of lengths at each node, see `guidance.length_factor`.
     arcs : (a, 2) int array
         Pairs of nodes that an arc joins.
     through_midpoints : (a,) bool array

@@ -16,6 +16,7 @@ from scipy.sparse import csgraph
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components, path_between
 from ..geometry.mesh import Mesh, side_keys, unique_edges
+from ..maps.guidance import length_factor
 from ..progress import checkpoint
 from .leg_graph import Node, Patch, nonmanifold_vertices
 from .virtual_splits import SplitMesh
@@ -40,13 +41,6 @@ These belong to several sheets but can be passed only once, so a leg should use 
 has to.
 """
 
-LEAST_WEIGHT = 1.0 / 3.0
-"""Least factor of a length under alignment, which limits the detour of a leg to a lane.
-
-At 0.1, distant legs are attracted to a lane, and two legs share a lane. At 0.5, legs ignore more of
-the lanes that are 5 % of the diagonal away.
-"""
-
 FIRST_REACH = 3.0
 """Length limit of the first search, relative to the straight-line distance between the ends."""
 
@@ -55,11 +49,6 @@ REACH_GROWTH = 2.0
 
 WHOLE_SHARE = 0.5
 """Fraction of the component's faces above which the search covers the whole component instead."""
-
-
-def length_factor(phi_fea: FloatArray) -> FloatArray:
-    """Factor of lengths where φ_fea has the values given, an array of any shape."""
-    return np.maximum(phi_fea**2, LEAST_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -137,8 +126,8 @@ class LegSearch:
         if phi_fea is not None:
             self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
 
-    def shortest(self, source: int, target: int, obstacles: BlockedElements) -> Leg | None:
-        """Find the shortest leg that avoids the obstacles; None if no leg exists.
+    def shortest(self, source: int, target: int, blocked: BlockedElements) -> Leg | None:
+        """Find the shortest leg that avoids the blocked elements; None if no leg exists.
 
         A search covers only the part of the surface that a leg of limited length can reach. It is
         repeated with larger limits until it succeeds. The leg found is the shortest one on the
@@ -155,15 +144,15 @@ class LegSearch:
             whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
             limit = np.inf if whole else self._least_factor * reach
             patch = self._whole() if whole else self._patch(inside)
-            leg = self._search(patch, source, target, obstacles, limit)
+            leg = self._search(patch, source, target, blocked, limit)
             if leg is not None or whole:
                 return leg
             reach *= REACH_GROWTH
 
-    def are_joinable(self, pairs: list[tuple[int, int]], obstacles: BlockedElements) -> bool:
+    def are_joinable(self, pairs: list[tuple[int, int]], blocked: BlockedElements) -> bool:
         """Whether each pair of vertices, taken alone, can be joined by a leg."""
         patch = self._whole()
-        free = self._free(patch, obstacles, np.zeros(0, dtype=np.int64))
+        free = self._free(patch, blocked, np.zeros(0, dtype=np.int64))
         free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
         _, label = components(patch.size, *free_arcs.T)
         whole = patch.graph(patch.lengths)
@@ -176,7 +165,7 @@ class LegSearch:
         return all(reached(first) & reached(second) for first, second in pairs)
 
     def _search(
-        self, patch: Patch, source: int, target: int, obstacles: BlockedElements, limit: float
+        self, patch: Patch, source: int, target: int, blocked: BlockedElements, limit: float
     ) -> Leg | None:
         """The cheapest leg on a patch, penalties included; None if all exceed the cost limit."""
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
@@ -184,14 +173,14 @@ class LegSearch:
         if factor is not None:
             lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
-        avoided = patch.node_indices(np.append(obstacles.vertices, source))
-        ends = patch.node_indices(np.append(obstacles.ends, source))
+        avoided = patch.node_indices(np.append(blocked.vertices, source))
+        ends = patch.node_indices(np.append(blocked.ends, source))
         beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
         lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
 
         checkpoint()
         (here,), (there,) = (patch.node_indices(np.array([vertex])) for vertex in (source, target))
-        free = self._free(patch, obstacles, np.array([here, there]))
+        free = self._free(patch, blocked, np.array([here, there]))
         lengths[~free[patch.arcs].all(axis=1)] = np.inf
         _, previous = csgraph.dijkstra(
             patch.graph(lengths), indices=here, return_predecessors=True, limit=limit
@@ -257,19 +246,19 @@ class LegSearch:
             through_midpoints=np.arange(len(arcs)) >= len(midpoint),
         )
 
-    def _free(self, patch: Patch, obstacles: BlockedElements, ends: IntArray) -> BoolArray:
-        """Whether a leg may use each node: its ends, and nodes off the boundary and obstacles."""
+    def _free(self, patch: Patch, blocked: BlockedElements, ends: IntArray) -> BoolArray:
+        """Whether a leg may use each node: its ends, and interior nodes that are not blocked."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
         # A boundary vertex at which several fans meet may be the only connection between them.
         free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
-        free[patch.node_indices(obstacles.vertices)] = False
-        if len(obstacles.edges):
+        free[patch.node_indices(blocked.vertices)] = False
+        if len(blocked.edges):
             # A leg through the midpoint of an edge of another leg would cross that leg.
             size = self._split.n_vertices
             keys = patch.vertices[patch.edges] @ [size, 1]
-            on_path = np.isin(keys, np.sort(obstacles.edges, axis=1) @ [size, 1])
+            on_path = np.isin(keys, np.sort(blocked.edges, axis=1) @ [size, 1])
             free[n_vertices + np.flatnonzero(on_path)] = False
         free[ends] = True
         return free

@@ -180,7 +180,7 @@ class Legs:
     def _find(self, leg: int) -> Leg | None:
         """The shortest path for a leg around the legs found so far; None if it does not exist."""
         self._open_corners(leg)
-        return self._search.shortest(*self.ends(leg), self._obstacles(*self.ends(leg)))
+        return self._search.shortest(*self.ends(leg), self._blocked(*self.ends(leg)))
 
     def _record(self, leg: int, found: Leg) -> None:
         """Split the mesh along a leg and record it."""
@@ -198,9 +198,9 @@ class Legs:
             return True
         for leg in legs:
             self._open_corners(leg)
-        return self._search.are_joinable([self.ends(leg) for leg in legs], self._obstacles())
+        return self._search.are_joinable([self.ends(leg) for leg in legs], self._blocked())
 
-    def _obstacles(self, *free: int) -> BlockedElements:
+    def _blocked(self, *free: int) -> BlockedElements:
         """All legs found so far, and all waypoints except the free ones."""
         paths = [np.array(path, dtype=np.int64) for path in self._paths.values()]
         edges = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]

@@ -78,7 +78,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
     points : SurfacePoints
         Distinct points on one component.
     phi_fea : (V,) float array or None
-        φ_fea at the input vertices, which weights lengths (`leg_search.length_factor`).
+        φ_fea at the input vertices, which weights lengths (`guidance.length_factor`).
     closed : bool
         Whether the path returns from the last point to the first.
 

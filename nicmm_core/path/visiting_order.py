@@ -10,6 +10,7 @@ import itertools
 
 import numpy as np
 
+from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..progress import checkpoint
 
@@ -132,7 +133,7 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
 def _improved(distance: FloatArray, tour: IntArray) -> IntArray:
     """Improve a closed tour by the best exchange until none shortens it; start at point 0."""
     # Exchanges with gains below rounding errors could cycle.
-    least = 1e-12 * float(distance[tour, np.roll(tour, -1)].sum())
+    least = tolerances.ROUNDED * float(distance[tour, np.roll(tour, -1)].sum())
     while True:
         checkpoint()
         gain, i, j = _best_reversal(distance, tour)

@@ -105,6 +105,11 @@ class Nodes:
     phi_fea: FloatArray
     curves: int = 1
 
+    @property
+    def per_curve(self) -> int:
+        """Number of nodes of each curve."""
+        return len(self.positions) // self.curves
+
     @cached_property
     def steps(self) -> FloatArray:
         """Vectors from each node to the next, (n, 3); zero at the last node of an open curve."""
@@ -135,17 +140,17 @@ class Nodes:
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of the curves, (c,), repeated for their nodes, (n,)."""
-        return values.repeat(len(self.positions) // self.curves)
+        return values.repeat(self.per_curve)
 
     @cached_property
     def first(self) -> IntArray:
         """Index of the first node of each curve, (c,)."""
-        return np.arange(0, len(self.positions), len(self.positions) // self.curves)
+        return np.arange(0, len(self.positions), self.per_curve)
 
     @cached_property
     def last(self) -> IntArray:
         """Index of the last node of each curve, (c,)."""
-        return self.first + len(self.positions) // self.curves - 1
+        return self.first + self.per_curve - 1
 
     @property
     def following(self) -> IntArray:

@@ -92,7 +92,7 @@ def balance(
     tension = _weight(nodes, (2.0 * np.pi / lengths) ** 2 / smoothness)
     weights = Balance(tension_factor * tension, 0.0)
     if apart:
-        size = len(nodes.positions) // nodes.curves
+        size = nodes.per_curve
         contact = _weight(nodes, CONTACT * curve_energies(nodes, weights) / size)
         weights = replace(weights, contact=contact)
     if surface.feature_map is not None:

@@ -19,7 +19,7 @@ NODES_PER_RADIAN = 1.0
 """Additional nodes per radian by which the normals turn."""
 
 SHORT_MOVE = 1e-3
-"""Move, in mean distances between nodes, below which `respaced` leaves a node in place."""
+"""Move, in mean distances between nodes, below which `evened` leaves a node in place."""
 
 LENGTH_WITHOUT_TRACE = 2.0
 """Assumed length of a step whose trace fails, relative to the distance of its nodes.
@@ -28,7 +28,7 @@ The trace fails around a thin part, where the way over the surface is longer.
 """
 
 
-def respaced(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
+def evened(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
     """Move nodes so that they are evenly spaced along the straight lines between them.
 
     Parameters
@@ -81,7 +81,7 @@ def resampled(
     """
     traces = traces_between_nodes(surface, nodes)
     node, share = _even_places(surface, nodes, traces, fixed, times)
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     former = np.full((nodes.curves, len(node) // nodes.curves), -1)
     former[:, ::times] = np.where(fixed, np.arange(len(fixed)), -1).reshape(nodes.curves, size)
     former = former.ravel()
@@ -99,7 +99,7 @@ def _even_places(
     surface: CurveSurface, nodes: Nodes, traces: NodeTraces, fixed: BoolArray, times: int
 ) -> tuple[IntArray, FloatArray]:
     """Where m new nodes lie: the node before each, (m,), and its share of the trace from there."""
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     if surface.folded is not None:
         # Inside a fold a trace runs backward, and nodes spaced along it would change places.
         faces = traces.points.faces
@@ -126,7 +126,7 @@ def _even_arcs(
     is closed, the last one if it is open. The first array, (c (n / c + 1),), includes these nodes,
     the second one does not.
     """
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     mean = nodes.by_curve(step_lengths).mean(axis=1)
     turning = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
     turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve

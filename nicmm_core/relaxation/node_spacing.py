@@ -35,7 +35,7 @@ def node_arcs(
     surface: CurveSurface,
     polyline: SurfacePoints,
     arc: FloatArray,
-    control_place: IntArray,
+    control_index: IntArray,
     count: int,
     closed: bool,
 ) -> tuple[FloatArray, IntArray]:
@@ -48,7 +48,7 @@ def node_arcs(
         Points of the polyline, each in the face of the segment after it.
     arc : (s + 1,) float array
         Arc lengths of the polyline, by `arc_lengths`.
-    control_place : (k,) int array
+    control_index : (k,) int array
         Indices of the control points in the polyline, ascending.
     count : int
         Approximate number of nodes.
@@ -61,7 +61,7 @@ def node_arcs(
     (k,) int array
         Indices of the control points among the nodes.
     """
-    place = np.append(control_place, len(polyline)) if closed else control_place
+    place = np.append(control_index, len(polyline)) if closed else control_index
     bounds = arc[place]
     legs = np.diff(bounds)
     counts = np.maximum(np.round(count * legs / legs.sum()), FEWEST_OF_A_LEG).astype(np.int64)

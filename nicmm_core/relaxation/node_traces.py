@@ -90,7 +90,7 @@ def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
 def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next nodes cross."""
     segments = traced_segments(surface.mesh, traces_between_nodes(surface, nodes))
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     curve = segments.node // size
     group = curve * len(surface.mesh.faces) + segments.face
     one, other = overlapping_segments(group, segments.start, segments.end)

@@ -47,14 +47,14 @@ class NodedCurve:
         Indices of the control points among the nodes, in order.
     polyline : SurfacePoints
         Points of the polyline, each in the face of the segment after it.
-    node_place : (n,) int array
+    node_index : (n,) int array
         Index of each node in the polyline, ascending.
     """
 
     nodes: Nodes
     control_nodes: IntArray
     polyline: SurfacePoints
-    node_place: IntArray
+    node_index: IntArray
 
     @property
     def closed(self) -> bool:
@@ -68,7 +68,7 @@ class NodedCurve:
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
         """The polyline in the form of a result."""
-        at_controls = self.node_place[self.control_nodes]
+        at_controls = self.node_index[self.control_nodes]
         polyline = self.polyline
         return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
 
@@ -80,7 +80,7 @@ def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
     """
     polyline = curve.polyline
     inside = np.zeros(len(polyline), dtype=bool)
-    inside[np.delete(curve.node_place, curve.control_nodes)] = True
+    inside[np.delete(curve.node_index, curve.control_nodes)] = True
     inside &= (polyline.barycentric > 0.0).all(axis=1)
     inside[1:] &= ~inside[:-1]  # Of two consecutive nodes, one stays.
     positions = polyline.positions(mesh)
@@ -89,7 +89,7 @@ def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
     kept = ~(inside & (short | np.roll(short, 1)))
     if kept.all() or len(crossing_segments(mesh.faces, polyline[kept], curve.closed)):
         return curve.surface_curve(mesh)
-    at_controls = (np.cumsum(kept) - 1)[curve.node_place[curve.control_nodes]]
+    at_controls = (np.cumsum(kept) - 1)[curve.node_index[curve.control_nodes]]
     polyline = polyline[kept]
     return curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, at_controls)
 
@@ -106,9 +106,9 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
     """
     first = int(curve.control_index[0])
     faces, barycentric = np.roll(curve.faces, -first), np.roll(curve.barycentric, -first, axis=0)
-    control_place = (curve.control_index - first) % len(faces)
+    control_index = (curve.control_index - first) % len(faces)
     polyline = SurfacePoints(faces, barycentric)
-    return _with_nodes(surface, polyline, control_place, count, curve.closed)
+    return _with_nodes(surface, polyline, control_index, count, curve.closed)
 
 
 def noded(
@@ -121,7 +121,7 @@ def noded(
 
 def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
     """The same polyline with about `count` equally spaced nodes."""
-    at_controls = curve.node_place[curve.control_nodes]
+    at_controls = curve.node_index[curve.control_nodes]
     return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
 
 
@@ -167,7 +167,7 @@ def smoothed(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> Nod
 def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
     """Arc lengths at the nodes, (n,), and the length of the whole polyline."""
     arc = arc_lengths(curve.polyline.positions(mesh), curve.closed)
-    return arc[curve.node_place], float(arc[-1])
+    return arc[curve.node_index], float(arc[-1])
 
 
 def moved_along_conormals(
@@ -233,10 +233,10 @@ def traced_through(
         kept = still & np.roll(still, -1)
         if not curve.closed:
             kept[-1] = False
-    polyline, node_place, lost = _traced_polyline(surface, curve, nodes, kept)
+    polyline, node_index, lost = _traced_polyline(surface, curve, nodes, kept)
     if lost.any():
         return None
-    return NodedCurve(nodes, curve.control_nodes, polyline, node_place)
+    return NodedCurve(nodes, curve.control_nodes, polyline, node_index)
 
 
 def straight_traces(
@@ -277,12 +277,12 @@ def retraced(
                 np.where(stays[:, None], old.barycentric, new.barycentric),
             )
             nodes = nodes_at(surface, places, curve.closed)
-        polyline, node_place, bad = _traced_polyline(surface, curve, nodes, kept)
+        polyline, node_index, bad = _traced_polyline(surface, curve, nodes, kept)
         if not bad.any():
             pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
-            bad[np.searchsorted(node_place, pairs.ravel(), side="right") - 1] = True
+            bad[np.searchsorted(node_index, pairs.ravel(), side="right") - 1] = True
         if not bad.any():
-            return NodedCurve(nodes, curve.control_nodes, polyline, node_place), stays
+            return NodedCurve(nodes, curve.control_nodes, polyline, node_index), stays
         if not (bad & ~kept).any():
             return curve, np.ones(len(old), dtype=bool)
         kept |= bad
@@ -292,14 +292,14 @@ def retraced(
 def _with_nodes(
     surface: CurveSurface,
     polyline: SurfacePoints,
-    control_place: IntArray,
+    control_index: IntArray,
     count: int,
     closed: bool,
 ) -> NodedCurve:
     """Insert equally spaced nodes on each leg and drop old points inside faces at their places."""
     mesh, n = surface.mesh, len(polyline)
     arc = arc_lengths(polyline.positions(mesh), closed)
-    at, control_nodes = node_arcs(surface, polyline, arc, control_place, count, closed)
+    at, control_nodes = node_arcs(surface, polyline, arc, control_index, count, closed)
     n_segments = len(arc) - 1
     segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
     along = (at - arc[segment]) / np.maximum(np.diff(arc)[segment], tolerances.TINY)
@@ -307,8 +307,8 @@ def _with_nodes(
     faces = polyline.faces[segment]
     end = in_faces(mesh, polyline[(segment + 1) % n], faces).barycentric
     barycentric = strictly_inside((1.0 - along) * polyline.barycentric[segment] + along * end)
-    faces[control_nodes] = polyline.faces[control_place]
-    barycentric[control_nodes] = polyline.barycentric[control_place]
+    faces[control_nodes] = polyline.faces[control_index]
+    barycentric[control_nodes] = polyline.barycentric[control_index]
     places = SurfacePoints(faces, barycentric)
 
     # All other old points remain, so the polyline keeps its shape.
@@ -318,16 +318,16 @@ def _with_nodes(
     nearest = np.minimum(nodes_along[ahead] - arc[:n], arc[:n] - nodes_along[ahead - 1])
     nearest = np.where(ahead > 0, nearest, 0.0)
     dropped = inside & (nearest < SAME_PLACE * arc[-1])
-    dropped[control_place] = True
+    dropped[control_index] = True
     old = np.flatnonzero(~dropped)
     # A node is sorted after the start of its segment, even if both are at the same place.
-    segment[control_nodes] = control_place
+    segment[control_nodes] = control_index
     before = np.concatenate([segment, old])
     order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
     merged = joined([places, polyline[old]])[order]
-    node_place = np.flatnonzero(order < len(at))
+    node_index = np.flatnonzero(order < len(at))
     nodes = nodes_at(surface, places, closed)
-    return NodedCurve(nodes, control_nodes, merged, node_place)
+    return NodedCurve(nodes, control_nodes, merged, node_index)
 
 
 def _traced_polyline(
@@ -387,7 +387,7 @@ A piece ends before the next node, and its first point is its node.
 
 def _kept_pieces(curve: NodedCurve, nodes: IntArray) -> Pieces:
     """The present pieces of the polyline after some nodes."""
-    bounds = np.append(curve.node_place, len(curve.polyline))
+    bounds = np.append(curve.node_index, len(curve.polyline))
     count = bounds[nodes + 1] - bounds[nodes]
     owner = np.repeat(nodes, count)
     offset = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)

@@ -25,7 +25,7 @@ from .elastic_energy import (
     elastic_system,
     energy_scales,
 )
-from .even_nodes import respaced
+from .even_nodes import evened
 from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
 from .noded_curve import moved_along_conormals
 from .strand_contact import close_pairs, contacts_of_pairs
@@ -81,7 +81,7 @@ def relax_together(
         Divisor of the tension and of the weight of a map.
     config : TogetherConfig
     """
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     steps = StepConfig()
     least = steps.least_damping(size)
     damping = np.full(nodes.curves, least)
@@ -92,7 +92,7 @@ def relax_together(
     for iteration in range(config.iterations):
         checkpoint(iteration / config.iterations)
         if iteration % config.respacing == 0:
-            nodes = respaced(surface, nodes, fixed)
+            nodes = evened(surface, nodes, fixed)
             pairs = close_pairs(nodes) if config.contact else None
         # Nodes may coincide where a route could not be placed; such a curve does not move.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -135,7 +135,7 @@ def relax_together(
 
 def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     """Some of the curves, by their indices."""
-    size = len(nodes.positions) // nodes.curves
+    size = nodes.per_curve
     place = (which[:, None] * size + np.arange(size)).ravel()
     return Nodes(
         nodes.places[place], nodes.closed, nodes.positions.T.take(place, axis=1).T,

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.grouping import path_between
@@ -109,7 +110,7 @@ def _joined(
     traced = nodes
     if normals is not None:
         traced = Nodes(nodes.places, nodes.closed, nodes.positions, normals, nodes.phi_fea)
-    polyline, node_place, lost = straight_traces(surface, curve, traced)
+    polyline, node_index, lost = straight_traces(surface, curve, traced)
     bypasses: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()
@@ -124,7 +125,7 @@ def _joined(
             else:
                 return None
         bypasses[node] = paths[pair]
-    return _with_paths(curve, polyline, node_place, bypasses)
+    return _with_paths(curve, polyline, node_index, bypasses)
 
 
 def _outside_loops(curve: NodedCurve, crossings: IntArray) -> BoolArray:
@@ -133,10 +134,10 @@ def _outside_loops(curve: NodedCurve, crossings: IntArray) -> BoolArray:
     Of the two parts of a closed curve, the one with fewer nodes is the loop. A loop with a control
     point cannot be removed; its two neighbours are removed instead, which changes its traces.
     """
-    n = len(curve.node_place)
+    n = len(curve.node_index)
     control = np.zeros(n, dtype=bool)
     control[curve.control_nodes] = True
-    steps = np.searchsorted(curve.node_place, crossings, side="right") - 1
+    steps = np.searchsorted(curve.node_index, crossings, side="right") - 1
     outside = np.ones(n, dtype=bool)
     for low, high in np.unique(np.sort(steps, axis=1), axis=0).tolist():
         first, last = low, high
@@ -188,7 +189,7 @@ def _path_along_edges(
     length = np.linalg.norm(positions[arcs[:, 0]] - positions[arcs[:, 1]], axis=1)
     size = len(positions)
     # A sparse graph has no arc where the length is zero.
-    length = np.maximum(length, np.finfo(float).tiny)
+    length = np.maximum(length, tolerances.TINY)
     graph = sparse.csr_array((length, (arcs[:, 0], arcs[:, 1])), shape=(size, size))
     _, previous = csgraph.dijkstra(graph, directed=False, indices=here, return_predecessors=True)
     if previous[there] < 0:
@@ -225,14 +226,14 @@ def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> Surface
 def _with_paths(
     curve: NodedCurve,
     polyline: SurfacePoints,
-    node_place: IntArray,
+    node_index: IntArray,
     paths: dict[int, SurfacePoints],
 ) -> NodedCurve:
     """The polyline with paths along edges in place of failed traces."""
-    bounds = np.append(node_place, len(polyline))
+    bounds = np.append(node_index, len(polyline))
     parts = [
         paths.get(node, polyline[np.arange(bounds[node], bounds[node + 1])])
-        for node in range(len(node_place))
+        for node in range(len(node_index))
     ]
     lengths = np.array([len(part) for part in parts])
     return NodedCurve(curve.nodes, curve.control_nodes, joined(parts), np.cumsum(lengths) - lengths)

@@ -103,7 +103,7 @@ class NearStrands:
 
 def contacts_of_pairs(nodes: Nodes, pairs: IntArray) -> Contacts:
     """Contacts among given pairs: closer than the clearance, on the same side of the surface."""
-    ends, size = pairs.T, len(nodes.positions) // nodes.curves
+    ends, size = pairs.T, nodes.per_curve
     clearance = _clearances(nodes).take(ends[0] // size)
     one, other = (nodes.positions.take(end, axis=0).T for end in ends)
     distance = np.maximum(lengths(one - other), tolerances.TINY)

@@ -279,10 +279,10 @@ class _Sides:
         start, end = vertices[corner[self._low[sides]]], vertices[corner[self._high[sides]]]
         edge = end - start
         outward = vertices[corner[sides]] - start
-        squared = np.maximum((edge * edge).sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        squared = np.maximum((edge * edge).sum(axis=1, keepdims=True), tolerances.TINY)
         outward -= (outward * edge).sum(axis=1, keepdims=True) / squared * edge
         length = np.linalg.norm(outward, axis=1, keepdims=True)
-        outward /= np.maximum(length, np.finfo(float).tiny)
+        outward /= np.maximum(length, tolerances.TINY)
         if len(sides) > MOST_COMPARED:
             return _opposite(outward)
         straight = outward @ outward.T

@@ -6,7 +6,8 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses import course_surface
-from nicmm_core.courses.course_search import farthest_between, find_courses, random_waves
+from nicmm_core.courses.comparison import farthest_between
+from nicmm_core.courses.course_search import find_courses, random_waves
 from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
 from nicmm_core.courses.leg_combinations import (
     CROSSING,

@@ -63,12 +63,12 @@ def test_nodes_are_points_of_the_same_curve_at_equal_distances_on_each_leg(ball,
     assert_valid_curve(ball, result, curve.points[curve.control_index], closed)
     assert result.length == pytest.approx(curve.length, rel=1e-5)
     assert distance_to(result.points, curve.points, closed) < 1e-5
-    np.testing.assert_array_equal(result.points[exact.node_place], exact.nodes.positions)
-    assert (np.diff(exact.node_place) > 0).all()
+    np.testing.assert_array_equal(result.points[exact.node_index], exact.nodes.positions)
+    assert (np.diff(exact.node_index) > 0).all()
     n = len(exact.nodes.positions)
     assert n == pytest.approx(count, abs=3) or count < 18
     bounds = [*exact.control_nodes, n] if closed else exact.control_nodes
-    place = np.append(exact.node_place, len(result.points))
+    place = np.append(exact.node_index, len(result.points))
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(result.steps, axis=1))])
     arc = arc if closed else np.append(arc, arc[-1])
     for first, last in zip(bounds[:-1], bounds[1:], strict=True):
@@ -80,7 +80,7 @@ def test_nodes_are_points_of_the_same_curve_at_equal_distances_on_each_leg(ball,
 def test_the_first_control_point_is_the_first_node(ball):
     curve = ring_on(ball)
     exact = noded_curve(surface_of(ball), curve, 50)
-    assert exact.control_nodes[0] == exact.node_place[0] == 0
+    assert exact.control_nodes[0] == exact.node_index[0] == 0
     np.testing.assert_array_equal(
         exact.nodes.positions[exact.control_nodes], curve.points[curve.control_index]
     )
@@ -155,10 +155,10 @@ def test_a_traced_curve_passes_its_nodes_and_lies_on_the_mesh(body, closed, seed
     result = new.surface_curve(mesh)
     assert_lies_on_surface(mesh, result)
     assert_visits(mesh, result, exact.nodes.positions[exact.control_nodes])
-    np.testing.assert_array_equal(result.points[new.node_place], nodes.positions)
-    assert new.node_place[0] == 0 and (np.diff(new.node_place) > 0).all()
+    np.testing.assert_array_equal(result.points[new.node_index], nodes.positions)
+    assert new.node_index[0] == 0 and (np.diff(new.node_index) > 0).all()
     if not closed:
-        assert new.node_place[-1] == len(result.points) - 1
+        assert new.node_index[-1] == len(result.points) - 1
 
 
 def section(mesh, closed=True):
@@ -205,7 +205,7 @@ def test_whatever_moves_a_simple_curve_stays_simple_and_through_its_points(flat_
         assert_valid_curve(flat_disc, result, controls)
         expected = np.where(stays[:, None], exact.nodes.positions, nodes.positions)
         np.testing.assert_allclose(new.nodes.positions, expected, atol=1e-15)
-        np.testing.assert_allclose(result.points[new.node_place], expected, atol=1e-15)
+        np.testing.assert_allclose(result.points[new.node_index], expected, atol=1e-15)
         exact = new
 
 
@@ -295,7 +295,7 @@ def test_a_node_close_beside_an_edge_makes_no_short_segment(flat_disc):
     places = ring.nodes.places
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     beside = np.setdiff1d(np.arange(64), ring.control_nodes)
-    before = in_faces(flat_disc, ring.polyline[ring.node_place[beside] - 1], faces[beside])
+    before = in_faces(flat_disc, ring.polyline[ring.node_index[beside] - 1], faces[beside])
     barycentric[beside] = 0.99 * before.barycentric + 0.01 * barycentric[beside]
     moved = traced_through(
         surface, ring, nodes_at(surface, SurfacePoints(faces, barycentric), True)

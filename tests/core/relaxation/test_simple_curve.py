@@ -31,7 +31,7 @@ def test_all_nodes_of_a_simple_curve_are_kept(closed):
     angles = np.linspace(0.0, 2.0 * np.pi if closed else 4.0, 60, endpoint=False)
     mesh, places = on_sphere(angles, 0.1 * np.sin(3.0 * angles))
     curve = joined_simply(mesh, places, closed=closed)
-    assert len(curve.node_place) == 60
+    assert len(curve.node_index) == 60
     np.testing.assert_array_equal(curve.control_nodes, CONTROLS)
     assert_valid_curve(mesh, curve.surface_curve(mesh), closed=closed)
 
@@ -47,7 +47,7 @@ def test_nodes_of_a_loop_are_removed(size):
     mesh, places = on_sphere(angles, heights)
     curve = joined_simply(mesh, places)
     assert is_simple(curve_surface(mesh), curve)
-    assert 60 - size - 2 <= len(curve.node_place) < 60
+    assert 60 - size - 2 <= len(curve.node_index) < 60
     assert_valid_curve(mesh, curve.surface_curve(mesh), closed=True)
     at_controls = curve.nodes.positions[curve.control_nodes]
     np.testing.assert_array_equal(at_controls, places[CONTROLS].positions(mesh))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.courses.current_course import current_course
+from nicmm_core.courses.comparison import current_course
 
 
 @pytest.fixture(scope="module")

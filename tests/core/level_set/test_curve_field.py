@@ -7,7 +7,7 @@ from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.relaxation.curve_field import curve_field
+from nicmm_core.level_set.curve_field import curve_field
 from tests.core.checks import (
     circle,
     curve_through,
