@@ -9,7 +9,10 @@ class Status(enum.Enum):
     """How a design ended; ``str()`` says what to change."""
 
     CONVERGED = "converged: one curve through all control points"
-    ITERATION_LIMIT = "stopped before the energy converged; the curve is usable; a finer mesh, a mesh without defects or other control points may give a fairer one"
+    ITERATION_LIMIT = (
+        "stopped before the energy converged; the curve is usable; a finer mesh, a mesh without "
+        "defects or other control points may give a fairer one"
+    )
     DIVERGED = (
         "the energy became infinite or NaN; the best earlier curve is returned; look for faces "
         "without area, or merge vertices by distance"
