@@ -122,7 +122,7 @@ def _flag(option: Option) -> dict[str, Any]:
             "action": "append",
             "default": [],
             "metavar": "I:A,B",
-            "help": "vertices that the initial path passes after the I-th of the points, from 0; "
+            "help": "vertices near which the curve runs after the I-th of the points, from 0; "
             "repeatable",
         }
     number = int if option.kind is Kind.COUNT else float

@@ -2,15 +2,16 @@
 
 A request is checked, and faces inside obstacles are removed (`repair.free_surface`). If the
 remaining surface is not a manifold, it is repaired (`repaired_surface`). The curve is designed on
-this manifold (`surface_designer`). The default method takes the steps
+a canonical copy of this manifold (`geometry.numbering`), by `surface_designer`. The default method
+takes the steps
 
 control points → courses without crossings (`courses`), compared by their energy → relaxation of the
 best course,
 
 or, if no course is found,
 
-control points → initial loop → signed distance → features (`problem`) → pretrained network
-→ its level set → one loop through the points → contour → relaxation of the curve.
+control points → initial path → signed distance → features (`level_set.problem`) → pretrained
+network → its level set → one loop through the points → contour → relaxation of the curve.
 
 Except on small meshes, all steps before the relaxation run on a coarse mesh of the same surface,
 and the curve is mapped from there to the fine mesh (`coarsening`).
@@ -252,8 +253,8 @@ def design_curve(
     via_points : mapping, optional
         Points that select one of several courses between two control points, such as
         ``{1: [57]}``. The key is the index of a control point. The value has points, in any form
-        that control points may have, through which the initial path to the next control point
-        runs. The curve does not pass through them exactly. Only for the order "given".
+        that control points may have, through which the curve from which the computation starts
+        runs to the next control point. The result passes near them. Only for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
         The best of many candidate courses, or else the level set of the pretrained network, relaxed
         on the surface (the default); the method of the paper, which trains the network further for

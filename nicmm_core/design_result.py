@@ -41,7 +41,7 @@ class Design:
     resumable : Resumable or None
         State from which a design with ``start=`` continues; None if it continues from `curves`.
     alternatives : list of Design
-        Curves along other courses, the fairest first. Each is somewhere at least 2 % of the
+        Curves along other courses, the lowest energy first. Each is somewhere at least 2 % of the
         diagonal away from this curve and from the other alternatives. Empty unless requested.
     """
 

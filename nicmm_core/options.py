@@ -104,7 +104,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.POINTS,
         None,
         "Via Points",
-        "Points that the initial path passes on its way from one control point to the next",
+        "Points near which the curve runs on its way from one control point to the next",
         flag="via",
     ),
     Option(
@@ -161,7 +161,7 @@ OPTIONS: tuple[Option, ...] = (
         Kind.COUNT,
         0,
         "Alternatives",
-        "Maximum number of additional curves along other courses, the fairest first",
+        "Maximum number of additional curves along other courses, the lowest energy first",
         usual=(0.0, 5.0),
     ),
 )

@@ -30,9 +30,9 @@ The number is reduced where its sum over all legs would exceed the third value.
 """
 
 NODES, FEWEST_SHARED = 96, 48
-"""Number of nodes of a course, and least number of those that its legs share by their lengths.
+"""Number of nodes of a course, and least number of them that its legs share by their lengths.
 
-Besides, every leg has `FEWEST_NODES`. With many legs, a course has more nodes.
+In addition, every leg gets `FEWEST_NODES`, so with many legs a course has more nodes.
 """
 
 SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)

@@ -30,7 +30,7 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
     """Positions relative to the surface's centroid, along its principal axes, shape (n, 3).
 
     In this frame the input, and so the curve, does not depend on the rotation or translation of the
-    model, unless the axes are undetermined, as for a ball.
+    model, unless the axes are undetermined, as for a sphere.
     """
     frame = principal_frame(vertices, faces, face_areas)
     axes = frame.signed_axes()

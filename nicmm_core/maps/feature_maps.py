@@ -26,7 +26,7 @@ USUAL, STRIKING = 0.5, 0.95
 """Quantiles of the curvature over the area that get weight 0 and weight 1 by default."""
 
 LEAST_CONTRAST = 2.0
-"""Least ratio of the curvatures with weight 1 and weight 0, so that a ball has no weights."""
+"""Least ratio of the curvatures with weight 1 and weight 0, so that a sphere has no weights."""
 
 HUB = 64
 """Valence above which two-rings do not extend through a vertex: they would be too large."""
@@ -86,8 +86,8 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     mesh : Mesh
     low, high : float, optional
         Curvatures with weight 0 and with weight 1, in 1/length. By default these are the median
-        over the area, and the 95 % quantile or twice the median, whichever is larger. So a ball, a
-        tube and a plane have no weights.
+        over the area, and the 95 % quantile or twice the median, whichever is larger. So a sphere,
+        a tube and a plane have no weights.
 
     Returns
     -------

@@ -1,7 +1,8 @@
-"""Via points, which steer the initial path between consecutive control points.
+"""Via points, which select the course of a curve between consecutive control points.
 
 They select the homotopy class of the curve, such as the side of a limb or the direction around a
-handle. Only the initial path passes through them; the final curve does not interpolate them.
+handle. Only the curve from which the computation starts passes through them; the final curve does
+not interpolate them.
 """
 
 from __future__ import annotations

@@ -19,11 +19,11 @@ from ..geometry.vectors import cross, dot, lengths, unit
 from ..maps.guidance import feature_map
 
 FEATURE_TENSION = 600.0
-"""τ_fea = λ_fea / λ_smooth for lengths in square roots of the surface's area.
+"""The part of τ_fea that scales with the surface, times its area.
 
 It determines the smallest radius to which the curve bends to follow a map: about 1/√600, 4 % of
-that unit. With 30, the ratio of the level set, the curve would be too stiff for typical painted
-maps.
+the square root of the area. With 30, the ratio λ_fea / λ_smooth of the level set, the curve would
+be too stiff for typical painted maps.
 """
 
 
@@ -39,7 +39,7 @@ class CurveSurface:
     feature_map : (V,) float array or None
         φ_fea.
     feature_weight : float
-        λ_fea / λ_smooth, in 1/length², where there is a feature map.
+        `FEATURE_TENSION` over the area, in 1/length², where there is a feature map.
     folded : (F,) bool array or None
         Which faces are folded back over others, so that they point against the normals of their
         corners. None if no face is folded.

@@ -22,7 +22,7 @@ SHORT_MOVE = 1e-3
 """Move, in mean distances between nodes, below which `evened` leaves a node in place."""
 
 LENGTH_WITHOUT_TRACE = 2.0
-"""Assumed length of a step whose trace fails, relative to the distance of its nodes.
+"""Assumed length of a step whose trace fails, relative to the distance between its nodes.
 
 The trace fails around a thin part, where the way over the surface is longer.
 """

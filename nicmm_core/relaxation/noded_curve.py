@@ -95,7 +95,7 @@ def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
 
 
 def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> NodedCurve:
-    """Place nodes on a curve that passes its control points in order.
+    """Place nodes on a curve that passes through its control points in order.
 
     Parameters
     ----------

@@ -184,19 +184,20 @@ def relax(
     ----------
     surface : CurveSurface
     start : SurfaceCurve or NodedCurve
-        A simple curve that passes its control points in order.
+        A simple curve that passes through its control points in order.
     smoothness : float
         Divisor of the tension and of the weight of a map.
     config : RelaxationConfig
     watch : callable, optional
-        Called after every iteration with the number of iterations, as a fraction of the cap, and
-        the positions of the nodes, (n, 3). Relaxation stops when it returns False. It also stops,
-        with the last traced curve, when `progress.checkpoint` raises `CancelledError`.
+        Called after every iteration with 1 minus the remaining iterations, relative to
+        `RelaxationConfig.iterations`, and the positions of the nodes, (n, 3). Relaxation stops when
+        it returns False. It also stops, with the last traced curve, when `progress.checkpoint`
+        raises `CancelledError`.
 
     Returns
     -------
     Relaxed
-        The start itself, with the status, if no simple relaxed curve was found.
+        The start itself, with the status `UNRELAXED`, if no simple relaxed curve was found.
     """
     if isinstance(start, NodedCurve):
         first, start = start, start.surface_curve(surface.mesh)

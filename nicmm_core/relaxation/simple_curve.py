@@ -67,8 +67,8 @@ def simple_curve(
     Returns
     -------
     NodedCurve or None
-        A simple curve through the control points and most of the other nodes, or None if there is a
-        step that no path replaces, or a loop that contains a control point.
+        A simple curve through the control points and most of the other nodes. None if a step cannot
+        be traced or replaced by a path, or if crossings remain after `ROUNDS` rounds.
     """
     faces, barycentric = places.faces.copy(), strictly_inside(places.barycentric)
     faces[control_nodes], barycentric[control_nodes] = controls.faces, controls.barycentric

@@ -43,7 +43,7 @@ def with_moved_controls(
     ----------
     surface : CurveSurface
     curve : NodedCurve
-        A simple curve that passes its control points in order.
+        A simple curve that passes through its control points in order.
     controls : SurfacePoints
         New places of the control points, in the order visited.
 
