@@ -33,7 +33,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
         description="Number of recently used meshes to keep in memory, so that further curves "
         "on them are faster. Each mesh takes about 400 bytes per vertex",
         default=KEPT_MESHES,
-        min=0,
+        min=1,
         max=64,
     )
     live_delay: FloatProperty(

@@ -260,6 +260,13 @@ class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGr
     tube: _tube_property(not sticky_curves.are_drawn_with_all_points())
 
 
+def take_from_sidebar(operator, properties) -> None:
+    """Give an operator the settings of the sidebar, except those that its caller has set."""
+    for name in PROPERTY_NAMES:
+        if not operator.properties.is_property_set(name):
+            setattr(operator, name, getattr(properties, name))
+
+
 def choose_tube(operator) -> None:
     """Enable *Tube* in Blender versions that draw strands coarsely; for calls from the window.
 

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty
 from .. import settings
 from ..outputs import curve_object, writing
 from ..scene import curve_record, mesh_data
+from ..scene.messages import InputError
 from . import polls
 from .long_solves import with_error_reports
 
@@ -26,8 +27,11 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        has_curve = curve_record.has_record(context.active_object)
-        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.OBJECT)
+        # Outputs that change the mesh make it active. The redo panel exists only if the operator
+        # could run then, although Blender undoes it first.
+        active = context.active_object
+        can_run = curve_record.has_record(active) or mesh_data.mesh_object(context) is not None
+        return polls.usable(cls, context, can_run, polls.NO_CURVE, polls.OBJECT)
 
     def draw(self, context):
         settings.draw_output(self.layout, self)
@@ -42,6 +46,8 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
 
     def _execute(self, context):
         original = context.active_object
+        if not curve_record.has_record(original):
+            raise InputError(polls.NO_CURVE)
         name = original.name
         mesh_object = curve_record.mesh_in_view_layer(context, original)
         mesh_data.synchronise(mesh_object)
@@ -53,7 +59,7 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
             curve_object.remove(original)
         if self.output not in writing.SEPARATE:
             curve_object.select_only(context, mesh_object)
-        self.report({"INFO"}, f"{name}: {summary}")
+        self.report({"INFO"}, f'"{name}": {summary}')
         return {"FINISHED"}
 
 

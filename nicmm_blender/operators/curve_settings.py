@@ -21,12 +21,16 @@ COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_
 DRAWING = ("spline", "offset")
 
 _problems: dict = {}
-"""Messages about changes that were impossible, by the session_uid of the curve."""
+"""Messages about changes that were impossible, by the session_uid of the curve.
+
+Each is stored with the digest of the curve at that time, and is out of date if that has changed.
+"""
 
 
 def problem_of(curve) -> str:
     """Why the last change of a curve's settings was impossible; empty if it was not."""
-    return _problems.get(curve.session_uid, "")
+    digest, message = _problems.get(curve.session_uid, ("", ""))
+    return message if curve_record.is_current(curve, digest) else ""
 
 
 def _read(group, name: str, default):
@@ -53,7 +57,8 @@ def _write(group, name: str, value) -> None:
     try:
         _change(curve, name, value)
     except (InputError, nicmm.NicmmError, ImportError) as error:
-        _problems[curve.session_uid] = str(error)
+        digest = curve.data.get(curve_record.DIGEST_KEY, "")
+        _problems[curve.session_uid] = digest, str(error)
     else:
         _problems.pop(curve.session_uid, None)
 

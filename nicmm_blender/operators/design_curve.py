@@ -54,7 +54,7 @@ class NICMM_OT_design_curve(
         settings.draw(self.layout, self, mesh_data.mesh_object(context))
 
     def invoke(self, context, event):
-        settings.choose_tube(self)
+        settings.take_from_sidebar(self, context.scene.nicmm_curves)
         return super().invoke(context, event)
 
     def requests(self, context) -> list:
@@ -64,12 +64,13 @@ class NICMM_OT_design_curve(
         points, order = self._control_points(mesh_object, surface)
         curve_settings = curve_record.settings_from(self)
         request = design_request.for_points(mesh_object, surface, points, order, curve_settings)
-        if self.alternatives and self.output not in writing.SEPARATE:
+        alternatives = _alternatives(self)
+        if alternatives and self.output not in writing.SEPARATE:
             raise InputError(
                 "Alternatives are separate curves. Set Output to Curve or Sticky Curves, or set "
                 "Alternatives to 0"
             )
-        return [replace(request, options={**request.options, "alternatives": self.alternatives})]
+        return [replace(request, options={**request.options, "alternatives": alternatives})]
 
     def _control_points(self, mesh_object, surface):
         if self.points and self.point_group:
@@ -104,13 +105,18 @@ class NICMM_OT_design_curve(
         summary = f"{_summary(mesh_object, design, order, request.settings)}: {result}"
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
-        if self.alternatives:
+        if _alternatives(self):
             summary += f"; {counted(len(design.alternatives), 'alternative')}"
         if design.status == nicmm.Status.CONVERGED:
             self.report({"INFO"}, summary)
         else:
             self.report({"WARNING"}, f"{summary}; {design.status}")
         return {"FINISHED"}
+
+
+def _alternatives(operator) -> int:
+    """Number of alternatives; the setting has no effect with other methods."""
+    return operator.alternatives if operator.method == "NICMM" else 0
 
 
 def _summary(mesh_object, design, order: str, curve_settings) -> str:

@@ -123,6 +123,8 @@ def _unnoticed():
 
 def _add_request(designed, mesh_object, surfaces: dict) -> None:
     """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
+    from ... import nicmm_core as nicmm
+
     uid = designed.session_uid
     now = ""
     try:
@@ -142,7 +144,7 @@ def _add_request(designed, mesh_object, surfaces: dict) -> None:
         writing.check_replaceable(designed)
         traced = read(mesh_object, settings.use_modifiers)
         request = design_request.for_curve(designed, mesh_object, traced, settings)
-    except InputError as error:
+    except (InputError, nicmm.NicmmError) as error:
         _updates.failed[uid] = now, f"{designed.name}: {error}"
         return
     _updates.requests.append(request)
@@ -151,6 +153,8 @@ def _add_request(designed, mesh_object, surfaces: dict) -> None:
 
 def _write() -> None:
     """Write the new curves into their objects."""
+    from ... import nicmm_core as nicmm
+
     work, requests, curves = _updates.work, _updates.requests, _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
@@ -158,13 +162,14 @@ def _write() -> None:
         designed = objects.get(uid)
         if designed is None or request.mesh_object() is None:
             continue
-        now = curve_record.digest(request.mesh_object(), request.surface, request.settings)
         _updates.failed.pop(uid, None)
+        now = ""
         try:
+            now = curve_record.digest(request.mesh_object(), request.surface, request.settings)
             writing.check_replaceable(designed)
             request.check_unchanged()
             writing.replace(designed, request, answer)
-        except InputError as error:
+        except (InputError, nicmm.NicmmError) as error:
             _updates.failed[uid] = now, f"{designed.name}: {error}"
 
 
@@ -210,7 +215,9 @@ def note_changes(scene, depsgraph) -> None:
         if isinstance(update.id, bpy.types.Object)
         and update.id.type == "MESH"
         and (
-            update.is_updated_geometry or (update.is_updated_shading and update.id.mode == "SCULPT")
+            update.is_updated_geometry
+            or update.is_updated_transform  # a curve depends on the object's scale
+            or (update.is_updated_shading and update.id.mode == "SCULPT")
         )
     }
     if objects:

@@ -76,12 +76,23 @@ class LongSolves:
         """Cancel the work; also called by Blender when it opens another file or quits."""
         self._work.cancel()
         self._tidy(context)
+        vars(self).clear()
+
+    def end(self, context, requests: list, answers: list) -> set:
+        """Finish, and drop everything that was kept during the work.
+
+        Blender keeps the last operators for the redo panel, and so would keep their meshes.
+        """
+        try:
+            return self.finish(context, requests, answers)
+        finally:
+            vars(self).clear()
 
     def _all_at_once(self, context):
         requests = self.requests(context)
         with pointer_progress(context) as progress:
             answers = answer_all(requests, progress)
-        return self.finish(context, requests, answers)
+        return self.end(context, requests, answers)
 
     def _begin(self, context):
         return self.answer(context, self.requests(context))
@@ -91,14 +102,14 @@ class LongSolves:
         self._requests = requests
         self._work = time_slices.Work(lambda progress: answer_all(requests, progress))
         if self._work.run_slice(preferences.patience()):
-            return self.finish(context, requests, self._work.result())
+            return self.end(context, requests, self._work.result())
         self._partial, self._shown = PartialCurve(), None
         self._slice_ended = time.perf_counter()
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TIME_SLICE, window=context.window)
         if not self.has_handler:
             window_manager.modal_handler_add(self)
-        _running.append(self)
+        note_running(self)
         self._show(context)
         return {"RUNNING_MODAL"}
 
@@ -106,7 +117,7 @@ class LongSolves:
         answers = self._work.result()
         for request in self._requests:
             request.check_unchanged()
-        return self.finish(context, self._requests, answers)
+        return self.end(context, self._requests, answers)
 
     def _show(self, context):
         if self._work.polyline is not self._shown:
@@ -117,10 +128,20 @@ class LongSolves:
         context.workspace.status_text_set(f"{self.bl_label}: {percent}%   |   Esc: Cancel")
 
     def _tidy(self, context):
-        _running.remove(self)
+        note_ended(self)
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
         self._partial.remove()
+
+
+def note_running(operator) -> None:
+    """Record that an operator is waiting for timer events."""
+    _running.append(operator)
+
+
+def note_ended(operator) -> None:
+    """Record that an operator no longer waits."""
+    _running.remove(operator)
 
 
 def stop_all() -> None:

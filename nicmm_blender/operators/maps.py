@@ -6,11 +6,11 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..outputs import edited_curve
-from ..scene import mesh_data
+from ..scene import curve_record, mesh_data
 from ..scene.messages import InputError
 from ..scene.selection import selected_vertices
 from ..scene.surface import read, vertex_group
-from . import polls
+from . import curve_settings, polls
 from .long_solves import with_error_reports
 
 ROLES = (
@@ -88,8 +88,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
-        mesh_object = mesh_data.mesh_object(context)
-        mesh_data.check_local(mesh_object, "its weights cannot be changed")
+        mesh_object, curve = _mesh_to_change(context), edited_curve.active(context)
         mesh_data.synchronise(mesh_object)
         weights = self.strength * _weights(mesh_object, self.source, self.angle)
         if self.source != "PAINT" and not weights.any():
@@ -99,10 +98,15 @@ class NICMM_OT_new_map(bpy.types.Operator):
         group = mesh_object.vertex_groups.new(name=NAMES[self.role])
         for vertex in np.flatnonzero(weights).tolist():
             group.add([vertex], float(weights[vertex]), "REPLACE")
-        setattr(settings_of(context), FIELDS[self.role], group.name)
+        # The mesh is active now, but the map is for the curve that was.
+        setattr(_settings(context, curve), FIELDS[self.role], group.name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT" if self.show else mode)
-        self.report({"INFO"}, f'Vertex group "{group.name}", {np.count_nonzero(weights)} vertices')
+        created = f'Vertex group "{group.name}", {np.count_nonzero(weights)} vertices'
+        if curve is not None and (problem := curve_settings.problem_of(curve)):
+            self.report({"WARNING"}, f'{created}; "{curve.name}" does not use it: {problem}')
+        else:
+            self.report({"INFO"}, created)
         return {"FINISHED"}
 
 
@@ -123,7 +127,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
         return with_error_reports(self, lambda: self._execute(context))
 
     def _execute(self, context):
-        mesh_object = mesh_data.mesh_object(context)
+        mesh_object = curve_record.mesh_of_context(context)
         name = getattr(settings_of(context), FIELDS[self.role])
         if is_painting(context, mesh_object, name):
             _enter(context, mesh_object, "OBJECT")
@@ -132,8 +136,7 @@ class NICMM_OT_paint_map(bpy.types.Operator):
             raise InputError(
                 f"No vertex group is chosen for {NAMES[self.role]}. Choose one, or create a new map"
             )
-        mesh_data.check_local(mesh_object, "its weights cannot be changed")
-        group = vertex_group(mesh_object, name)
+        group = vertex_group(_mesh_to_change(context), name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT")
         return {"FINISHED"}
@@ -141,8 +144,22 @@ class NICMM_OT_paint_map(bpy.types.Operator):
 
 def settings_of(context):
     """The settings that name the maps: those of the active curve, or of a new curve."""
-    curve = edited_curve.active(context)
+    return _settings(context, edited_curve.active(context))
+
+
+def _settings(context, curve):
     return context.scene.nicmm_curves if curve is None else curve.nicmm_settings
+
+
+def _mesh_to_change(context):
+    """The active mesh, or the mesh of the active curve; an error if its weights cannot change."""
+    active = context.active_object
+    if curve_record.has_record(active):
+        mesh_object = curve_record.mesh_in_view_layer(context, active)
+    else:
+        mesh_object = mesh_data.mesh_object(context)
+    mesh_data.check_local(mesh_object, "its weights cannot be changed")
+    return mesh_object
 
 
 def is_painting(context, mesh_object, name: str) -> bool:
@@ -152,8 +169,9 @@ def is_painting(context, mesh_object, name: str) -> bool:
 
 
 def _poll(cls, context) -> bool:
-    has_mesh = mesh_data.mesh_object(context) is not None
-    return polls.usable(cls, context, has_mesh, polls.NO_MESH, polls.OBJECT_EDIT_OR_WEIGHTS)
+    has_mesh = curve_record.mesh_of_context(context) is not None
+    missing = polls.NO_MESH_OR_CURVE
+    return polls.usable(cls, context, has_mesh, missing, polls.OBJECT_EDIT_OR_WEIGHTS)
 
 
 def _weights(mesh_object, source: str, angle: float) -> np.ndarray:

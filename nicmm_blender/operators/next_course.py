@@ -8,6 +8,7 @@ operator searches for courses again, and the user chooses one of them.
 from dataclasses import replace
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import IntProperty
 
 from ..outputs import edited_curve
@@ -21,7 +22,7 @@ ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
 _found: dict = {}
-"""The designs of the last search by what they depend on, so that a next call takes no time."""
+"""The courses of the last search by what they depend on, so that a next call takes no time."""
 
 
 class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
@@ -43,29 +44,35 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        has_mesh = curve_record.mesh_of_context(context) is not None
-        return polls.usable(cls, context, has_mesh, polls.NO_CURVE, polls.TOOL)
+        has_curve = edited_curve.active(context) is not None
+        return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
     def requests(self, context) -> list:
+        if self.options.is_repeat_last:
+            self.course = 0  # it holds the number that was selected last
         edited = edited_curve.chosen(context, self.curve)
         if edited is None:
             raise InputError(polls.NO_CURVE)
         if not curve_record.has_curve(edited):
             raise InputError(curve_record.no_curve_message(edited))
         self._opened = edited_curve.open_curve(context, edited)
-        if _key(self._opened) in _found:
+        self._key = _key(self._opened)
+        if self._key in _found:
             return []
         (request,) = edited_curve.request(self._opened, self._opened.points)
         options = {**request.options, "alternatives": ALTERNATIVES}
         return [replace(request, start=None, options=options)]
 
     def finish(self, context, _requests: list, answers: list) -> set:
-        opened, name = self._opened, self._opened.curve_object.name
+        opened = self._opened
         if answers:
             edited_curve.curves_of(answers)  # raises an answer that is an error
             _found.clear()
-            _found[_key(opened)] = [answers[0], *answers[0].alternatives]
-        courses = [design.curves[0] for design in _found[_key(opened)]]
+            designs = [answers[0], *answers[0].alternatives]
+            _found[self._key] = [design.curves[0] for design in designs]
+        if opened.curve_object is None:
+            raise InputError(edited_curve.DELETED)
+        courses, name = _found[self._key], opened.curve_object.name
         current = _current(opened, courses)
         if len(courses) == 1 and current == 0:
             self.report({"INFO"}, f'No other course of "{name}" was found')
@@ -94,10 +101,18 @@ def _current(opened, courses: list) -> int | None:
     return current_course(mesh, opened.curve, courses)
 
 
+@persistent
+def forget(*_arguments) -> None:
+    """Drop the courses found before another file is opened."""
+    _found.clear()
+
+
 def register() -> None:
     bpy.utils.register_class(NICMM_OT_next_course)
+    bpy.app.handlers.load_pre.append(forget)
 
 
 def unregister() -> None:
-    _found.clear()
+    forget()
+    bpy.app.handlers.load_pre.remove(forget)
     bpy.utils.unregister_class(NICMM_OT_next_course)

@@ -28,6 +28,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         name="Use Sidebar Settings",
         description="Replace the settings of each curve with those in the sidebar",
         default=False,
+        options={"SKIP_SAVE"},
     )
 
     @classmethod

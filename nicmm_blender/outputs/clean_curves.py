@@ -94,7 +94,8 @@ def _offset_points(surface, curve, offset: float) -> np.ndarray:
         return surface.points(curve.faces, curve.barycentric)
     from ...nicmm_core.splines.offset import offset_points
 
-    height = offset / surface.unit
+    # A reflection turns the normals of the core's mesh inwards.
+    height = np.sign(np.linalg.det(surface.local_to_core)) * offset / surface.unit
     points = offset_points(_core_mesh(surface), curve.faces, curve.barycentric, height)
     return points @ np.linalg.inv(surface.local_to_core).T
 

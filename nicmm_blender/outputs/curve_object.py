@@ -2,7 +2,8 @@
 """Writes splines to a Blender curve object, and links new objects to the scene.
 
 A curve object is a child of its mesh object. If the mesh object is scaled non-uniformly, the child
-gets an unscaled space of its own, since a tube would be flattened in the space of the mesh.
+gets an unscaled space of its own, since a tube would be flattened in the space of the mesh. If the
+user gives a curve another parent, or none, its place in the scene counts instead.
 """
 
 import bpy
@@ -10,7 +11,11 @@ import numpy as np
 
 from mathutils import Matrix
 
+from ..scene import curve_record
 from .clean_curves import Knots
+
+SAME_MATRIX = 1e-5
+"""Greatest difference of entries of matrices in single precision that should be equal."""
 
 
 def new_object(mesh_object, surface, splines, radius: float):
@@ -40,24 +45,58 @@ def parent_to_mesh(curve_object, mesh_object, surface) -> None:
     curve_object.matrix_parent_inverse = Matrix((np.linalg.inv(to_world) @ rigid).tolist())
 
 
+def is_child(curve_object) -> bool:
+    """Whether the parent of an object is its mesh, and was set by `parent_to_mesh`.
+
+    That function sets the inverse of a stretch without rotation or translation. Blender's own
+    operator sets the inverse of the placement of the parent.
+    """
+    if curve_object.parent is None or curve_object.parent != _mesh_of(curve_object):
+        return False
+    inverse = np.array(curve_object.matrix_parent_inverse)
+    stretch, size = inverse[:3, :3], np.abs(inverse[:3, :3]).max()
+    return bool(
+        np.abs(inverse[:3, 3]).max() <= SAME_MATRIX
+        and np.abs(stretch - stretch.T).max() <= SAME_MATRIX * size
+    )
+
+
 def scale_of(curve_object, surface) -> float:
-    """Length in the scene of one unit of the space of a child object."""
+    """Length in the scene of one unit of the space of a curve object."""
+    if not is_child(curve_object):
+        return _mean_scale(curve_object.matrix_world)
     inverse = np.array(curve_object.matrix_parent_inverse)[:3, :3]
     return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
 
 
 def scale_in_scene(curve_object, mesh_object) -> float:
-    """The same as `scale_of`, from the parent `mesh_object` instead of its surface."""
-    placement = np.array(mesh_object.matrix_world @ curve_object.matrix_parent_inverse)[:3, :3]
-    return float(np.cbrt(abs(np.linalg.det(placement)))) or 1.0
+    """The same as `scale_of`, from the mesh object instead of its surface."""
+    if not is_child(curve_object):
+        return _mean_scale(curve_object.matrix_world)
+    return _mean_scale(mesh_object.matrix_world @ curve_object.matrix_parent_inverse)
+
+
+def _mean_scale(matrix) -> float:
+    return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3])))) or 1.0
 
 
 def to_object_space(curve_object, points: np.ndarray) -> np.ndarray:
-    """Transform points (n, 3) from the mesh's local space to the space of a child object."""
-    if curve_object.parent is None or curve_object.matrix_parent_inverse == Matrix():
-        return points
-    to_child = np.linalg.inv(np.array(curve_object.matrix_parent_inverse))
-    return points @ to_child[:3, :3].T + to_child[:3, 3]
+    """Transform points (n, 3) from the mesh's local space to the space of a curve object."""
+    if is_child(curve_object):
+        if curve_object.matrix_parent_inverse == Matrix():
+            return points
+        to_curve = np.linalg.inv(np.array(curve_object.matrix_parent_inverse))
+    else:
+        in_world = np.array(_mesh_of(curve_object).matrix_world)
+        to_curve = np.array(curve_object.matrix_world.inverted_safe()) @ in_world
+    return points @ to_curve[:3, :3].T + to_curve[:3, 3]
+
+
+def _mesh_of(curve_object):
+    """The mesh on which a curve was designed; the parent of an object without a record yet."""
+    if curve_record.has_record(curve_object):
+        return curve_record.mesh_of(curve_object)
+    return curve_object.parent
 
 
 def write_splines(curve_object, splines) -> None:
@@ -165,8 +204,12 @@ def link(context, mesh_object, new_object) -> None:
 
 
 def _collections(context, mesh_object):
-    """The collections of the mesh, or the scene collection if all are linked from other files."""
-    editable = [found for found in mesh_object.users_collection if found.library is None]
+    """The collections of the mesh, or the scene collection if all belong to other files."""
+    editable = [
+        found
+        for found in mesh_object.users_collection
+        if found.library is None and found.override_library is None
+    ]
     return editable or [context.scene.collection]
 
 

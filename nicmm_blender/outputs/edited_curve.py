@@ -18,6 +18,8 @@ from . import curve_object, writing
 
 MAPS = ("obstacle_group", "alignment_group")
 
+DELETED = "The curve was deleted while it was being designed. Undo to bring it back"
+
 
 @dataclass(frozen=True)
 class Opened:
@@ -192,6 +194,8 @@ def write(context, edited: Opened, points, curves: list, settings):
     `settings` holds the output settings of a new object.
     """
     mesh_object, result = edited.mesh_object, edited.curve_object
+    if edited.curve_uid and result is None:
+        raise InputError(DELETED)
     if result is None:
         result = writing.as_object(mesh_object, edited.surface, curves, settings)
         drawn = writing.drawn_as(settings)
@@ -218,6 +222,16 @@ def surface_points_at(edited: Opened, positions: np.ndarray, name: str):
     surface = edited.surface
     mesh = designers.mesh_for(surface.core_positions, surface.faces)
     return locate_points(mesh, positions @ surface.local_to_core.T, name)
+
+
+def nearest_surface_points(edited: Opened, positions: np.ndarray):
+    """SurfacePoints of the core nearest to positions (k, 3) in the object's local space."""
+    from ...nicmm_core.geometry.surface_points import nearest_points
+    from ..scene import designers
+
+    surface = edited.surface
+    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    return nearest_points(mesh, positions @ surface.local_to_core.T)[0]
 
 
 def with_point(points, number: int, place, replaced: bool = False):

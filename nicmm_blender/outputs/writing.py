@@ -75,11 +75,16 @@ def as_object(mesh_object, surface, curves, settings):
 
 
 def redraw(drawn, surface, curves) -> None:
-    """Replace the curves in a curve object; its radius, materials and modifiers are kept."""
+    """Replace the curves in a curve object; its radius, materials and modifiers are kept.
+
+    A linked duplicate gets data of its own, since its record describes only its own curve.
+    """
+    if drawn.data.users - drawn.data.use_fake_user > 1:
+        drawn.data = drawn.data.copy()
     kind = curve_record.drawn_as(drawn)
     if kind is None:  # an object of an earlier version is in the space of its mesh
         kind = {"spline": EXACT, "offset": 0.0}
-    elif drawn.parent is not None and drawn.parent == curve_record.mesh_of(drawn):
+    elif curve_object.is_child(drawn):
         curve_object.parent_to_mesh(drawn, drawn.parent, surface)
     scale = curve_object.scale_of(drawn, surface)
     if drawn.type == "CURVES":

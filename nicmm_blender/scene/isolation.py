@@ -5,6 +5,9 @@ from contextlib import contextmanager
 
 import bpy
 
+SIMPLIFICATION = ("use_simplify", "simplify_subdivision")
+"""Settings of a scene that limit the subdivision levels in its viewports."""
+
 
 @contextmanager
 def evaluated_in_isolation(temporary):
@@ -18,6 +21,8 @@ def evaluated_in_isolation(temporary):
         scene.collection.objects.link(temporary)
         now = bpy.context.scene
         scene.frame_current, scene.frame_subframe = now.frame_current, now.frame_subframe
+        for name in SIMPLIFICATION:
+            setattr(scene.render, name, getattr(now.render, name))
         layer = scene.view_layers[0]
         layer.update()
         evaluated = temporary.evaluated_get(layer.depsgraph)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..operators import time_slices
+from ..operators import long_solves, time_slices
 from ..operators.long_solves import LONGEST_TIME_SLICE, PASSED_ON, with_error_reports
 from ..operators.viewports import redraw
 from ..scene import designers
@@ -47,9 +47,10 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if picking.is_ready(context, mesh_object, curve):
             return self._act(context)
         self._work, self._surface = None, None
-        self._slices = 0
+        self._slices, self._view = 0, context.region_data.perspective_matrix.copy()
         self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
         context.window_manager.modal_handler_add(self)
+        long_solves.note_running(self)
         self._show(context)
         return {"RUNNING_MODAL"}
 
@@ -88,6 +89,9 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         elif self._work.run_slice(LONGEST_TIME_SLICE):
             self._work.result()
             self._tidy(context)
+            if context.region_data.perspective_matrix != self._view:
+                self.report({"INFO"}, "The view has changed since the click. Click again")
+                return {"CANCELLED"}
             return self._act(context)
         self._show(context)
         return PASS
@@ -101,6 +105,7 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
+            long_solves.note_ended(self)
             context.workspace.status_text_set(None)
 
     def _act(self, context):

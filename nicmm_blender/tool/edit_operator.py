@@ -11,7 +11,7 @@ from ..operators import polls
 from ..operators.long_solves import answer_all, pointer_progress, with_error_reports
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
-from ..scene import curve_record, mesh_data
+from ..scene import curve_record
 from ..scene.messages import InputError
 from . import modes
 
@@ -69,14 +69,16 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        has_mesh = mesh_data.mesh_object(context) is not None
+        has_mesh = curve_record.mesh_of_context(context) is not None
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL_OR_EDIT)
 
     def draw(self, context):
+        if not len(self.points):  # the tool was chosen
+            return
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        mesh_object = mesh_data.mesh_object(context)
+        mesh_object = curve_record.mesh_of_context(context)
         for name in ("closed", "smoothness", "use_modifiers"):
             layout.prop(self, name)
         for name in edited_curve.MAPS:
@@ -102,9 +104,11 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         if context.mode not in modes.TOOLS:
             raise InputError(modes.WRONG_MODE)
         if edited is not None:
+            curve_record.mesh_in_view_layer(context, edited)
             modes.make_active(context, edited)
         bpy.ops.wm.tool_set_by_id(name=modes.TOOLS[context.mode])
-        return {"FINISHED"}
+        # Without a curve nothing has changed that could be undone.
+        return {"CANCELLED"} if edited is None else {"FINISHED"}
 
     def execute(self, context):
         return with_error_reports(self, lambda: self._execute(context))

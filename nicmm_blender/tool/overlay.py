@@ -88,6 +88,8 @@ def hovered():
 
 def _drawn_now(context) -> _Drawn | None:
     """What to draw; None if the tool is not active or the mesh would have to be read first."""
+    from ...nicmm_core import NicmmError
+
     if _state.dragged is not None:
         return _state.dragged
     if not modes.is_tool_active(context) or not context.space_data.overlay.show_overlays:
@@ -99,7 +101,7 @@ def _drawn_now(context) -> _Drawn | None:
         if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
             return None
         opened = picking.opened_now(context)
-    except InputError:
+    except (InputError, NicmmError):
         return None  # a click reports the error
     points, line = opened.positions(), opened.polyline()
     return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))

@@ -183,7 +183,9 @@ def _read(context) -> _VisibleCurves:
     mesh_object, curve = mesh_and_curve(context)
     uid = 0 if curve is None else curve.session_uid
     panel = context.scene.nicmm_curves.use_modifiers
-    key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode
+    # Another viewport may be in local view and show other curves.
+    view = 0 if context.space_data is None else context.space_data.as_pointer()
+    key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode, view
     if key != _visible_curves.key:
         _visible_curves.opened = edited_curve.open_curve(context, curve)
         _visible_curves.lines = _other_lines(

@@ -171,7 +171,7 @@ class PointDrag:
 
     def _commit(self, context, requests: list, design):
         if design is not None:
-            return self.finish(context, requests, [design])
+            return self.end(context, requests, [design])
         # The points stay visible during a long computation.
         overlay.show_dragged(self._opened, self._points, self._opened.curve)
         result = set()

@@ -77,9 +77,10 @@ class _ChangesPoints(LongSolves):
         """The position of the new or moved point on the surface, as a point of the core."""
         if self.dragged is not None:
             return self.dragged
-        return edited_curve.surface_points_at(
-            opened, np.array([self.position[:]], dtype=float), "position"
-        )
+        given = np.array([self.position[:]], dtype=float)
+        if self.from_mouse:  # the redo panel after a click, where any position can be entered
+            return edited_curve.nearest_surface_points(opened, given)
+        return edited_curve.surface_points_at(opened, given, "position")
 
 
 class _Output:

@@ -244,6 +244,7 @@ OPERATORS = pytest.mark.parametrize("operator", [design, convert])
 
 @OPERATORS
 def test_window_begins_with_a_tube_where_few_points_are_drawn(monkey, window, all_points, operator):
+    bpy.context.scene.nicmm_curves.tube = not all_points  # its default when Blender starts
     assert operator() == {"FINISHED"}
     assert (shown_mesh(bpy.context.active_object) is None) == all_points
 
