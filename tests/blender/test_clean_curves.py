@@ -172,6 +172,17 @@ def test_offset_lifts_the_curve_off_the_skin(monkey, output, spline):
     assert outside > np.linalg.norm(base - centre, axis=1).mean()
 
 
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (-1, 2, 1), (1, -1, -1.5)])
+def test_offset_is_outwards_also_on_mirrored_objects(empty_scene, scale):
+    sphere = scenes.sphere()
+    sphere.scale = scale
+    bpy.context.view_layer.update()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve(offset=0.05)
+    lengths = np.linalg.norm(in_world(bpy.context.active_object) / np.abs(scale), axis=1)
+    assert lengths.min() > 1.01
+
+
 def test_radii_tilts_and_materials_survive_an_update(monkey):
     curve = draw(monkey, closed=False)
     curve.data.materials.append(bpy.data.materials.new("Red"))

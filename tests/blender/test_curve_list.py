@@ -243,6 +243,18 @@ def test_live_update_follows_the_mesh(live, sphere, output):
     assert_same_curve(places(curve), places(expected))
 
 
+def test_live_update_follows_the_scale_of_the_object(live, sphere):
+    curve = draw(sphere)
+    run_timer(live)
+    sphere.scale = (1.0, 1.0, 3.0)
+    assert run_timer(live) > 0
+    assert_same_curve(places(curve), places(draw(sphere)))
+    sphere.location.x = 2.0
+    before = places(curve)
+    run_timer(live)
+    np.testing.assert_array_equal(places(curve), before)
+
+
 @pytest.mark.slow
 def test_live_update_follows_weights_and_edit_mode(live, sphere):
     walls = sphere.vertex_groups.new(name="Walls")

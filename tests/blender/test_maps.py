@@ -116,12 +116,42 @@ def test_painting_is_switched_on_and_off(cube, role, field):
         bpy.ops.nicmm.paint_map(role=role)
 
 
-def test_maps_work_with_a_curve_active(empty_scene):
+@pytest.mark.parametrize("show", [True, False])
+def test_a_map_is_for_the_active_curve(empty_scene, show):
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     bpy.ops.nicmm.design_curve()
-    bpy.ops.nicmm.new_map(role="OBSTACLES", source="PAINT")
-    assert bpy.context.active_object == sphere and bpy.context.mode == "PAINT_WEIGHT"
+    curve = bpy.context.active_object
+    bpy.ops.nicmm.new_map(role="OBSTACLES", source="PAINT", show=show)
+    assert bpy.context.active_object == sphere
+    assert bpy.context.mode == ("PAINT_WEIGHT" if show else "OBJECT")
+    assert curve.nicmm_settings.obstacle_group == "Obstacles"
+    assert bpy.context.scene.nicmm_curves.obstacle_group == ""
+
+
+def test_a_map_that_the_curve_cannot_use_is_reported(empty_scene, capfd):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve()
+    curve = bpy.context.active_object
+    around = np.abs(scenes.positions(sphere)[:, 2]) < 0.5
+    scenes.select(sphere, np.flatnonzero(around).tolist())
+    scenes.activate(curve)
+    bpy.ops.nicmm.new_map(role="OBSTACLES", source="SELECTION", show=False)
+    assert curve.nicmm_settings.obstacle_group == ""
+    assert f'"{curve.name}" does not use it' in capfd.readouterr().out
+
+
+def test_a_map_of_a_curve_without_a_parent_is_on_its_mesh(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve()
+    other = scenes.sphere()
+    curve = scenes.curves()[0]
+    curve.parent = other
+    scenes.activate(curve)
+    assert bpy.ops.nicmm.new_map(role="ALIGNMENT", source="PAINT") == {"FINISHED"}
+    assert "Alignment" in sphere.vertex_groups and not other.vertex_groups
 
 
 def test_map_of_a_linked_mesh_is_refused(empty_scene, tmp_path):

@@ -3,6 +3,7 @@
 import re
 import sys
 from importlib import import_module
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -431,3 +432,43 @@ def test_selections_on_other_meshes_are_mentioned(empty_scene, capfd):
     assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
     assert 'The selection on "Other" is not used' in capfd.readouterr().out
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_alternatives_have_no_effect_with_other_methods(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    settings = {"method": "VARIATIONAL", "alternatives": 2}
+    assert bpy.ops.nicmm.design_curve(**settings) == {"FINISHED"}
+    assert len(scenes.curves()) == 1
+
+
+def test_a_call_from_a_menu_takes_the_settings_of_the_sidebar(empty_scene):
+    """In the window, menus pass no settings; the last ones must not count."""
+    settings = import_module(f"{empty_scene.name}.nicmm_blender.settings")
+    panel = bpy.context.scene.nicmm_curves
+    panel.smoothness, panel.closed = 3.0, False
+    given = {"closed"}
+    operator = SimpleNamespace(
+        properties=SimpleNamespace(is_property_set=lambda name: name in given),
+        smoothness=1.0,
+        closed=True,
+    )
+    settings.take_from_sidebar(operator, panel)
+    assert operator.smoothness == 3.0 and operator.closed
+    assert operator.output == panel.output
+
+
+def test_the_option_to_replace_settings_is_not_remembered(extension):
+    assert bpy.ops.nicmm.update_curves.get_rna_type().properties["use_panel"].is_skip_save
+
+
+def test_the_redo_panel_stays_after_a_conversion_of_the_mesh(empty_scene):
+    """Blender shows it only while the operator could run again."""
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve()
+    assert bpy.ops.nicmm.convert_curve(output="EDGES") == {"FINISHED"}
+    assert bpy.context.active_object == sphere
+    assert bpy.ops.nicmm.convert_curve.poll()
+    with pytest.raises(RuntimeError, match="Make a designed curve active"):
+        bpy.ops.nicmm.convert_curve(output="EDGES")

@@ -261,6 +261,14 @@ def test_an_impossible_setting_is_explained(empty_scene, curve, sphere):
     assert 'obstacles: the vertex group "Wall"' in problem_of(curve)
     curve.nicmm_settings.smoothness = 2.0
     assert problem_of(curve) == ""
+    curve.nicmm_settings.obstacle_group = "Wall"
+    assert problem_of(curve)
+    call("move_point", index=0, position=sphere.closest_point_on_mesh((1.0, 0.3, 0.2))[1])
+    curve = the_curve()
+    assert problem_of(curve)  # nothing has changed that could make it possible
+    sphere.data.vertices[0].co.x += 0.01
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert problem_of(the_curve()) == ""
 
 
 def test_settings_of_what_is_no_curve(sphere):
@@ -413,3 +421,43 @@ def test_a_preview_leaves_no_trace(empty_scene, sphere, places, output):
     assert len(bpy.data.curves) + len(bpy.data.hair_curves) == count
     preview.restore()
     assert content() == before
+
+
+def test_any_position_can_be_entered_after_a_click(empty_scene, curve, sphere):
+    """The redo panel runs the operator again; scripts must give positions on the surface."""
+    assert "off the surface" in refusal("move_point", index=0, position=(2.0, 0.5, 0.5))
+    call("move_point", index=0, position=(2.0, 0.5, 0.5), from_mouse=True)
+    expected = sphere.closest_point_on_mesh((2.0, 0.5, 0.5))[1]
+    np.testing.assert_allclose(controls(the_curve())[0], expected, atol=ROUNDING)
+
+
+def test_a_curve_deleted_meanwhile_is_not_made_again(empty_scene, curve):
+    edited_curve = module(empty_scene, "outputs.edited_curve")
+    opened = edited_curve.open_curve(bpy.context, curve)
+    (request,) = edited_curve.request(opened, opened.points)
+    (answer,) = module(empty_scene, "operators.long_solves").answer_all([request], always)
+    bpy.data.objects.remove(curve)
+    with pytest.raises(module(empty_scene, "scene.messages").InputError, match="was deleted"):
+        edited_curve.write(bpy.context, opened, opened.points, answer.curves, None)
+    assert not scenes.curves()
+
+
+def always(_fraction, _polyline):
+    return True
+
+
+def test_operators_keep_nothing_when_they_have_finished(empty_scene, curve):
+    """Blender keeps finished operators, and their meshes would stay in memory."""
+    long_solves = module(empty_scene, "operators.long_solves")
+
+    class Operator(long_solves.LongSolves):
+        def requests(self, _context):
+            self.kept = curve
+            return []
+
+        def finish(self, _context, _requests, _answers):
+            return {"FINISHED"}
+
+    operator = Operator()
+    assert operator.execute(bpy.context) == {"FINISHED"}
+    assert not vars(operator)

@@ -10,6 +10,7 @@ import bmesh
 from mathutils import Matrix
 
 from tests.blender import scenes
+from tests.blender.test_shown_surface import in_world
 
 OUTPUTS = ("CURVE", "STICKY", "EDGES", "REGION", "PARTS")
 
@@ -182,6 +183,74 @@ def test_override_of_another_file(empty_scene, tmp_path):
     bpy.context.view_layer.objects.active = made
     assert bpy.ops.nicmm.design_curve(spline="EXACT", point_group="Cut") == {"FINISHED"}
     assert_on_surface(empty_scene.core, scenes.curves()[0], made)
+
+
+def test_override_of_a_collection_of_another_file(empty_scene, tmp_path):
+    """Objects cannot be added to the override of a collection."""
+    sphere = scenes.sphere()
+    sphere.vertex_groups.new(name="Cut").add(scenes.ring(sphere, 4), 1.0, "REPLACE")
+    collection = bpy.data.collections.new("Character")
+    collection.objects.link(sphere)
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {collection})
+    bpy.data.objects.remove(sphere)
+    bpy.data.collections.remove(collection)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    layer = bpy.context.view_layer
+    made = wanted.collections[0].override_hierarchy_create(bpy.context.scene, layer)
+    (overridden,) = made.objects
+    assert overridden.users_collection[0].override_library is not None
+    layer.objects.active = overridden
+    assert bpy.ops.nicmm.design_curve(spline="EXACT", point_group="Cut") == {"FINISHED"}
+    (curve,) = scenes.curves()
+    assert list(curve.users_collection) == [bpy.context.scene.collection]
+    assert_on_surface(empty_scene.core, curve, overridden)
+
+
+def test_a_linked_duplicate_is_edited_alone(empty_scene):
+    sphere = scenes.sphere(4)
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve(spline="EXACT")
+    first = bpy.context.active_object
+    before = scenes.points(first)
+    bpy.ops.object.duplicate(linked=True)
+    twin = bpy.context.active_object
+    assert twin.data == first.data
+    bpy.ops.nicmm.move_point(index=0, position=sphere.closest_point_on_mesh((1, 0.3, 0.3))[1])
+    assert twin.data != first.data
+    np.testing.assert_array_equal(scenes.points(first), before)
+    assert len(scenes.points(twin)) != len(before) or not (scenes.points(twin) == before).all()
+
+
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5)], ids=["even", "uneven"])
+@pytest.mark.parametrize("parent", ["none", "empty", "mesh again"])
+def test_curves_with_another_parent_stay_on_the_surface(empty_scene, scale, parent):
+    sphere = scenes.sphere()
+    sphere.location, sphere.rotation_euler, sphere.scale = (1, 2, 3), (0.3, 0.4, 0.5), scale
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.context.view_layer.update()
+    bpy.ops.nicmm.design_curve(spline="EXACT", radius=0.25)
+    curve = bpy.context.active_object
+    expected = in_world(curve)
+    bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
+    bpy.context.view_layer.update()
+    if parent != "none":
+        target = sphere
+        if parent == "empty":
+            target = bpy.data.objects.new("Empty", None)
+            bpy.context.scene.collection.objects.link(target)
+            target.location, target.rotation_euler = (-4, 5, 6), (1.0, 0.2, 0.1)
+            bpy.context.view_layer.update()
+        target.select_set(True)
+        bpy.context.view_layer.objects.active = target
+        assert bpy.ops.object.parent_set(type="OBJECT") == {"FINISHED"}
+    scenes.activate(curve)
+    np.testing.assert_allclose(in_world(curve), expected, atol=1e-4)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    # An update may lower the energy a little further.
+    np.testing.assert_allclose(in_world(curve), expected, atol=1e-3)
+    assert curve.nicmm_settings.radius == pytest.approx(0.25, rel=1e-4)
 
 
 def test_modifiers_that_change_the_mesh(empty_scene):

@@ -308,6 +308,20 @@ def test_points_survive_a_change_of_level(monkey, levels):
     assert curve_deviation(curve, monkey) < 1e-4
 
 
+def test_simplified_scenes_show_fewer_levels(monkey, empty_scene):
+    """The levels of modifiers may be limited in the scene; points keep their vertices."""
+    monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    render = bpy.context.scene.render
+    render.use_simplify, render.simplify_subdivision = True, 1
+    surface = module(empty_scene, "scene.surface").read(monkey, use_modifiers=True)
+    assert len(surface.faces) == len(shown(monkey)[1])
+    assert (surface.cage.vertices[list(CHOSEN)] >= 0).all()
+    curve = draw(monkey)
+    vertices, _ = shown(monkey)
+    chosen = vertices[surface.cage.vertices[list(CHOSEN)]]
+    assert scenes.distances_to(chosen, in_world(curve)).max() < 1e-6
+
+
 @pytest.mark.slow
 def test_points_stay_in_their_half_of_a_mirror(monkey):
     mirror(monkey)
