@@ -110,8 +110,11 @@ def opened_now(context) -> Opened:
 
 
 def other_lines(context) -> list:
-    """The other designed curves on the mesh, each a `Line`."""
-    return _read(context).lines
+    """The other designed curves on the mesh that the viewport shows, each a `Line`."""
+    # Blender does not report that an object was hidden.
+    return [
+        line for line in _read(context).lines if _is_shown(context, bpy.data.objects.get(line.name))
+    ]
 
 
 def pixel_of(event) -> np.ndarray:
@@ -139,17 +142,16 @@ def under_mouse(context, pixel) -> Hit | None:
     mesh_object, curve = mesh_and_curve(context)
     if mesh_object is None:
         return None
-    found = _read(context)
-    opened, name = found.opened, "" if curve is None else curve.name
+    opened, name = opened_now(context), "" if curve is None else curve.name
     view = view_on(context, mesh_object, opened.surface)
-    hit = _hit(context, view, pixel, found, name, curve)
+    hit = _hit(context, view, pixel, opened, name, curve)
     if hit is None or _is_behind_another(context, mesh_object, view, pixel, hit.position):
         return None
     return hit
 
 
-def _hit(context, view: View, pixel, found: _VisibleCurves, name: str, curve) -> Hit | None:
-    opened, scale = found.opened, context.preferences.system.ui_scale
+def _hit(context, view: View, pixel, opened: Opened, name: str, curve) -> Hit | None:
+    scale = context.preferences.system.ui_scale
     positions = opened.positions()
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
     if number is not None:
@@ -159,7 +161,7 @@ def _hit(context, view: View, pixel, found: _VisibleCurves, name: str, curve) ->
     on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
     if on_line is not None:
         return _on_line(opened, view.mesh, name, *on_line)
-    for line in found.lines:
+    for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
             return Hit(Kind.CURVE, line.name, 0, tuple(line.positions[on_line[0]]))
@@ -234,7 +236,9 @@ def radius_of(curve, surface) -> float:
 def _is_shown(context, candidate) -> bool:
     """Whether an object is visible in this viewport, also in its local view."""
     space = context.space_data
-    if not is_in(context.view_layer, candidate) or not candidate.visible_get():
+    if candidate is None or not is_in(context.view_layer, candidate):
+        return False
+    if not candidate.visible_get():
         return False
     if space is None or space.type != "VIEW_3D":
         return True

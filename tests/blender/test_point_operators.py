@@ -461,3 +461,13 @@ def test_operators_keep_nothing_when_they_have_finished(empty_scene, curve):
     operator = Operator()
     assert operator.execute(bpy.context) == {"FINISHED"}
     assert not vars(operator)
+
+
+def test_hidden_curves_cannot_be_clicked(empty_scene, curve, sphere):
+    picking = module(empty_scene, "tool.picking")
+    assert bpy.ops.nicmm.end_curve() == {"FINISHED"}
+    assert [line.name for line in picking.other_lines(bpy.context)] == [curve.name]
+    curve.hide_set(True)
+    assert picking.other_lines(bpy.context) == []
+    curve.hide_set(False)
+    assert [line.name for line in picking.other_lines(bpy.context)] == [curve.name]

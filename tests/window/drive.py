@@ -290,7 +290,8 @@ def draw(blender: Blender) -> None:
     blender.shot("4-inserted")
     inserted = blender.do("value = helper.pixels(helper.places())")
     nearest = min(range(6), key=lambda each: math.dist(inserted[each], on_curve))
-    check(math.dist(inserted[nearest], on_curve) < 4.0, "the point is where the click was")
+    away = math.dist(inserted[nearest], on_curve)
+    check(away < 4.0, f"the point is where the click was, {away:.1f} pixels away")
     blender.click(inserted[nearest], "ctrl")
     count_points(blender, 5)
 
