@@ -31,6 +31,7 @@ def wavy_ring(mesh, axis, waves=5, height=0.2, points=300, controls=4):
     return NearestPoints(mesh).curve(ring, np.arange(controls) * points // controls)
 
 
+@pytest.mark.slow
 def test_points_on_a_great_circle_give_the_great_circle(ball):
     axis = np.array([1.0, 2.0, 2.0]) / 3.0
     start = wavy_ring(ball, axis)
@@ -43,6 +44,7 @@ def test_points_on_a_great_circle_give_the_great_circle(ball):
     assert result.curve.length == pytest.approx(2 * np.pi, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_points_on_a_circle_of_the_plane_give_a_circle():
     disc = shapes.disc(24)
     angle = np.arange(240) * 2 * np.pi / 240
@@ -55,6 +57,7 @@ def test_points_on_a_circle_of_the_plane_give_a_circle():
     assert np.linalg.norm(result.curve.points, axis=1) == pytest.approx(0.6, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_energy_falls_and_control_points_stay(ball):
     start = wavy_ring(ball, np.array([0.6, 0.8, 0.0]), waves=7)
     result = elastic_curve(ball, start, nodes=100)
@@ -78,6 +81,7 @@ def wavy_arc(mesh, place, controls, waves=6, height=0.1, points=241):
     return NearestPoints(mesh).curve(place(along, height * swing), index, closed=False)
 
 
+@pytest.mark.slow
 def test_open_curve_on_a_great_circle_is_its_arc(ball):
     def place(along, aside):
         angle = 2.5 * along
@@ -94,6 +98,7 @@ def test_open_curve_on_a_great_circle_is_its_arc(ball):
     assert result.curve.length == pytest.approx(2.5, rel=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controls, share", [(5, 0.1), (9, 0.05)])
 def test_open_curve_through_points_on_an_arc_of_the_plane(controls, share):
     """The result is nearly the arc but slightly fairer, since it may straighten near its ends."""
@@ -111,6 +116,7 @@ def test_open_curve_through_points_on_an_arc_of_the_plane(controls, share):
     assert curvature[54:74] == pytest.approx(1.0 / 0.6, rel=1.5 * share)
 
 
+@pytest.mark.slow
 def test_energy_of_an_open_curve_falls_and_control_points_stay(ball):
     def place(along, aside):
         ring = np.stack([np.cos(4.0 * along), np.sin(4.0 * along), 0.4 + aside], axis=1)

@@ -53,6 +53,7 @@ def test_a_statement_asks_for_new_measurements_where_it_is_run_only():
     assert found == set(MEASUREMENTS) - without
 
 
+@pytest.mark.slow
 def test_a_comment_asks_for_nothing():
     read = changed(RELAXATION, "\n# More.\n")
     assert evidence.code_behind("courses", read) == evidence.code_behind("courses")
@@ -103,6 +104,7 @@ def fake(monkeypatch, begun, fails=(), interrupted=()):
     monkeypatch.setattr(command, "run_apart", run_apart)
 
 
+@pytest.mark.slow
 def test_stale_says_what_changed(kept, monkeypatch, capsys):
     assert command.list_stale() == 1
     assert capsys.readouterr().out == "messes: never measured\nfuzz: never measured\n"
@@ -114,6 +116,7 @@ def test_stale_says_what_changed(kept, monkeypatch, capsys):
     assert evidence.what_changed("messes", read) == ["nicmm_core/relaxation/relaxing.py"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_where_it_was(kept, monkeypatch):
     begun = []
     fake(monkeypatch, begun, interrupted=("fuzz",))
@@ -135,12 +138,14 @@ def test_a_failure_stops_nothing_else(kept, monkeypatch):
     assert evidence.is_kept("fuzz") and not evidence.is_kept("messes")
 
 
+@pytest.mark.slow
 def test_a_run_apart_keeps_its_output(monkeypatch, tmp_path):
     monkeypatch.setattr(command, "_log_of", lambda name: tmp_path / "log.txt")
     assert not command.run_apart("nothing", Scale.SMOKE)
     assert "invalid choice: 'nothing'" in (tmp_path / "log.txt").read_text()
 
 
+@pytest.mark.slow
 def test_nothing_is_begun_that_would_end_after_the_hours_given(kept, monkeypatch):
     begun = []
     fake(monkeypatch, begun)

@@ -41,6 +41,7 @@ def repeated(scale=Scale.FULL):
     return list(progress.resumed(NAME, scale, range(10), squares(asked))), asked
 
 
+@pytest.mark.slow
 def test_a_second_run_measures_only_the_rest():
     interrupted(4)
     interrupted(7)
@@ -49,6 +50,7 @@ def test_a_second_run_measures_only_the_rest():
     assert asked == [7, 8, 9]
 
 
+@pytest.mark.slow
 def test_the_durations_add_up():
     assert progress.seconds_before(NAME, Scale.FULL) == 0.0
     interrupted(4)
@@ -57,6 +59,7 @@ def test_the_durations_add_up():
     assert progress.seconds_before(NAME, Scale.FULL) > first > 0.0
 
 
+@pytest.mark.slow
 def test_an_incomplete_record_is_measured_again(folder):
     interrupted(4)
     (file,) = folder.iterdir()
@@ -70,6 +73,7 @@ def test_results_of_other_code_are_not_used(monkeypatch):
     assert repeated()[1] == list(range(10))
 
 
+@pytest.mark.slow
 def test_results_of_a_saved_measurement_are_not_used():
     interrupted(4)
     progress.forget(NAME, Scale.FULL)

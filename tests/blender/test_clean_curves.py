@@ -92,6 +92,7 @@ def test_clean_splines_are_near_the_exact_one(monkey, spline, scale):
     assert len(knots) < len(exact)
 
 
+@pytest.mark.slow
 def test_even_points_are_on_the_surface_and_evenly_spaced(monkey):
     curve = draw(monkey)
     assert curve_deviation(curve, monkey) < SINGLE
@@ -212,6 +213,7 @@ def test_an_update_keeps_spline_and_offset(monkey, spline):
     assert curve.data.splines[0].type == ("BEZIER" if spline == "BEZIER" else "POLY")
 
 
+@pytest.mark.slow
 def test_a_converted_curve_is_cut_exactly(empty_scene):
     """The record contains the exact curve, whatever spline is shown."""
     monkey = scenes.monkey()

@@ -243,6 +243,7 @@ def test_live_update_follows_the_mesh(live, sphere, output):
     assert_same_curve(places(curve), places(expected))
 
 
+@pytest.mark.slow
 def test_live_update_follows_the_scale_of_the_object(live, sphere):
     curve = draw(sphere)
     run_timer(live)

@@ -52,6 +52,7 @@ def all_courses(curve):
         assert len(lines) < 10
 
 
+@pytest.mark.slow
 def test_every_course_passes_the_points_and_differs_from_the_others(torus, curve):
     before, name, material = controls(curve), curve.name, bpy.data.materials.new("Ink")
     curve.data.materials.append(material)
@@ -67,6 +68,7 @@ def test_every_course_passes_the_points_and_differs_from_the_others(torus, curve
         assert min(np.linalg.norm(one - point, axis=1).min() for one in lines) < 1e-6
 
 
+@pytest.mark.slow
 def test_the_number_selects_a_course_and_the_first_is_the_fairest(torus, curve):
     fairest = line(curve)
     call("next_course", course=2)
@@ -78,12 +80,14 @@ def test_the_number_selects_a_course_and_the_first_is_the_fairest(torus, curve):
     assert away(line(curve), second) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_number_beyond_the_last_course_selects_the_last(torus, curve):
     lines = all_courses(curve)
     call("next_course", course=5)
     assert any(away(line(curve), one) < 1e-6 for one in lines)
 
 
+@pytest.mark.slow
 def test_updates_and_moves_keep_the_chosen_course(torus, curve):
     call("next_course", course=2)
     chosen = line(curve)
@@ -94,6 +98,7 @@ def test_updates_and_moves_keep_the_chosen_course(torus, curve):
     assert away(line(curve), chosen) < 5 * APART * diagonal(torus)
 
 
+@pytest.mark.slow
 def test_it_is_one_undo_step(curve):
     before = content()
     call("next_course")
@@ -105,6 +110,7 @@ def test_it_is_one_undo_step(curve):
     assert content() == after
 
 
+@pytest.mark.slow
 def test_without_another_course_nothing_changes(empty_scene):
     bpy.ops.mesh.primitive_plane_add()
     bpy.context.scene.nicmm_curves.closed = False

@@ -336,6 +336,7 @@ def test_separate_parts_are_reported(empty_scene):
     assert f"P{first} and p{other} lie on different components" in report
 
 
+@pytest.mark.slow
 def test_an_order_that_works_is_counted_from_one_like_the_points(empty_scene):
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8)
     grid = bpy.context.active_object

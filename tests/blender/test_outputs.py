@@ -97,6 +97,7 @@ def test_edges_follow_the_curve(monkey, mode, cut_faces, simplify):
     assert sizes.max() == 4 or cut_faces == "POLYGONS"
 
 
+@pytest.mark.slow
 def test_seam_and_sharp_are_chosen(monkey):
     design("OBJECT", output="EDGES", mark_seam=False, mark_sharp=True)
     assert len(seams(monkey)) == 0
@@ -265,6 +266,7 @@ def test_region_that_is_cut_ends_at_the_curve(monkey, mode):
     )
 
 
+@pytest.mark.slow
 @MODES
 @pytest.mark.parametrize("region_cut", [False, True])
 def test_region_is_a_vertex_group(monkey, mode, region_cut):
@@ -293,6 +295,7 @@ def test_region_is_a_face_set(monkey, mode):
     np.testing.assert_array_equal(sets, np.where(expected, 2, 1))
 
 
+@pytest.mark.slow
 @MODES
 def test_parts_stay_in_the_mesh(monkey, mode):
     before = components(monkey)
@@ -303,6 +306,7 @@ def test_parts_stay_in_the_mesh(monkey, mode):
     assert area(monkey) == pytest.approx(whole, rel=1e-5)
 
 
+@pytest.mark.slow
 @MODES
 def test_parts_become_objects(monkey, mode):
     before, whole = components(monkey), area(monkey)
@@ -416,6 +420,7 @@ def summary():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", CONVERSIONS, ids=lambda settings: settings["output"])
 def test_converting_after_saving_and_reopening(monkey, settings, tmp_path):
     drawn(monkey)
@@ -441,6 +446,7 @@ def test_curve_follows_the_mesh_that_was_moved_before_converting(monkey):
     np.testing.assert_allclose(after, before * [1.0, 2.0, 0.5], atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_original_may_stay(monkey):
     curve = drawn(monkey)
     bpy.ops.nicmm.convert_curve(output="STICKY", keep_original=True)
@@ -459,6 +465,7 @@ def test_mesh_outputs_make_the_mesh_active(monkey):
     assert bpy.context.selected_objects == [monkey]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [*CONVERSIONS, {"output": "PARTS", "parts_as": "OBJECTS"}],
@@ -480,6 +487,7 @@ def test_one_undo_takes_everything_back(monkey, settings, mode):
         np.testing.assert_array_equal(after[kind], values)
 
 
+@pytest.mark.slow
 def test_undo_of_converting_brings_the_curve_back(monkey):
     drawn(monkey)
     bpy.ops.ed.undo_push(message="Drawn")
@@ -514,6 +522,7 @@ def refused(operator, **settings):
 CHANGING = ({"output": "EDGES"}, {"output": "REGION"}, {"output": "PARTS"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", CHANGING, ids=lambda settings: settings["output"])
 def test_shared_mesh_is_not_changed(monkey, settings):
     other = monkey.copy()
@@ -523,6 +532,7 @@ def test_shared_mesh_is_not_changed(monkey, settings):
     assert bpy.ops.nicmm.design_curve(output="STICKY") == {"FINISHED"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", CHANGING, ids=lambda settings: settings["output"])
 def test_linked_mesh_is_not_changed(monkey, settings, tmp_path):
     library = str(tmp_path / "library.blend")
@@ -540,12 +550,14 @@ def test_linked_mesh_is_not_changed(monkey, settings, tmp_path):
     assert bpy.ops.nicmm.design_curve(output="CURVE") == {"FINISHED"}
 
 
+@pytest.mark.slow
 def test_multiresolution_is_not_cut(monkey):
     monkey.modifiers.new("Multires", "MULTIRES")
     assert "Multiresolution modifier" in refused(bpy.ops.nicmm.design_curve, output="EDGES")
     assert bpy.ops.nicmm.design_curve(output="REGION") == {"FINISHED"}
 
 
+@pytest.mark.slow
 def test_changed_mesh_is_reported(monkey):
     drawn(monkey)
     bpy.ops.nicmm.convert_curve(output="EDGES", keep_original=True)
@@ -554,6 +566,7 @@ def test_changed_mesh_is_reported(monkey):
     assert "mesh has changed" in report and "draw the curve again" in report
 
 
+@pytest.mark.slow
 def test_missing_mesh_is_reported(monkey):
     curve = drawn(monkey)
     bpy.data.objects.remove(monkey)

@@ -75,6 +75,7 @@ def curve(places):
     return bpy.context.active_object
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("mode", ["OBJECT", "SCULPT", "WEIGHT_PAINT"])
 def test_each_point_is_one_undo_step(sphere, places, mode, output):
@@ -110,6 +111,7 @@ def test_a_curve_grows_with_its_points(empty_scene, sphere, places):
     np.testing.assert_allclose(controls(made), places[:4], atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_insert_move_and_remove(curve, places, sphere):
     between = list(sphere.closest_point_on_mesh(np.mean(places[:2], axis=0))[1])
     call("insert_point", index=1, position=between)
@@ -176,6 +178,7 @@ def test_errors_change_nothing(curve, places, sphere):
     )
 
 
+@pytest.mark.slow
 def test_points_on_another_part_are_refused(empty_scene, sphere, places):
     bpy.ops.mesh.primitive_ico_sphere_add(location=(4, 0, 0), subdivisions=2)
     bpy.ops.object.select_all(action="SELECT")
@@ -207,6 +210,7 @@ def test_drafts_are_explained(sphere, places):
     assert draft.data.splines[0].use_cyclic_u
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 def test_settings_take_effect_at_once(sphere, places, output):
     bpy.context.scene.nicmm_curves.output = output
@@ -235,6 +239,7 @@ def test_settings_take_effect_at_once(sphere, places, output):
     np.testing.assert_allclose(controls(curve), places, atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_the_radius_of_a_draft_is_kept(sphere, places):
     bpy.context.scene.nicmm_curves.output = "STICKY"
     bpy.context.scene.nicmm_curves.radius = 0.125
@@ -402,6 +407,7 @@ def test_a_problem_keeps_the_last_curve(empty_scene, curve, places):
     assert not live.problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 def test_a_preview_leaves_no_trace(empty_scene, sphere, places, output):
     bpy.context.scene.nicmm_curves.output = output

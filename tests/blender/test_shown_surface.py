@@ -189,6 +189,7 @@ WAYS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
 @pytest.mark.parametrize("change", WAYS, ids=lambda way: way.__name__)
 def test_curves_lie_on_the_shown_surface(monkey, change, output):
@@ -223,6 +224,7 @@ def test_even_curves_are_near_the_shown_surface_and_evenly_spaced(monkey, change
         assert leg.min() >= 0.5 * leg.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [subdivision, armature_and_subdivision, mirror])
 def test_points_are_the_selected_vertices_where_they_are_shown(monkey, change):
     change(monkey)
@@ -275,6 +277,7 @@ def test_weights_agree_with_those_of_single_vertices(monkey, empty_scene, mode):
     assert found.max() > 0.4
 
 
+@pytest.mark.slow
 def test_a_wall_keeps_the_curve_away_on_the_shown_surface(monkey):
     group = monkey.vertex_groups.new(name="Wall")
     monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
@@ -308,6 +311,7 @@ def test_points_survive_a_change_of_level(monkey, levels):
     assert curve_deviation(curve, monkey) < 1e-4
 
 
+@pytest.mark.slow
 def test_simplified_scenes_show_fewer_levels(monkey, empty_scene):
     """The levels of modifiers may be limited in the scene; points keep their vertices."""
     monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
@@ -341,6 +345,7 @@ def test_points_stay_in_their_half_of_a_mirror(monkey):
     assert scenes.distances_to(ends, expected).max() < 0.05
 
 
+@pytest.mark.slow
 def test_a_curve_on_the_cage_moves_to_the_shown_surface(monkey):
     curve = draw(monkey, use_modifiers=False)
     subdivision(monkey)
@@ -360,6 +365,7 @@ def test_the_pose_is_followed(monkey):
         assert curve_deviation(curve, monkey) < EXACT
 
 
+@pytest.mark.slow
 def test_sticky_curves_follow_an_animated_pose(monkey):
     armature_and_subdivision(monkey)
     curve = draw(monkey, output="STICKY")
@@ -368,6 +374,7 @@ def test_sticky_curves_follow_an_animated_pose(monkey):
         assert curve_deviation(curve, monkey) < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 2, 3])
 def test_sticky_curves_follow_another_level(monkey, level):
     """A render may use more levels than the viewport."""
@@ -399,6 +406,7 @@ def test_cuts_are_exact_where_modifiers_only_deform(monkey, change):
     assert len(chain) > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["EDGES", "REGION", "PARTS"])
 def test_cuts_are_refused_where_modifiers_generate_faces(monkey, output):
     subdivision(monkey)
@@ -409,6 +417,7 @@ def test_cuts_are_refused_where_modifiers_generate_faces(monkey, output):
     draw(monkey, output=output, use_modifiers=False)
 
 
+@pytest.mark.slow
 def test_a_linked_mesh_is_not_written_to(monkey, tmp_path):
     subdivision(monkey)
     path = str(tmp_path / "library.blend")

@@ -49,6 +49,7 @@ def on_deformed_mesh(mesh_object, curves_object):
     return np.einsum("nj,njk->nk", weights, place[corners])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_sticky_curve_is_the_curve(monkey, closed):
     expected = scenes.points(drawn_with(monkey, closed=closed))
@@ -66,6 +67,7 @@ def test_sticky_curve_is_the_curve(monkey, closed):
     )
 
 
+@pytest.mark.slow
 def test_sticky_curve_follows_a_cast_and_an_armature(monkey):
     monkey.location = (0.3, -1.0, 2.0)
     monkey.rotation_euler = (0.3, 0.5, -1.0)
@@ -120,6 +122,7 @@ def rings(curves_object):
     return get(mesh.vertices, "co", 3).astype(float).reshape(-1, SIDES, 3)
 
 
+@pytest.mark.slow
 @CLOSED
 def test_tube_is_as_far_from_the_curve_as_the_strands_are_thick(monkey, closed):
     expected = scenes.points(drawn_with(monkey, closed=closed))
@@ -145,6 +148,7 @@ def vertices(mesh_object):
     return get(mesh_object.data.vertices, "co", 3)
 
 
+@pytest.mark.slow
 @CLOSED
 def test_tube_without_thickness_is_a_line_through_all_points(monkey, closed):
     curves = sticky(monkey, closed=closed, tube=True, thickness=0.0)
@@ -164,6 +168,7 @@ def test_tube_follows_the_mesh(monkey):
     np.testing.assert_allclose(middle, on_deformed_mesh(monkey, curves), atol=ROUNDING)
 
 
+@pytest.mark.slow
 def test_tube_stays_when_the_curve_is_edited_and_updated(monkey):
     curves = sticky(monkey, tube=True)
     before = len(curves.data.points)
@@ -242,6 +247,7 @@ def convert(**settings):
 OPERATORS = pytest.mark.parametrize("operator", [design, convert])
 
 
+@pytest.mark.slow
 @OPERATORS
 def test_window_begins_with_a_tube_where_few_points_are_drawn(monkey, window, all_points, operator):
     bpy.context.scene.nicmm_curves.tube = not all_points  # its default when Blender starts
@@ -249,12 +255,14 @@ def test_window_begins_with_a_tube_where_few_points_are_drawn(monkey, window, al
     assert (shown_mesh(bpy.context.active_object) is None) == all_points
 
 
+@pytest.mark.slow
 @OPERATORS
 def test_scripts_get_strands(monkey, all_points, operator):
     assert operator() == {"FINISHED"}
     assert shown_mesh(bpy.context.active_object) is None
 
 
+@pytest.mark.slow
 @OPERATORS
 @pytest.mark.parametrize("tube", [True, False])
 def test_what_the_caller_asks_for_counts(monkey, window, all_points, operator, tube):
@@ -262,6 +270,7 @@ def test_what_the_caller_asks_for_counts(monkey, window, all_points, operator, t
     assert (shown_mesh(bpy.context.active_object) is not None) == tube
 
 
+@pytest.mark.slow
 def test_editing_tool_makes_a_tube(monkey):
     points = [{"name": "", "position": vertices(monkey)[v].tolist()} for v in (73, 365, 74, 366)]
     bpy.ops.nicmm.edit_curve(points=points, output="STICKY", tube=True)
@@ -274,6 +283,7 @@ def test_editing_tool_makes_a_tube(monkey):
 # Node groups of other files
 
 
+@pytest.mark.slow
 def test_nodes_that_somebody_put_into_the_group_stay(monkey, extension):
     nodes = module(extension, "outputs.sticky_nodes")
     group = nodes._new_group()
@@ -288,6 +298,7 @@ def test_nodes_that_somebody_put_into_the_group_stay(monkey, extension):
     np.testing.assert_allclose(rings(curves).mean(axis=1), expected, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["GeometryNodeTree", "ShaderNodeTree"])
 def test_group_of_that_name_which_is_none_of_ours_is_left_alone(monkey, extension, kind):
     name = module(extension, "outputs.sticky_nodes").GROUP_NAME
@@ -297,6 +308,7 @@ def test_group_of_that_name_which_is_none_of_ours_is_left_alone(monkey, extensio
     assert not other.nodes
 
 
+@pytest.mark.slow
 def test_linked_group_is_left_alone(monkey, extension, tmp_path):
     nodes = module(extension, "outputs.sticky_nodes")
     file = str(tmp_path / "library.blend")

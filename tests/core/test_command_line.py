@@ -178,6 +178,7 @@ def test_pretrain_refuses_to_train_nothing(mesh_file, tmp_path, capsys, options)
     assert not output.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "arguments"),
     [

@@ -52,6 +52,7 @@ def visited(mesh, vertices, curve):
 
 
 class TestClosedForms:
+    @pytest.mark.slow
     def test_points_of_a_great_circle_give_a_great_circle(self, ball):
         """The points are inside faces; the curve stays within an edge length of the plane."""
         turn = Rotation.from_rotvec([0.3, 0.5, 0.2])
@@ -115,6 +116,7 @@ class TestResult:
         order = np.linalg.norm(offset, axis=2).argmin(axis=1)
         assert_valid_curve(surface, curve, expected[order])
 
+    @pytest.mark.slow
     def test_order_is_kept_or_chosen(self, ball):
         chosen = nearest_vertices(ball, circle([0.0, 3.0, 1.5, 4.5], 0.8) + [0.0, 0.0, 0.6])
         given = nicmm.design_curve(ball, chosen, order="given")
@@ -159,6 +161,7 @@ class TestResult:
         design = nicmm.design_curve(ball, points)
         assert_valid_design(ball, design, points.positions(ball))
 
+    @pytest.mark.slow
     def test_smoothness_makes_it_fairer(self, body):
         energies = [
             nicmm.design_curve(body, CHOSEN, order="shortest", smoothness=s).energy["smooth"]
@@ -196,6 +199,7 @@ class TestInvariance:
         )
         assert_identical(designer.design(CHOSEN, order="shortest"), plain)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("scale", [1e-3, 1e3])
     def test_unit_and_place_do_not_matter(self, body, plain, scale):
         shift = scale * np.array([3.0, -2.0, 5.0])
@@ -208,6 +212,7 @@ class TestInvariance:
             design.field / scale, plain.field, rtol=0, atol=4 * SAME * body.diagonal
         )
 
+    @pytest.mark.slow
     def test_pose_does_not_matter(self, body, plain):
         turn = Rotation.from_rotvec([0.4, -1.1, 0.7])
         moved = nicmm.Mesh(turn.apply(body.vertices.copy()), body.faces)
@@ -230,6 +235,7 @@ class TestInvariance:
             design.field, plain.field[old], rtol=0, atol=4 * SAME * body.diagonal
         )
 
+    @pytest.mark.slow
     def test_form_of_the_control_points_does_not_matter(self, body, plain):
         design = nicmm.design_curve(body, body.vertices[CHOSEN], order="shortest")
         assert apart(design.curves[0].points, plain.curves[0].points) < SAME * body.diagonal
@@ -294,6 +300,7 @@ class TestGuidance:
         assert before > PAINTED_RADIUS
         assert self.length_inside(ball, design.curves[0], weights) < 0.7 * before
 
+    @pytest.mark.slow
     def test_alignment_attracts_the_curve(self, ball, designer, parallel, neutral, middle):
         centre = middle - [0.0, 0.0, 0.35]
         weights = self.painted(ball, centre / np.linalg.norm(centre))
@@ -444,11 +451,13 @@ class TestErrors:
         with pytest.raises(nicmm.UnreachableError, match=r"^control_points\[0\]"):
             nicmm.design_curve(mesh, [3, 60, N + 5])
 
+    @pytest.mark.slow
     def test_a_loop_that_would_have_to_cross_itself_is_unreachable(self, flat_disc):
         rim = nearest_vertices(flat_disc, circle(np.pi / 2 * np.array([0, 2, 1, 3])))
         with pytest.raises(nicmm.UnreachableError, match="^control_points"):
             nicmm.design_curve(flat_disc, rim)
 
+    @pytest.mark.slow
     def test_arguments_are_not_changed(self, small_ball):
         vertices, faces = small_ball.vertices.copy(), small_ball.faces.copy()
         points = random_surface_points(small_ball, 3, seed=1)
@@ -522,6 +531,7 @@ def broken_meshes():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", broken_meshes())
 def test_broken_meshes_give_a_valid_curve_or_a_typed_error(name):
     vertices, faces, chosen = broken_meshes()[name]

@@ -142,6 +142,7 @@ def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monke
         assert not judge_curve(body, curve, closed=True).faults
 
 
+@pytest.mark.slow
 def test_points_are_those_of_the_mesh_that_was_given(at_every_checkpoint):
     """Far from the origin, faces without area are repaired on a copy about another origin."""
     mesh = nicmm.Mesh(MESHES["caps"].vertices + 1e5, MESHES["caps"].faces)

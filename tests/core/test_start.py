@@ -314,6 +314,7 @@ def test_other_methods_can_be_gone_on_from(ball):
     assert_valid_curve(ball, now.curves[0], on_ball(ball, 0.05).positions(ball))
 
 
+@pytest.mark.slow
 def test_beside_obstacles(ball):
     """A start beside obstacles is accepted; one that enters an obstacle is refused."""
     points, designer = on_ball(ball), nicmm.Designer(ball)
@@ -430,6 +431,7 @@ class TestRefusals:
     def test_iterations(self, ball, bad):
         self.refused(ball, CHOSEN, "max_iterations is", nicmm.ArgumentError, max_iterations=bad)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("method", ["variational", "nicmm-paper"])
     def test_methods_that_start_from_nothing(self, ball, method):
         start = nicmm.design_curve(ball, CHOSEN, order="shortest")

@@ -35,6 +35,7 @@ def rough_sphere():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize(
     "mesh",

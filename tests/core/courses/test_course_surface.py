@@ -11,6 +11,7 @@ from nicmm_core.design import Designer
 from tests.core.checks import assert_valid_design
 
 
+@pytest.mark.slow
 def test_edges_crossed_are_counted_by_random_lines():
     """Compared with the mean number of mesh edges that random segments in the plane cross."""
     n = 40

@@ -99,6 +99,7 @@ def test_hops_between_neighbouring_control_points_need_no_cell():
     assert all(len(leg.cells) for leg in routes_of_legs(graph, LEGS, closed=True))
 
 
+@pytest.mark.slow
 def test_no_hop_goes_on_with_a_turn_sharper_than_allowed_and_others_do(body):
     graph = build_hop_graph(curve_surface(body))
     indptr, after, _ = graph.arcs

@@ -92,6 +92,7 @@ def test_strands_that_cross_twice_exchange_their_parts(surface, opposite):
     np.testing.assert_array_equal(passed, visit)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.booleans())
 def test_in_any_order_a_polygon_becomes_simple(seed, closed):
     """In the plane, every reordering replaces steps by shorter ones, so repetition terminates."""

@@ -44,6 +44,7 @@ def test_gradient_is_the_derivative(problem, half_width_in_edges):
         assert rise / 2.0 == pytest.approx(gradient @ step, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_hessian_is_symmetric_and_positive_semidefinite(problem):
     band = build_narrow_band(problem, problem.initial_distance, 3.0 * problem.edge_length)
     values = problem.initial_distance[band.unknowns]

@@ -64,6 +64,7 @@ def test_what_is_no_simple_curve_is_replaced(flat_disc, lane):
         assert as_it_is.curves[0].length == pytest.approx(repaired.curves[0].length)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_designs_without_maps_do_not_choose(flat_disc, monkeypatch, closed):
     from nicmm_core.network import single_pass

@@ -55,6 +55,7 @@ def test_iterations_lower_the_loss_of_an_untrained_network(problem):
     assert loss_of(problem, result.field) < 0.98 * loss_of(problem, problem.initial_distance)
 
 
+@pytest.mark.slow
 def test_terms_are_those_of_the_field_returned(network, problem):
     result = run(network, problem, iterations=10)
     surface = surface_tensors(problem, CPU)

@@ -46,6 +46,7 @@ def test_cap_has_its_area_and_its_vertices(cap):
     assert ((region.share > 0) & (region.share < 1)).sum() < 0.1 * len(mesh.faces)
 
 
+@pytest.mark.slow
 def test_sides_are_those_of_the_level_set(cap):
     mesh, _, _ = cap
     design = nicmm.design_curve(mesh, [100, 700, 1500, 2000], order="shortest")
@@ -84,6 +85,7 @@ def test_random_curves_bound_where_they_separate(kind, seed, closed):
         np.testing.assert_array_equal(chosen.cut_faces, wanted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["meridian of a torus", "(1, 1) curve of a torus", "core of a Möbius strip"],

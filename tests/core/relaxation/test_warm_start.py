@@ -1,6 +1,7 @@
 """Tests that a curve moves to nearby control points with the nodes that it has."""
 
 import numpy as np
+import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.normals import unsigned_normals
@@ -14,6 +15,7 @@ from tests.core.checks import apart
 CHOSEN = [12, 80, 41, 150]
 
 
+@pytest.mark.slow
 def test_a_dragged_curve_keeps_its_nodes(ball):
     """The start is the returned curve, with the same number of nodes."""
     surface = CurveSurface(ball, unsigned_normals(ball))

@@ -296,6 +296,7 @@ class TestOpenEdgesAtOnePlace:
         design = nicmm.design_curve(mesh, [far, far + n], closed=False)
         assert not judge(mesh, design, [far, far + n], closed=False).faults
 
+    @pytest.mark.slow
     def test_three_sheets_that_share_no_vertices(self):
         mesh = MESHES["three sheets along an edge"]
         soup = nicmm.Mesh(

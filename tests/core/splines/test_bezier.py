@@ -191,6 +191,7 @@ def test_noise_is_followed_where_the_tolerance_demands_it():
     assert_fits(points, True, np.array([100, 200]), 1e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(
     seed=st.integers(0, 10_000),

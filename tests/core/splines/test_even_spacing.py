@@ -126,6 +126,7 @@ def test_scale_does_not_matter():
         np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DESIGNS)
 @pytest.mark.parametrize("share", [CLEAN_CURVE, 10 * CLEAN_CURVE])
 def test_designed_curve(name, share):
