@@ -363,9 +363,12 @@ def _traced_polyline(
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
     # A trace must start strictly inside a face. Control points may lie elsewhere, so traces from
-    # them run backward.
+    # them run backward, and there is none from one control point to the next.
+    untraceable = changed & controls[node] & controls[following]
+    lost[node[untraceable]] = True
+    parts.append((node[untraceable], places[node[untraceable]]))
     for backwards in (False, True):
-        here = node[changed & (controls[node] == backwards)]
+        here = node[changed & ~untraceable & (controls[node] == backwards)]
         ends = (here, following[here])
         part, reached = _traced_pieces(surface, nodes, here, ends, backwards)
         lost[here[~reached]] = True

@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.geometry.surface_points import nearest_points
+from nicmm_core.geometry.surface_points import locate_control_points, nearest_points
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from nicmm_core.relaxation.noded_curve import is_simple
 from nicmm_core.relaxation.simple_curve import simple_curve
@@ -81,3 +81,21 @@ def test_path_along_edges_replaces_a_failed_trace():
     at_vertices = (curve.polyline.barycentric == 1.0).any(axis=1)
     assert at_vertices.any()
     assert_valid_curve(mesh, curve.surface_curve(mesh), closed=True)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_control_points_at_vertices_without_nodes_between_them(seed):
+    """No trace can start at a vertex, so the control points are joined along edges."""
+    mesh = shapes.moebius_strip(around=15, across=1)
+    generator = np.random.default_rng(seed)
+    vertex = generator.integers(len(mesh.vertices))
+    chosen = [vertex]
+    for _ in range(2):
+        around = np.setdiff1d(mesh.faces[(mesh.faces == vertex).any(axis=1)], chosen)
+        vertex = generator.choice(around)
+        chosen.append(vertex)
+    places = locate_control_points(mesh, chosen, closed=False)
+    curve = joined_simply(mesh, places, np.arange(3), closed=False)
+    assert curve is not None
+    points = curve.surface_curve(mesh).points
+    assert len(np.unique(points, axis=0)) == len(points)
