@@ -27,7 +27,7 @@ EXTREMELY_BENT = 80.0
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 5
+FURTHER_SEARCHES = 10
 """Greatest number of repeated searches."""
 
 FRUITLESS_SEARCHES = 2
@@ -36,11 +36,14 @@ FRUITLESS_SEARCHES = 2
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_WORK = 1_500
+MOST_WORK = 3_000
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes (`Work`). It takes two to three seconds.
+In moves of all nodes (`Work`). It takes four to six seconds.
 """
+
+RESERVED = 800
+"""Part of that work which searches leave for the other attempts at a curve with kinks."""
 
 WORK_OF_SEARCH = 40
 """Approximate work of a search, in the same unit; as much again for each control or via point."""
@@ -100,7 +103,7 @@ class Attempts:
         gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
         fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
         promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
-        return promising and self._is_affordable(self._work / self.searches)
+        return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
     def tightening_pays(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
