@@ -105,7 +105,7 @@ class Nodes:
     phi_fea: FloatArray
     curves: int = 1
 
-    @property
+    @cached_property
     def per_curve(self) -> int:
         """Number of nodes of each curve."""
         return len(self.positions) // self.curves

@@ -365,10 +365,12 @@ def _traced_polyline(
     # A trace must start strictly inside a face. Control points may lie elsewhere, so traces from
     # them run backward, and there is none from one control point to the next.
     untraceable = changed & controls[node] & controls[following]
-    lost[node[untraceable]] = True
-    parts.append((node[untraceable], places[node[untraceable]]))
+    if untraceable.any():
+        lost[node[untraceable]] = True
+        parts.append((node[untraceable], places[node[untraceable]]))
+        changed &= ~untraceable
     for backwards in (False, True):
-        here = node[changed & ~untraceable & (controls[node] == backwards)]
+        here = node[changed & (controls[node] == backwards)]
         ends = (here, following[here])
         part, reached = _traced_pieces(surface, nodes, here, ends, backwards)
         lost[here[~reached]] = True
