@@ -59,6 +59,7 @@ def test_a_comment_asks_for_nothing():
     assert evidence.code_behind("courses", read) == evidence.code_behind("courses")
 
 
+@pytest.mark.slow
 def test_wording_asks_for_nothing():
     path = evidence.ROOT / "benchmarks" / "messes.py"
 

@@ -86,6 +86,7 @@ def test_curves_are_updated_on_the_mesh_as_it_is_now(kept):
         assert scenes.distances_to(controls(kept, curve), now).max() < ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_is_edited_in_place(kept, name):
     curve = bpy.data.objects[name]

@@ -34,6 +34,7 @@ def as_polyline(curve, every):
     )
 
 
+@pytest.mark.slow
 def test_each_course_is_recognised_also_with_fewer_points(torus, courses):
     assert len(courses) >= 3
     for number, curve in enumerate(courses):
@@ -41,5 +42,6 @@ def test_each_course_is_recognised_also_with_fewer_points(torus, courses):
         assert current_course(torus, as_polyline(curve, 2), courses) == number
 
 
+@pytest.mark.slow
 def test_another_course_is_not(torus, courses):
     assert current_course(torus, courses[0], courses[1:]) is None

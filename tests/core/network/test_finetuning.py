@@ -65,6 +65,7 @@ def test_terms_are_those_of_the_field_returned(network, problem):
         assert result.terms[name] == pytest.approx(value.item(), rel=1e-5, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_stops_when_the_energy_has_been_still_for_the_patience(network, problem):
     """With a fluctuation that every energy satisfies, it stops at the first opportunity."""
     for patience, least, expected in ((3, 1, 3), (7, 1, 7), (3, 12, 12)):

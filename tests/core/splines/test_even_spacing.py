@@ -145,6 +145,7 @@ def test_designed_curve(name, share):
     assert even.closed == curve.closed
 
 
+@pytest.mark.slow
 def test_curve_of_another_mesh_is_refused(flat_disc):
     _, curve = designed("ball")
     with pytest.raises(nicmm.CurveError, match="not on this mesh"):
