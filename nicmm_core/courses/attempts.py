@@ -89,7 +89,7 @@ class Attempts:
         return distinct_by_energy(self.surface, self.curves, self.smoothness)
 
     def end_search(self) -> None:
-        """Record that a search has ended, whether or not it has led to another relaxed curve."""
+        """Record that a search has ended, with or without another relaxed curve."""
         self.relaxed_after.append(len(self.relaxed))
 
     def another_search_pays(self) -> bool:

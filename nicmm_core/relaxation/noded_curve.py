@@ -363,7 +363,7 @@ def _traced_polyline(
     controls = np.zeros(n, dtype=bool)
     controls[curve.control_nodes] = True
     # A trace must start strictly inside a face. Control points may lie elsewhere, so traces from
-    # them run backward, and there is none from one control point to the next.
+    # them run backward, and no trace joins two control points.
     untraceable = changed & controls[node] & controls[following]
     if untraceable.any():
         lost[node[untraceable]] = True
