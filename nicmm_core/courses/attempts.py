@@ -43,7 +43,7 @@ In moves of all nodes (`Work`). It takes four to six seconds.
 """
 
 RESERVED = 800
-"""Part of that work which searches leave for the other attempts at a curve with kinks."""
+"""Part of that work that must be left after a further search, for other attempts at kinks."""
 
 WORK_OF_SEARCH = 40
 """Approximate work of a search, in the same unit; as much again for each control or via point."""

@@ -175,13 +175,6 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
     return nodes.by_curve(at_nodes).sum(axis=1)
 
 
-def energy_scale(nodes: Nodes, weights: Balance, energy: float) -> float:
-    """The same as `energy_scales` for one curve and its energy."""
-    if weights.held is None:
-        return energy
-    return float(energy_scales(nodes, weights, np.array([energy]))[0])
-
-
 def energy_scales(nodes: Nodes, weights: Balance, energies: FloatArray) -> FloatArray:
     """Positive values, (c,), that decreases of the energies of all curves are compared with.
 
