@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve
 from ..geometry.distances import distance_to_segments
@@ -92,7 +93,7 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     CurveError
         If the curve does not lie on this mesh.
     """
-    curve, segment_faces = checked_curve(mesh, curve)
+    mesh, curve, segment_faces = _checked(mesh, curve)
     places = even_places(curve.points, curve.closed, curve.control_index, tolerance)
     segment, share, control_index = places
     following = (segment + 1) % len(curve.faces)
@@ -107,6 +108,25 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     barycentric = np.where(between[:, None], weights, curve.barycentric[segment])
     positions = (barycentric[:, :, None] * mesh.vertices[corners]).sum(axis=1)
     return SampledCurve(curve.closed, faces, barycentric, positions, control_index)
+
+
+def _checked(mesh: Mesh, curve: SurfaceCurve) -> tuple[Mesh, SurfaceCurve, IntArray]:
+    """`checked_curve`, and the mesh with which it succeeds.
+
+    If faces have equal positions but not the same vertices, as in a soup of triangles, this is the
+    mesh whose faces share them; its faces and their corners are numbered as before.
+    """
+    try:
+        return mesh, *checked_curve(mesh, curve)
+    except CurveError:
+        _, first, shared = np.unique(
+            mesh.vertices + 0.0, axis=0, return_index=True, return_inverse=True
+        )
+        faces = shared.reshape(-1)[mesh.faces]
+        if len(first) == len(mesh.vertices) or (faces == np.roll(faces, 1, axis=1)).any():
+            raise
+        joined = Mesh(mesh.vertices[first], faces)
+        return joined, *checked_curve(joined, curve)
 
 
 def even_places(

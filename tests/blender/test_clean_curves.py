@@ -27,6 +27,20 @@ def draw(mesh_object, **settings):
     return bpy.context.active_object
 
 
+@pytest.mark.parametrize("spline", ["EVEN", "BEZIER", "EXACT"])
+def test_a_mesh_of_separate_triangles(empty_scene, spline):
+    """Imported files often have faces without common vertices."""
+    ball = scenes.sphere()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.edge_split()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(ball.data.vertices) == 3 * len(ball.data.polygons)
+    chosen = ", ".join(map(str, scenes.ring(ball, 4)))
+    assert bpy.ops.nicmm.design_curve(points=chosen, spline=spline) == {"FINISHED"}
+    assert np.linalg.norm(outline(bpy.context.active_object), axis=1).min() > 0.97
+
+
 def on_segments(points, line):
     """Distances from points to a closed polyline."""
     start, step = line, np.roll(line, -1, axis=0) - line

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nicmm_core as nicmm
+from nicmm_core import shapes
 from nicmm_core.geometry.tolerances import CLEAN_CURVE, of_clean_curve
 from nicmm_core.splines.even_spacing import even_curve, even_places
 from tests.core.checks import circle
@@ -143,6 +144,21 @@ def test_designed_curve(name, share):
     at_controls = even.points[even.control_index]
     np.testing.assert_allclose(at_controls, curve.points[curve.control_index], atol=1e-12)
     assert even.closed == curve.closed
+
+
+def test_a_curve_on_a_soup_of_triangles():
+    """Faces without common vertices make no difference to a curve on the same faces."""
+    ball = shapes.sphere(2)
+    separate = np.arange(ball.faces.size).reshape(-1, 3)
+    soup = nicmm.Mesh(ball.vertices[ball.faces].reshape(-1, 3), separate)
+    corners = [int(np.flatnonzero(ball.faces.ravel() == vertex)[0]) for vertex in (3, 60, 100)]
+    curve = nicmm.design_curve(soup, corners).curves[0]
+    tolerance = of_clean_curve(soup.diagonal)
+    even = even_curve(soup, curve, tolerance)
+    expected = even_curve(ball, curve, tolerance)
+    np.testing.assert_allclose(even.points, expected.points, rtol=0, atol=1e-12)
+    places = (even.barycentric[:, :, None] * soup.vertices[soup.faces[even.faces]]).sum(axis=1)
+    np.testing.assert_allclose(places, even.points, rtol=0, atol=1e-12)
 
 
 @pytest.mark.slow
