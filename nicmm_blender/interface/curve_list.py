@@ -32,8 +32,11 @@ class NICMM_UL_curves(bpy.types.UIList):
         shown = set(curve_record.designed_on(curve_record.mesh_of_context(context)))
         objects = getattr(data, name)
         wanted = self.filter_name.casefold()
+        item = self.bitflag_filter_item
+        # Blender inverts the flags afterwards if the user inverts the filter.
+        other = item if self.use_filter_invert else 0
         flags = [
-            self.bitflag_filter_item if found in shown and wanted in found.name.casefold() else 0
+            (item if wanted in found.name.casefold() else 0) if found in shown else other
             for found in objects
         ]
         return flags, []
@@ -52,6 +55,7 @@ def _activate(_window_manager, index: int) -> None:
         chosen = bpy.data.objects[index]
         if chosen.visible_get():
             curve_object.select_only(context, chosen)
+            bpy.ops.ed.undo_push(message="Select Curve")  # as a click in the viewport does
 
 
 def draw(layout, context) -> None:

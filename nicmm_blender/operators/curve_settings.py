@@ -20,6 +20,9 @@ from .long_solves import answer_all
 COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
 DRAWING = ("spline", "offset")
 
+UNDO_DELAY = 0.3
+"""Seconds without another change after which an undo step is added in Sculpt Mode."""
+
 _problems: dict = {}
 """Messages about changes that were impossible, by the session_uid of the curve.
 
@@ -61,6 +64,25 @@ def _write(group, name: str, value) -> None:
         _problems[curve.session_uid] = digest, str(error)
     else:
         _problems.pop(curve.session_uid, None)
+        _push_undo_later()
+
+
+def _push_undo_later() -> None:
+    """Add an undo step soon: Blender adds none for a change of a property in Sculpt Mode."""
+    if bpy.app.background or bpy.context.mode != "SCULPT":
+        return
+    _cancel_undo()
+    bpy.app.timers.register(_push_undo, first_interval=UNDO_DELAY)
+
+
+def _push_undo() -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.ed.undo_push(message="Curve Settings")
+
+
+def _cancel_undo() -> None:
+    if bpy.app.timers.is_registered(_push_undo):
+        bpy.app.timers.unregister(_push_undo)
 
 
 def _change(curve, name: str, value) -> None:
@@ -117,7 +139,7 @@ def _set_radius(context, curve, value: float) -> None:
 
 def _property(name: str, given):
     """A property that reads a setting from the record of its curve and writes it there."""
-    words = {**given.keywords}
+    words = {**given.keywords, "options": set()}  # not animatable, since a change takes effect
     default = words.get("default", "")
     get, put = functools.partial(_read, name=name, default=default), _setter(name)
     if "items" in words:
@@ -136,7 +158,7 @@ def _setter(name: str):
 
 def _radius_property():
     words = dict(settings.OutputProperties.__annotations__["radius"].keywords)
-    words["description"] = "Radius of the curve. Set to zero for a line"
+    words |= {"description": "Radius of the curve. Set to zero for a line", "options": set()}
     return bpy.props.FloatProperty(
         **words, get=_get_radius, set=lambda group, value: _write(group, "radius", value)
     )
@@ -189,6 +211,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    _cancel_undo()
     _problems.clear()
     del bpy.types.Object.nicmm_settings
     bpy.utils.unregister_class(NICMM_PG_curve_settings)

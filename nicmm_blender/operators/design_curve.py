@@ -137,7 +137,7 @@ def _other_selections() -> str:
     ]
     if context.mode != "EDIT_MESH" or not names:
         return ""
-    return f"The selection on {', '.join(names)} is not used: a curve lies on one mesh"
+    return f"The vertices selected on {', '.join(names)} are ignored: a curve lies on one mesh"
 
 
 def register() -> None:

@@ -83,6 +83,8 @@ class LongSolves:
 
         Blender keeps the last operators for the redo panel, and so would keep their meshes.
         """
+        if context.mode == "EDIT_MESH":
+            _include_all_data_in_undo()
         try:
             return self.finish(context, requests, answers)
         finally:
@@ -132,6 +134,14 @@ class LongSolves:
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
         self._partial.remove()
+
+
+def _include_all_data_in_undo() -> None:
+    """Make the next undo step of Edit Mode hold all data, not only the edited meshes.
+
+    Blender does so after a data-block has been created.
+    """
+    bpy.data.meshes.remove(bpy.data.meshes.new("NICMM"))
 
 
 def note_running(operator) -> None:

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..outputs import edited_curve
 from ..scene import curve_record, mesh_data
-from ..scene.messages import InputError
+from ..scene.messages import InputError, counted
 from ..scene.selection import selected_vertices
 from ..scene.surface import read, vertex_group
 from . import curve_settings, polls
@@ -102,7 +102,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         setattr(_settings(context, curve), FIELDS[self.role], group.name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT" if self.show else mode)
-        created = f'Vertex group "{group.name}", {np.count_nonzero(weights)} vertices'
+        created = f'Vertex group "{group.name}" with {counted(np.count_nonzero(weights), "weight")}'
         if curve is not None and (problem := curve_settings.problem_of(curve)):
             self.report({"WARNING"}, f'{created}; "{curve.name}" does not use it: {problem}')
         else:
@@ -159,6 +159,8 @@ def _mesh_to_change(context):
     else:
         mesh_object = mesh_data.mesh_object(context)
     mesh_data.check_local(mesh_object, "its weights cannot be changed")
+    if not mesh_object.visible_get():
+        raise InputError(f'"{mesh_object.name}" is hidden. Show it to create or paint maps')
     return mesh_object
 
 

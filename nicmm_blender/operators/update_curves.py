@@ -39,16 +39,23 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         return True
 
     def requests(self, context) -> list:
-        curves = self._curves(context)
-        for designed in curves:
-            writing.check_replaceable(designed)
-        self._names = [designed.name for designed in curves]
         chosen = None
         if self.use_panel:
             chosen = curve_record.settings_from(context.scene.nicmm_curves)
-        return [request_again(designed, chosen) for designed in curves]
+        requests, self._names, self._failed = [], [], []
+        for designed in self._curves(context):
+            try:
+                writing.check_replaceable(designed)
+                requests.append(request_again(designed, chosen))
+                self._names.append(designed.name)
+            except InputError as error:
+                self._failed.append((designed.name, str(error)))
+        if not requests:
+            raise InputError("; ".join(message for _, message in self._failed))
+        return requests
 
     def _curves(self, context) -> list:
+        """The curve with the given name, or all curves on the mesh without unfinished drawings."""
         if self.curve:
             return [named(self.curve)]
         mesh_object = curve_record.mesh_of_context(context)
@@ -58,23 +65,27 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
                 f'No curve was designed on "{mesh_object.name}". Select vertices and run '
                 "Design Curve on Surface"
             )
-        return curves
+        return [each for each in curves if not curve_record.is_unfinished(each)] or curves
 
     def finish(self, _context, requests: list, answers: list) -> set:
-        failed = []
+        total = len(requests) + len(self._failed)
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:
                 writing.replace(named(name), request, answer)
             except InputError as error:
-                failed.append(f'"{name}": {error}')
-        if len(failed) == len(requests):
-            raise InputError("; ".join(failed))
-        done = f"{len(requests) - len(failed)} of {counted(len(requests), 'curve')} updated"
+                self._failed.append((name, str(error)))
+        remarks = [f'"{name}": {message}' for name, message in self._failed]
+        if len(self._failed) == total:
+            raise InputError("; ".join(remarks))
+        done = f"{total - len(self._failed)} of {counted(total, 'curve')} updated"
         moved = sum(request.moved for request in requests)
         if moved:
-            failed.append(f"{counted(moved, 'control point')} moved because triangles were deleted")
-        if failed:
-            self.report({"WARNING"}, f"{done}; {'; '.join(failed)}")
+            remarks.append(
+                f"{counted(moved, 'control point')} moved to the nearest positions, because their "
+                "triangles no longer exist"
+            )
+        if remarks:
+            self.report({"WARNING"}, f"{done}; {'; '.join(remarks)}")
         else:
             self.report({"INFO"}, done)
         return {"FINISHED"}

@@ -118,6 +118,11 @@ def check_replaceable(designed) -> None:
             f'"{designed.name}" is linked from {library.filepath}. '
             "Make it local (Object > Relations > Make Local)"
         )
+    if designed.override_library or designed.data.override_library:
+        raise InputError(
+            f'"{designed.name}" is a library override, and Blender would not save its new points. '
+            "Make it local (Object > Relations > Make Local)"
+        )
     if designed.mode != "OBJECT":
         raise InputError(f'"{designed.name}" is being edited. Switch to Object Mode first')
 
@@ -163,7 +168,8 @@ def _cut_edges(context, mesh_object, surface, curve, settings) -> str:
             edge.seam = edge.seam or settings.mark_seam
             edge.smooth = edge.smooth and not settings.mark_sharp
     _set_normals(mesh_object, normals, cutting)
-    return f"cut, with {len(edges)} edges along the curve{_custom_normals_note(mesh_object)}"
+    along = counted(len(edges), "edge")
+    return f"mesh cut along the curve, {along}{_custom_normals_note(mesh_object)}"
 
 
 def _region(context, mesh_object, surface, curve, settings) -> str:

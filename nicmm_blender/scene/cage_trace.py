@@ -226,6 +226,9 @@ class _Copy:
         """Evaluate the copy and read its attributes."""
         copy = self.mesh_object.copy()
         copy.data = self.cage.copy()
+        if self.mesh_object.mode == "EDIT":
+            for modifier in copy.modifiers:
+                modifier.show_viewport = modifier.show_viewport and modifier.show_in_editmode
         self._write(copy.data)
         with evaluated_in_isolation(copy) as evaluated:
             return self._read(evaluated, shown, loops)

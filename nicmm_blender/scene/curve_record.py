@@ -188,6 +188,8 @@ def digest(mesh_object, surface, settings: CurveSettings) -> str:
     found = hashlib.blake2b(words.encode(), digest_size=16)
     found.update(surface.core_positions.tobytes())
     found.update(surface.faces.tobytes())
+    if settings.clearance > 0.0 and surface.unit != 1.0:
+        found.update(np.float64(surface.unit).tobytes())
     for name in groups_of(settings):
         if name in mesh_object.vertex_groups:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
@@ -248,6 +250,14 @@ def has_curve(curve_object) -> bool:
     return len(_checked_record(curve_object)["counts"]) > 0
 
 
+def is_unfinished(curve_object) -> bool:
+    """Whether a drawing has too few points for a curve; False if its record is damaged."""
+    try:
+        return not has_curve(curve_object)
+    except InputError:
+        return False
+
+
 def mesh_of(curve_object):
     """The mesh object that a curve was designed on, or None if it no longer exists."""
     found = curve_object[RECORD_KEY].get("mesh")
@@ -273,7 +283,7 @@ def mesh_in_any_scene(curve_object):
 def _missing_mesh_error(curve_object) -> InputError:
     return InputError(
         f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
-        "Bring it back, or draw the curve again"
+        "Link it to the scene, or draw the curve again"
     )
 
 

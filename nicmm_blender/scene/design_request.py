@@ -81,6 +81,10 @@ def for_points(mesh_object, surface, points, order: str, settings: CurveSettings
     settings : CurveSettings
         Settings of the curve.
     """
+    options = curve_record.arguments_of(
+        settings, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
+    )
+    options["clearance"] /= surface.unit
     return DesignRequest(
         mesh_name=mesh_object.name,
         mesh_uid=mesh_object.session_uid,
@@ -88,9 +92,7 @@ def for_points(mesh_object, surface, points, order: str, settings: CurveSettings
         points=points,
         order=order,
         settings=settings,
-        options=curve_record.arguments_of(
-            settings, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
-        ),
+        options=options,
     )
 
 

@@ -186,7 +186,7 @@ def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | N
         return None
     vertex_group(mesh_object, name)
     with shown_mesh(mesh_object, use_modifiers) as (mesh, _):
-        return weights_on(mesh, name)
+        return weights_on(mesh, mesh_object.vertex_groups.keys(), name)
 
 
 def vertex_group(mesh_object, name: str):
@@ -212,8 +212,8 @@ def _is_sculpted_without_modifiers(mesh_object) -> bool:
         return False
     if mesh_object.use_dynamic_topology_sculpting:
         raise InputError(
-            f'"{mesh_object.name}" is sculpted with dynamic topology, whose faces extensions '
-            "cannot read. Turn Dyntopo off, or leave Sculpt Mode"
+            f'"{mesh_object.name}" is sculpted with dynamic topology (Dyntopo), whose faces '
+            "extensions cannot read. Disable Dyntopo, or leave Sculpt Mode"
         )
     return not active_modifiers_text(mesh_object)
 
@@ -222,6 +222,12 @@ def _depsgraph_of(mesh_object):
     """A dependency graph that evaluates the object: preferably that of the current view layer."""
     context = bpy.context
     if is_in(context.view_layer, mesh_object):
+        if _is_disabled(context.view_layer, mesh_object) and active_modifiers_text(mesh_object):
+            raise InputError(
+                f'"{mesh_object.name}" is disabled in viewports, so its '
+                f"{active_modifiers_text(mesh_object)} are not computed. Enable it in the "
+                "Outliner, or turn Use Modifiers off"
+            )
         return context.evaluated_depsgraph_get()
     for scene in mesh_object.users_scene:
         for layer in scene.view_layers:
@@ -232,6 +238,16 @@ def _depsgraph_of(mesh_object):
         f'"{mesh_object.name}" is in no view layer, so its modifiers are not computed. Bring it '
         "back to the scene, or turn Use Modifiers off"
     )
+
+
+def _is_disabled(view_layer, mesh_object) -> bool:
+    """Whether an object, or all of its collections, are disabled in viewports.
+
+    Blender does not evaluate such an object. It does evaluate one that is hidden with the eye icon.
+    """
+    hidden = mesh_object.hide_get(view_layer=view_layer)
+    visible = mesh_object.visible_get(view_layer=view_layer)
+    return mesh_object.hide_viewport or not (hidden or visible)
 
 
 def _keeps_proportions(linear: np.ndarray) -> bool:

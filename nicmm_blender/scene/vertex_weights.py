@@ -14,14 +14,17 @@ from .isolation import evaluated_in_isolation
 STORED = "nicmm_weights"
 
 
-def weights_on(mesh, group: str) -> np.ndarray:
+def weights_on(mesh, groups: list, group: str) -> np.ndarray:
     """Weights (V,) of all vertices of a mesh in a vertex group; 0 outside the group.
 
-    `mesh` may be the evaluated mesh of an object. It is not changed.
+    `mesh` may be the evaluated mesh of an object. It is not changed. `groups` are the names of all
+    vertex groups of the object: a copy of an edited mesh has weights without names.
     """
     nodes = _new_node_group(group)
     try:
         temporary = bpy.data.objects.new("NICMM weights", mesh.copy())
+        for name in groups[len(temporary.vertex_groups) :]:
+            temporary.vertex_groups.new(name=name)
         temporary.modifiers.new("NICMM weights", "NODES").node_group = nodes
         with evaluated_in_isolation(temporary) as stored:
             weights = np.zeros(len(stored.vertices), dtype=np.float32)

@@ -91,7 +91,12 @@ def mesh_and_curve(context) -> tuple:
 
 
 def is_ready(context, mesh_object, curve) -> bool:
-    """Whether what is under the mouse is known without a long computation."""
+    """Whether what is under the mouse is known without a long computation.
+
+    During a render the surface must not be read, because that makes temporary objects.
+    """
+    if bpy.app.is_job_running("RENDER"):
+        return False
     surface = surface_cache.cached(mesh_object, _uses_modifiers(context, curve))
     if surface is None:
         return surface_cache.has_few_faces(mesh_object)

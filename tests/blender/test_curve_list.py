@@ -2,6 +2,7 @@
 
 import time
 from importlib import import_module
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -128,7 +129,7 @@ def test_vertices_that_are_new_do_not_matter(sphere, capfd):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.ops.nicmm.update_curves()
     assert scenes.distances_to(controls, places(curve)).max() < 1e-5
-    assert "moved because triangles were deleted" in capfd.readouterr().out
+    assert "moved to the nearest positions" in capfd.readouterr().out
 
 
 def test_one_of_several_fails(sphere, capfd):
@@ -139,10 +140,12 @@ def test_one_of_several_fails(sphere, capfd):
     with pytest.raises(RuntimeError, match='no vertex group "Wall"'):
         bpy.ops.nicmm.update_curves(curve=bad.name)
     pull(sphere)
-    before = places(good)
-    with pytest.raises(RuntimeError, match="Wall"):
-        bpy.ops.nicmm.update_curves()
-    np.testing.assert_array_equal(places(good), before)
+    before = places(good), places(bad)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert np.abs(places(good).max(axis=0) - before[0].max(axis=0)).max() > 0.01
+    np.testing.assert_array_equal(places(bad), before[1])
+    printed = capfd.readouterr().out
+    assert "1 of 2 curves updated" in printed and 'no vertex group "Wall"' in printed
 
 
 def test_unreachable_ones_leave_the_others(sphere, capfd):
@@ -185,6 +188,49 @@ def test_update_is_one_undo_step(sphere):
     assert np.abs(places(bpy.data.objects[name]) - before[:1]).max() > 0.1
     bpy.ops.ed.undo()
     np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
+
+
+@pytest.mark.parametrize("kind", ["CURVE", "STICKY"])
+def test_update_in_edit_mode_is_one_undo_step(sphere, kind):
+    curve = draw(sphere, output=kind)
+    name, before = curve.name, places(curve)
+    pull(sphere)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.ed.undo_push(message="Edit Mode")
+    bpy.ops.nicmm.update_curves("EXEC_DEFAULT", True)
+    assert np.abs(places(bpy.data.objects[name]) - before[:1]).max() > 0.1
+    bpy.ops.ed.undo()
+    np.testing.assert_array_equal(places(bpy.data.objects[name]), before)
+
+
+def test_update_passes_over_unfinished_drawings(sphere, capfd):
+    curve = draw(sphere)
+    bpy.ops.nicmm.add_point(position=(1.0, 0.0, 0.0))
+    drawing = bpy.context.active_object
+    assert drawing != curve
+    scenes.activate(sphere)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert "1 of 1 curve updated" in capfd.readouterr().out
+    with pytest.raises(RuntimeError, match="1 control point and no curve"):
+        bpy.ops.nicmm.update_curves(curve=drawing.name)
+
+
+def test_inverting_the_filter_of_the_list_shows_other_curves_only(empty_scene, sphere):
+    curves = [draw(sphere), draw(sphere)]
+    curves[0].name = "Collar"
+    view = module(empty_scene, "interface.curve_list").NICMM_UL_curves
+
+    def shown(**filters):
+        state = SimpleNamespace(bitflag_filter_item=1, filter_name="coll", **filters)
+        flags, _ = view.filter_items(state, bpy.context, bpy.data, "objects")
+        return [
+            found
+            for found, flag in zip(bpy.data.objects, flags, strict=True)
+            if bool(flag) != state.use_filter_invert  # as Blender does afterwards
+        ]
+
+    assert shown(use_filter_invert=False) == [curves[0]]
+    assert shown(use_filter_invert=True) == [curves[1]]
 
 
 def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):

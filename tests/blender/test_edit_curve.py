@@ -99,6 +99,34 @@ def test_groups_reach_the_core(empty_scene, sphere, places):
         assert scenes.distances_to(scenes.points(curve), plain).max() > 0.005
 
 
+@pytest.mark.slow
+def test_clearance_is_a_length_of_the_scene(sphere, places):
+    """It is the same fraction of the sphere whatever the scale of the object."""
+    middle = scenes.five_places()[:2].mean(axis=0)
+    away = np.linalg.norm(scenes.positions(sphere) - middle / np.linalg.norm(middle), axis=1)
+    sphere.vertex_groups.new(name="Wall").add(np.flatnonzero(away < 0.3).tolist(), 1.0, "REPLACE")
+    drawn = []
+    for scale in (1.0, 0.01):
+        sphere.scale = (scale,) * 3
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.objects.active = sphere
+        curve = edit(points=as_points(places), obstacle_group="Wall", clearance=0.1 * scale)
+        drawn.append(scenes.points(curve))
+    np.testing.assert_allclose(*drawn, atol=ROUNDING)
+    before = curve.data["nicmm_designed_on"]
+    sphere.scale = (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    assert bpy.ops.nicmm.update_curves(curve=curve.name) == {"FINISHED"}
+    assert curve.data["nicmm_designed_on"] != before
+
+
+def test_settings_of_a_curve_cannot_be_animated(sphere, places):
+    curve = edit(points=as_points(places))
+    for name in ("closed", "smoothness", "clearance", "offset", "radius"):
+        with pytest.raises(TypeError, match="not animatable"):
+            curve.nicmm_settings.keyframe_insert(name)
+
+
 def test_new_curve_takes_the_settings_of_the_panel(sphere, places):
     bpy.context.scene.nicmm_curves.closed = False
     bpy.context.scene.nicmm_curves.smoothness = 2.0

@@ -39,6 +39,17 @@ def on_edges_of_the_cube(mesh_object):
     return (np.isclose(np.abs(scenes.positions(mesh_object)), 1.0).sum(axis=1) >= 2).astype(float)
 
 
+def test_maps_of_a_hidden_mesh_are_refused(cube):
+    cube.vertex_groups.new(name="Wall")
+    bpy.context.scene.nicmm_curves.obstacle_group = "Wall"
+    cube.hide_viewport = True
+    bpy.context.view_layer.objects.active = cube
+    for run in (bpy.ops.nicmm.new_map, bpy.ops.nicmm.paint_map):
+        with pytest.raises(RuntimeError, match="is hidden. Show it"):
+            run()
+    assert cube.vertex_groups.keys() == ["Wall"]
+
+
 @ROLES
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT", "WEIGHT_PAINT"])
 def test_empty_map_is_chosen_and_shown(cube, role, field, mode):

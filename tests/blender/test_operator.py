@@ -431,7 +431,7 @@ def test_selections_on_other_meshes_are_mentioned(empty_scene, capfd):
     other.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
     assert bpy.ops.nicmm.design_curve() == {"FINISHED"}
-    assert 'The selection on "Other" is not used' in capfd.readouterr().out
+    assert 'The vertices selected on "Other" are ignored' in capfd.readouterr().out
     bpy.ops.object.mode_set(mode="OBJECT")
 
 

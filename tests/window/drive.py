@@ -26,6 +26,10 @@ INSIDE = Path(__file__).resolve().with_name("inside.py")
 # Sideways and upwards on the front of Suzanne's head, in this order: a loop around the face.
 PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.45, -0.08))
 DRAGGED, JUMPING = 3, 1
+
+SMOOTHNESS = (150, 68)
+"""Pixel of the field in the header."""
+
 PATIENCE = 60.0
 """Seconds that a step may take; software OpenGL is slow."""
 
@@ -217,6 +221,14 @@ def undo_and_redo(blender: Blender, states: list, why: str) -> None:
         blender.wait(f"helper.state() == {expected!r}", f"redo {why}")
 
 
+def change_smoothness(blender: Blender) -> None:
+    """Drag the field in the header."""
+    drag(blender, SMOOTHNESS, 12, (6.0, 0.0))
+    blender.mouse("mouseup", 1)
+    smoothness = "helper.curve().nicmm_settings.smoothness"
+    blender.wait(f"abs({smoothness} - 1.0) > 0.01", "the header changes the smoothness")
+
+
 def install(blender: Blender, archive: Path) -> None:
     step("Install the zip")
     check(blender.do("value = bpy.app.background") is False, "a window")
@@ -352,18 +364,9 @@ def live_between(blender: Blender) -> None:
     check(now != turned, "the navigation gizmo turns the view")
     blender.do("helper.look()")
     before = state(blender)
-    smoothness = "helper.curve().nicmm_settings.smoothness"
-    field = (150, 68)
-    drag(blender, field, 12, (6.0, 0.0))
-    blender.mouse("mouseup", 1)
-    blender.wait(f"abs({smoothness} - 1.0) > 0.01", "the header changes the smoothness")
+    change_smoothness(blender)
     blender.shot("6-header")
-    after = state(blender)
-    blender.move(blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0])
-    blender.key("ctrl+z")
-    blender.wait(f"helper.state() == {before!r}", "undo of a setting")
-    blender.key("ctrl+shift+z")
-    blender.wait(f"helper.state() == {after!r}", "redo of a setting")
+    undo_and_redo(blender, [before, state(blender)], "of a setting")
     path = str(blender.folder / "head.blend")
     blender.do(f"bpy.ops.wm.save_as_mainfile(filepath={path!r})")
     saved = Path(path).stat().st_mtime_ns
@@ -536,6 +539,10 @@ def other_modes(blender: Blender) -> None:
         blender.shot(f"16-{mode.lower()}")
         undo_and_redo(blender, states, f"in {mode}")
         check(blender.do("value = helper.shape('Suzanne')") == mesh, "the mesh is unchanged")
+        change_smoothness(blender)
+        time.sleep(1.0)
+        blender.shot(f"17-{mode.lower()}-header")
+        undo_and_redo(blender, [states[-1], state(blender)], f"of a setting in {mode}")
         drag(blender, pixel_of(blender, 2), 10, (1.0, -2.0))
         blender.mouse("mouseup", 1)
         blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
