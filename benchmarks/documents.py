@@ -136,11 +136,11 @@ def _courses(results: Results) -> str:
         + "\n"
         + _item(
             "The curve depends only on the surface, because it is designed on a copy that is "
-            "numbered by position in the principal frame. Curves that moved by more than "
-            f"{100 * courses.MOVED:g} % of the diagonal when the mesh was changed, although the "
-            f"energies differ by more than {100 * courses.TIE:g} %: {far}. "
-            f"{100 * np.mean(np.array(every) < 1e-6):.0f} % of all {len(every)} curves stay the "
-            "same within 1e-6."
+            "numbered by position in the principal frame. When the mesh is changed, a curve "
+            f"counts as another one if it moves by more than {100 * courses.MOVED:g} % of the "
+            f"diagonal and its energy changes by more than {100 * courses.TIE:g} %: {far}. "
+            f"{(np.array(every) < 1e-6).sum()} of all {len(every)} curves stay the same within "
+            "1e-6."
         )
     )
 
@@ -189,13 +189,14 @@ def _sharp_edges(results: Results) -> str:
     every = [line for lines in results["lines"].values() for line in lines]
     others = [line["mesh"] for line in every if line["aligned"] > sharp_edges.WANTED]
     kinds = sorted({name.split(", ")[-1].rstrip(" 0123456789") for name in others})
-    where = f" (the others are on: {report.listed(kinds)})" if kinds else ""
+    where = f"; the others are on: {report.listed(kinds)}" if kinds else ""
     return _item(
         "A curve whose ends are 2 % of the diagonal away from a sharp edge is attracted to the "
-        f"edge and runs along it: within a quarter of a mesh edge on {len(every) - len(others)} of "
-        "the lines that were [measured](../benchmarks/RESULTS.md#sharp-edges-to-follow), of "
-        f"{len(every)}{where}. If other sharp edges are about as near, such as a neighbouring rim "
-        "of a shaft or the other half of a circle, the curve may follow those; "
+        f"edge and runs along it: of {len(every)} "
+        "[measured](../benchmarks/RESULTS.md#sharp-edges-to-follow) lines, "
+        f"{len(every) - len(others)} are within a quarter of a mesh edge of it{where}. If other "
+        "sharp edges are about as near, such as a neighbouring rim of a shaft or the other half of "
+        "a circle, the curve may follow those; "
         "[via points](via_points.md) select one."
     )
 
