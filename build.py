@@ -42,6 +42,9 @@ PLATFORMS = {
 LARGEST_ZIP = 120e6
 """Largest size of a zip without PyTorch, in bytes."""
 
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
+"""Environment of the tests: there is a process per core, and more threads only slow them down."""
+
 # NumPy is not bundled: all extensions share the NumPy that Blender includes.
 BUNDLED = ("libigl", "scipy")
 TORCH_COMPANIONS = (
@@ -292,7 +295,7 @@ def command_test(arguments: argparse.Namespace) -> int:
     failed = []
     for name, command in checks.items():
         say(name)
-        if run([VENV_PYTHON, "-m", *command]) != 0:
+        if run([VENV_PYTHON, "-m", *command], ONE_THREAD) != 0:
             failed.append(name)
     if failed:
         say(f"Failed: {', '.join(failed)}")

@@ -16,12 +16,12 @@ import os
 import platform
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy
 import scipy
-import torch
 
 from tests.oracles.mesh_files import INDEX
 
@@ -111,7 +111,7 @@ def machine() -> str:
     return (
         f"{os.cpu_count()} cores {platform.machine()}, "
         f"Python {platform.python_version()}, NumPy {numpy.__version__}, "
-        f"SciPy {scipy.__version__}, PyTorch {torch.__version__.split('+')[0]}"
+        f"SciPy {scipy.__version__}, PyTorch {version('torch').split('+')[0]}"
     )
 
 

@@ -124,7 +124,7 @@ def test_repeated_searches_are_bounded(monkeypatch):
     monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
-    body, chosen = shapes.creature(5, resolution=32, faces=1500), [20, 250, 600]
+    body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
     assert searched == list(range(1 + attempts.FRUITLESS_SEARCHES))
     searched.clear()

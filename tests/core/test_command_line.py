@@ -85,22 +85,32 @@ def test_formats_go_by_their_endings(small_ball, tmp_path, mesh_ending, ending):
 
 
 @pytest.mark.slow
-def test_options_reach_the_design(mesh_file, tmp_path):
-    outputs = []
-    for number, options in enumerate(
-        (["--order", "shortest", "--smoothness", "0.2"], ["--method", "nicmm-paper"])
-    ):
-        output = tmp_path / f"{number}.csv"
-        arguments = ["design", str(mesh_file), "--points", "3,60,100,20", "-o", str(output)]
-        assert main([*arguments, *options]) == 0
-        outputs.append(output.read_text())
-    assert outputs[0] != outputs[1]
+@pytest.mark.parametrize(
+    ("flags", "options"),
+    [
+        ("--order shortest", {"order": "shortest"}),
+        ("--smoothness 0.2", {"smoothness": 0.2}),
+        ("--method variational", {"method": "variational"}),
+        ("--open", {"closed": False}),
+    ],
+)
+def test_options_reach_the_design(mesh_file, tmp_path, flags, options):
+    output, chosen = tmp_path / "curve.json", [3, 60, 100, 20]
+    arguments = ["design", str(mesh_file), "--points", "3,60,100,20", "-o", str(output)]
+    assert main([*arguments, *flags.split()]) == 0
+    mesh = read_mesh(mesh_file)
+    points = np.array(json.loads(output.read_text())["points"])
+    expected, plain = (
+        nicmm.design_curve(mesh, chosen, **given).curves[0].points for given in (options, {})
+    )
+    np.testing.assert_allclose(points, expected, rtol=0, atol=1e-9)
+    assert not np.array_equal(expected, plain)
 
 
 @pytest.mark.slow
 def test_alternatives_are_written_beside_the_curve(tmp_path, capsys):
     mesh_path, output = tmp_path / "body.obj", tmp_path / "curve.csv"
-    body = shapes.creature(5, resolution=32, faces=1500)
+    body = shapes.creature(5, resolution=32, faces=1500, subdivisions=1)
     write_mesh(mesh_path, body)
     arguments = ["design", str(mesh_path), "--points", "20,250,600", "-o", str(output)]
     assert main([*arguments, "--alternatives", "2"]) == 0

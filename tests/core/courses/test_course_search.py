@@ -26,7 +26,7 @@ from tests.core.courses.test_hop_graph import LEGS, graph_through
 
 @pytest.fixture(scope="module")
 def body():
-    return shapes.creature(5, resolution=32, faces=1500)
+    return shapes.creature(5, resolution=32, faces=1500, subdivisions=1)
 
 
 def test_combinations_that_cross_cost_more(body):

@@ -5,6 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.coarsening import coarse_start
 from nicmm_core.geometry.numbering import (
     RESOLUTIONS,
     frame_coordinates,
@@ -128,13 +129,14 @@ def test_hash_is_uniform_and_knows_every_bit():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("faces", [500, 4000])
+@pytest.mark.parametrize("subdivisions", [1, 2])
 @pytest.mark.parametrize("closed", [True, False])
-def test_numbers_of_a_mesh_do_not_decide_the_course(faces, closed):
+def test_numbers_of_a_mesh_do_not_decide_the_course(subdivisions, closed):
     """On small meshes and on those with a coarse mesh, and for any order of the points."""
     moved = []
-    for seed in range(4):
-        mesh = shapes.creature(seed, resolution=32, faces=faces)
+    for seed in range(3):
+        mesh = shapes.creature(seed, resolution=32, faces=1000, subdivisions=subdivisions)
+        assert (len(mesh.vertices) > coarse_start.LARGE) == (subdivisions == 2)
         generator = np.random.default_rng(seed)
         chosen = generator.choice(len(mesh.vertices), 5, replace=False)
         curve = nicmm.design_curve(mesh, chosen, order="shortest", closed=closed).curves[0]
@@ -149,8 +151,8 @@ def test_numbers_of_a_mesh_do_not_decide_the_course(faces, closed):
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 def test_motions_and_mirrors_do_not_decide_the_course(mirror):
     moved = []
-    for seed in range(6):
-        mesh = shapes.creature(seed, resolution=32, faces=4000)
+    for seed in range(4):
+        mesh = shapes.creature(seed, resolution=32, faces=1000)
         chosen = np.random.default_rng(seed).choice(len(mesh.vertices), 4, replace=False)
         curve = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]
         matrix = 2.0 * rotation(seed) * [mirror, 1.0, 1.0]
@@ -167,7 +169,7 @@ def test_numbers_do_not_decide_the_course_through_points_inside_faces():
     """Their coordinates differ by rounding errors, so the curves do too, but not the courses."""
     moved = []
     for seed in range(4):
-        mesh = shapes.creature(seed, resolution=32, faces=4000)
+        mesh = shapes.creature(seed, resolution=32, faces=1000)
         points = random_surface_points(mesh, 4, seed).positions(mesh)
         curve = nicmm.design_curve(mesh, points, order="shortest").curves[0]
         other, _ = shuffled(mesh, seed + 1)
