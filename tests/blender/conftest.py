@@ -11,10 +11,12 @@ built for it:
 import os
 import sys
 import tempfile
+from dataclasses import astuple
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import build
@@ -72,3 +74,40 @@ def empty_scene(extension):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.ed.undo_push(message="Start")
     return extension
+
+
+_designs: dict = {}
+
+
+@pytest.fixture
+def remembered_designs(extension, monkeypatch):
+    """Compute equal designs once, for tests of what becomes of a curve in Blender.
+
+    That equal requests get equal curves is tested with the core. Bounded steps, as of a drag, and
+    cancelled designs are not remembered.
+    """
+    plain = extension.core.Designer.design
+
+    def design(self, points, *, progress=None, **options):
+        if options.get("max_iterations") is not None:
+            return plain(self, points, progress=progress, **options)
+        key = _key((self.mesh.vertices, self.mesh.faces, points, sorted(options.items())))
+        if key not in _designs:
+            found = plain(self, points, progress=progress, **options)
+            if found.status is extension.core.Status.CANCELLED:
+                return found
+            _designs[key] = found
+        return _designs[key]
+
+    monkeypatch.setattr(extension.core.Designer, "design", design)
+
+
+def _key(value):
+    """A hashable value that is the same for equal arguments of a design."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.dtype.str, value.tobytes()
+    if isinstance(value, tuple | list):
+        return tuple(_key(each) for each in value)
+    if hasattr(value, "__dataclass_fields__"):
+        return _key(astuple(value))
+    return value

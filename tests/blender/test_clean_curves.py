@@ -10,6 +10,8 @@ from mathutils import Euler
 from tests.blender import scenes
 from tests.blender.test_shown_surface import CHOSEN, curve_deviation, in_world, shown
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 SINGLE = 1e-6
 """Rounding of single precision, in diagonals."""
 

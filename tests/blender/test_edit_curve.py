@@ -8,6 +8,8 @@ import pytest
 
 from tests.blender import scenes
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 ROUNDING = 2e-6
 
 

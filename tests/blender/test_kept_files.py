@@ -9,6 +9,8 @@ import pytest
 
 from tests.blender import scenes
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 KEPT = Path(__file__).parent / "kept"
 FILES = sorted(KEPT.glob("*.blend"))
 CURVES = ("Closed", "Open", "Maps", "Variational", "Sticky", "Tube", "Placed")

@@ -8,6 +8,8 @@ from scipy.spatial import cKDTree
 from tests.blender import scenes
 from tests.blender.test_point_operators import call, content, controls, refusal
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 APART = 0.02
 
 SAME = 1e-3

@@ -9,6 +9,8 @@ import bmesh
 from tests.blender import scenes
 from tests.blender.scenes import evaluated_points, get, triangles
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 ROUNDING = 2e-6
 MODES = pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 

@@ -9,6 +9,8 @@ import pytest
 from tests.blender import scenes
 from tests.blender.test_abuse import DAMAGES
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 ROUNDING = 2e-6
 
 

@@ -12,6 +12,8 @@ from mathutils import Matrix
 from tests.blender import scenes
 from tests.blender.test_shown_surface import in_world
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 OUTPUTS = ("CURVE", "STICKY", "EDGES", "REGION", "PARTS")
 
 

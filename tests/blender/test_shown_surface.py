@@ -11,6 +11,8 @@ from mathutils import Euler
 
 from tests.blender import scenes
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 EXACT = 1e-6
 """Largest distance from the shown surface, in diagonals."""
 

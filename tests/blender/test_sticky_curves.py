@@ -9,6 +9,8 @@ import pytest
 from tests.blender import scenes
 from tests.blender.scenes import evaluated_points, get
 
+pytestmark = pytest.mark.usefixtures("remembered_designs")
+
 ROUNDING = 2e-6
 SIDES = 12
 CLOSED = pytest.mark.parametrize("closed", [True, False], ids=["closed", "open"])
