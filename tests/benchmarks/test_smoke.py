@@ -13,6 +13,7 @@ import pytest
 from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
+from nicmm_core.courses import attempts
 from nicmm_core.network.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
@@ -24,7 +25,8 @@ FEW_MESHES = 6
 
 @pytest.fixture(autouse=True)
 def short_computations(monkeypatch):
-    """Few steps of fine-tuning and of reference curves, and few meshes, which take most time."""
+    """Few attempts, meshes, and steps of fine-tuning and of reference curves; they take longest."""
+    monkeypatch.setattr(attempts, "MOST_WORK", 0)
     monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
     few = list(islice(corpus.defective_meshes(), FEW_MESHES))
     monkeypatch.setattr(corpus, "defective_meshes", lambda: iter(few))
