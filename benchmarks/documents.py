@@ -15,7 +15,16 @@ import numpy as np
 
 from tests.oracles.corpus import DECLINED, DUE, GOOD, WRONG
 
-from . import courses, guarantee, ninth_channel, pretrained_start, report, sharp_edges, transfer
+from . import (
+    courses,
+    fuzz,
+    guarantee,
+    ninth_channel,
+    pretrained_start,
+    report,
+    sharp_edges,
+    transfer,
+)
 from .evidence import ROOT, Record, Results
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -382,11 +391,18 @@ def _messes(results: Results) -> str:
 
 
 def _fuzz(results: Results) -> str:
-    return _item(
+    slow = sum(re.search(r": took \d+ s$", finding) is not None for finding in results["findings"])
+    text = (
         f"`python -m benchmarks fuzz`, hostile input: of {results['cases']:,} cases "
-        f"{_no(len(results['findings']), be='')} caused a crash, a hang, several curves or an "
-        "error that is not the package's own."
+        f"{_no(len(results['findings']) - slow, be='')} caused a crash, a hang, several curves or "
+        "an error that is not the package's own."
     )
+    if slow:
+        text += (
+            f" {slow} answers took more than {fuzz.SLOW:g} seconds of CPU time, at most "
+            f"{results['slowest']:.1f}."
+        )
+    return _item(text)
 
 
 def _no(count: int, be: str = " was") -> str:
