@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, settings
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.courses import course_surface
+from nicmm_core.courses import attempts, course_surface
 
 pytest.register_assert_rewrite("tests.core.checks")
 
@@ -60,3 +60,9 @@ def surface(request) -> nicmm.Mesh:
 def without_courses(monkeypatch):
     """Make curves start from the network's level set, as if no course were found."""
     monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))
+
+
+@pytest.fixture
+def one_attempt(monkeypatch):
+    """Make only the first attempt at each curve, which must be valid too but may bend more."""
+    monkeypatch.setattr(attempts, "MOST_WORK", 0)

@@ -94,7 +94,7 @@ def test_formats_go_by_their_endings(small_ball, tmp_path, mesh_ending, ending):
         ("--open", {"closed": False}),
     ],
 )
-def test_options_reach_the_design(mesh_file, tmp_path, flags, options):
+def test_options_reach_the_design(mesh_file, tmp_path, one_attempt, flags, options):
     output, chosen = tmp_path / "curve.json", [3, 60, 100, 20]
     arguments = ["design", str(mesh_file), "--points", "3,60,100,20", "-o", str(output)]
     assert main([*arguments, *flags.split()]) == 0

@@ -4,21 +4,17 @@ import warnings
 
 import pytest
 
-from nicmm_core.courses import attempts
 from tests.oracles import messes
 
 pytestmark = pytest.mark.slow
 
-COUNT = 150
-
-FEWER_ATTEMPTS = 1_000
-"""`attempts.MOST_WORK` for nine messes of ten: curves must be good after any number of attempts."""
+COUNT = 100
 
 
 @pytest.mark.parametrize("number", range(COUNT))
-def test_a_seeded_mess(number, monkeypatch):
+def test_a_seeded_mess(number, request):
     if number % 10:
-        monkeypatch.setattr(attempts, "MOST_WORK", FEWER_ATTEMPTS)
+        request.getfixturevalue("one_attempt")
     answer = messes.answer(number)
     assert answer.faults == [], answer.kind
 

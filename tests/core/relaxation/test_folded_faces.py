@@ -134,7 +134,7 @@ def test_a_move_to_and_fro_over_a_fold_comes_back(square, surface):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rings", [16, 32])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_on_a_degraded_disc_it_is_the_curve_of_the_clean_one(rings, seed):
     """Displacing vertices within a plane, even across edges, does not change the surface."""
     clean = shapes.disc(rings)

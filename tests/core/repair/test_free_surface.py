@@ -48,6 +48,7 @@ def test_every_method_goes_round(method):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_attempt")
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", range(2))
 def test_no_length_inside_on_any_surface(surface, closed, seed):

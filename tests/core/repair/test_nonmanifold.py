@@ -34,6 +34,7 @@ def first_repair(mesh):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_attempt")
 @pytest.mark.parametrize("request_number", [0, 3])
 @pytest.mark.parametrize("name", MESHES)
 def test_a_good_curve_unless_an_error_is_due(name, request_number):
