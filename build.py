@@ -326,7 +326,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
     test = commands.add_parser("test", help="run every check")
     test.add_argument(
-        "--quick", action="store_true", help="leave out the slow tests: some 90 seconds"
+        "--quick", action="store_true", help="leave out the slow tests: about a minute"
     )
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
