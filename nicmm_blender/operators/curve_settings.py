@@ -139,7 +139,7 @@ def _set_radius(context, curve, value: float) -> None:
 
 def _property(name: str, given):
     """A property that reads a setting from the record of its curve and writes it there."""
-    words = {**given.keywords, "options": set()}  # not animatable, since a change takes effect
+    words = {**given.keywords, "options": set()}  # not animatable: a change designs the curve
     default = words.get("default", "")
     get, put = functools.partial(_read, name=name, default=default), _setter(name)
     if "items" in words:
