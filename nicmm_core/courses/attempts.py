@@ -39,8 +39,8 @@ LEAST_GAIN = 0.02
 MOST_WORK = 3_000
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes (`Work`). It takes about five seconds on most meshes, and up to 15 on rough ones, where searches
-cost more than they count for.
+In moves of all nodes (`Work`). It takes about five seconds on most meshes, and up to 15 on rough
+ones, where searches cost more than they count for.
 """
 
 RESERVED = 800
