@@ -59,20 +59,11 @@ def _checked(mesh: Mesh, option: Option, value: Any) -> Any:
     if option.kind is Kind.WEIGHTS:
         return checked_map(name, value, mesh)
     if option.kind in (Kind.NUMBER, Kind.LENGTH):
-        return _checked_number(option, value)
+        what = "a length" if option.kind is Kind.LENGTH else "a number"
+        return number_between(name, value, *option.limits, what)
     if option.kind is Kind.COUNT:
         return _checked_count(option, value)
     return value
-
-
-def _checked_number(option: Option, value: Any) -> float:
-    """Convert a value to a finite float within the limits of an option."""
-    low, high = option.limits
-    what = "a length" if option.kind is Kind.LENGTH else "a number"
-    number = checked_number(option.name, value, f"{what}{_limits(option)}")
-    if not low <= number <= high:
-        raise ArgumentError(f"{option.name} is {value!r}; pass {what}{_limits(option)}")
-    return number
 
 
 def checked_number(name: str, value: Any, what: str = "a finite number") -> float:
@@ -86,8 +77,27 @@ def checked_number(name: str, value: Any, what: str = "a finite number") -> floa
     return number
 
 
-def _limits(option: Option) -> str:
-    low, high = option.limits
+def number_between(name: str, value: Any, low: float, high: float, what: str = "a number") -> float:
+    """Convert a value to a finite float within limits, or raise an ArgumentError that names them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument.
+    value : object
+    low, high : float
+        Limits, which are allowed values; `high` may be infinite.
+    what : str
+        What the number is, with an article.
+    """
+    wanted = what + _limits(low, high)
+    number = checked_number(name, value, wanted)
+    if not low <= number <= high:
+        raise ArgumentError(f"{name} is {value!r}; pass {wanted}")
+    return number
+
+
+def _limits(low: float, high: float) -> str:
     return f" of at least {low:g}" if np.isinf(high) else f" in {low:g} … {high:g}"
 
 
@@ -95,7 +105,9 @@ def _checked_count(option: Option, value: Any) -> int:
     """Convert a value to an int within the limits of an option."""
     low, high = option.limits
     if not (_is_whole(value) and low <= value <= high):
-        raise ArgumentError(f"{option.name} is {value!r}; pass a whole number{_limits(option)}")
+        raise ArgumentError(
+            f"{option.name} is {value!r}; pass a whole number{_limits(*option.limits)}"
+        )
     return int(value)
 
 

@@ -76,6 +76,7 @@ def extract_curves(
     nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
     for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
+        checkpoint()
         chain, along = _directed(chain, along, closed, nodes, control_vertices)
         parent = working.parent_face[segment_face[along]]
         # No segment starts at the last point of an open chain, so it gets the last segment's face.

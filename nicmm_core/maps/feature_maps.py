@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arguments import checked_number, checked_vertex_values
+from ..arguments import checked_number, checked_vertex_values, number_between
 from ..errors import ArgumentError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
@@ -133,9 +133,7 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     ArgumentError
         If the angle is not in 0 … π.
     """
-    limit = checked_number("angle", angle)
-    if not 0.0 <= limit <= math.pi:
-        raise ArgumentError(f"angle is {angle!r}; pass radians in 0 … π")
+    limit = number_between("angle", angle, 0.0, math.pi, "an angle in radians")
     solid = np.flatnonzero(mesh.face_areas > 0.0)
     faces, normals = mesh.faces[solid], mesh.face_normals[solid]
     start, end = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()

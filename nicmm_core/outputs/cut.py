@@ -14,7 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import ArgumentError, CurveError
+from ..arguments import number_between
+from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve
 from ..geometry.mesh import Mesh, adjacent_sides, sides_among
@@ -181,10 +182,8 @@ def cut_mesh(
     >>> len(cut.faces) > len(mesh.faces)
     True
     """
-    if not 0.0 <= snap <= LARGEST_SNAP:
-        raise ArgumentError(f"snap is {snap!r}; pass a number in 0 … {LARGEST_SNAP:g}")
-    if not 0.0 <= deviation < np.inf:
-        raise ArgumentError(f"deviation is {deviation!r}; pass a length of at least 0")
+    snap = number_between("snap", snap, 0.0, LARGEST_SNAP)
+    deviation = number_between("deviation", deviation, 0.0, np.inf, "a length")
     curve, segment_faces = checked_curve(mesh, curve)
     faces, barycentric = curve.faces, curve.barycentric
     must_keep = np.zeros(len(faces), dtype=bool)

@@ -313,7 +313,10 @@ def no_positions(faces, barycentric):
     )
 
 
-@pytest.mark.parametrize(("name", "value"), [("snap", -0.1), ("snap", 0.5), ("deviation", -1.0)])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("snap", -0.1), ("snap", 0.5), ("snap", "x"), ("deviation", -1.0), ("deviation", None)],
+)
 def test_arguments_out_of_range(name, value):
     mesh = grid(1)
     curve = curve_at(mesh, [(0, (1.0, 0, 0)), (0, (0, 0, 1.0))], False)
