@@ -15,7 +15,15 @@ from functools import cached_property, partial
 import numpy as np
 
 from .coarsening.coarse_start import CoarseStarts
-from .courses.attempts import FURTHER_SEARCHES, Attempts
+from .courses.attempts import (
+    COURSES_OF_A_PART,
+    FURTHER_SEARCHES,
+    LEAST_GAIN,
+    MOST_FAILURES,
+    SEARCHES_FOR_PARTS,
+    Attempts,
+)
+from .courses.bent_part import BentPart, bent_part, request_for_part, with_part
 from .courses.comparison import is_apart
 from .courses.course_surface import CourseSurface
 from .design_result import Design
@@ -202,13 +210,19 @@ class SurfaceDesigner:
         long, so they are made only for alternatives.
         """
         config = _config(request)
-        further = [self._course_starts(request, seed) for seed in FURTHER_SEEDS]
+        further = [self._course_starts(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         for search in further if by_course else ():
             if not attempts.another_search_pays():
                 break
             attempts.searches += 1
-            yield from ((start, attempts.limited(config)) for start in itertools.islice(search, 1))
+            start = next(search, None)
+            if start is None:
+                # On rough meshes hardly any course is simple, and each failure takes long.
+                break
+            yield start, attempts.limited(config)
             attempts.end_search()
+        if by_course:
+            yield from self._starts_with_other_parts(request, starts, attempts)
         if attempts.tightening_pays():
             yield starts[attempts.best], attempts.limited(TIGHTENED)
         if by_course and attempts.network_pays():
@@ -222,12 +236,67 @@ class SurfaceDesigner:
             most = MAX_COURSES_RELAXED + 2 * request.alternatives
             yield from ((start, config) for start in itertools.islice(new, most))
 
-    def _course_starts(self, request: Request, seed: int = 0) -> Iterator[_Start]:
-        """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths."""
+    def _starts_with_other_parts(
+        self, request: Request, starts: list[_Start], attempts: Attempts
+    ) -> Iterator[tuple[_Start, RelaxationConfig]]:
+        """The best curve with other courses in the parts that bend most, as long as it pays."""
+        tried: list[FloatArray] = []
+        fruitless = 0
+        for _ in range(SEARCHES_FOR_PARTS):
+            if not attempts.part_pays(fruitless):
+                break
+            count, best = len(attempts.relaxed), attempts.best
+            curve = attempts.curves[best]
+            part = bent_part(curve, tried)
+            if part is None:
+                break
+            tried.append(part.middle)
+            attempts.searches += 1
+            courses = self._courses_of_part(request, starts[best], curve, part)
+            for start in itertools.islice(courses, COURSES_OF_A_PART):
+                yield start, attempts.limited(WARM)
+            before, after = attempts.least_energies(count)
+            if after < (1.0 - LEAST_GAIN) * before:
+                tried, fruitless = [], 0
+            else:
+                fruitless += 1
+
+    def _courses_of_part(
+        self, request: Request, start: _Start, curve: NodedCurve, part: BentPart
+    ) -> Iterator[_Start]:
+        """A curve with other courses of one part that are apart from each other, the best first."""
+        found: list[NodedCurve] = []
+        part_request = request_for_part(request, curve, part)
+        for course in self._course_starts(part_request, most_failures=MOST_FAILURES):
+            if not _is_apart(course, found):
+                continue
+            assert isinstance(course.curve, NodedCurve)
+            changed = with_part(start.surface, curve, part, course.curve)
+            if changed is not None:
+                found.append(course.curve)
+                yield replace(start, curve=changed)
+
+    def _course_starts(
+        self, request: Request, seed: int = 0, most_failures: int | None = None
+    ) -> Iterator[_Start]:
+        """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
+
+        The search ends after `most_failures` courses in a row that are not simple.
+        """
+        failures = 0
+        for start in self._joined_courses(request, seed):
+            failures = failures + 1 if start is None else 0
+            if start is not None:
+                yield start
+            elif failures == most_failures:
+                break
+
+    def _joined_courses(self, request: Request, seed: int) -> Iterator[_Start | None]:
+        """Courses joined on the mesh; None for each course that is not simple there."""
         there, unit = self._curve_surface(request), self._unit(request)
         if self._coarse_starts.is_large(request):
             for found in self._coarse_starts.courses(request, seed):
-                yield _Start(found.curve, found.visited, there, unit)
+                yield None if found is None else _Start(found.curve, found.visited, there, unit)
             return
         for course in self._courses.courses(request, seed):
             checkpoint()
@@ -238,8 +307,7 @@ class SurfaceDesigner:
                 request.points[course.visited],
                 request.closed,
             )
-            if curve is not None:
-                yield _Start(curve, course.visited, there, unit)
+            yield None if curve is None else _Start(curve, course.visited, there, unit)
 
     def _start_by_network(self, request: Request) -> _Start:
         """The zero set of the network's level set, or the path if the zero set is not simple."""

@@ -96,8 +96,8 @@ class CoarseStarts:
         self._made: dict[tuple[int, int], _CoarseSurface] = {}
         self._large: dict[int, bool] = {}
 
-    def courses(self, request: Request, seed: int = 0) -> Iterator[CoarseStart]:
-        """Yield the courses on a coarse mesh that are simple on the fine mesh, the best first.
+    def courses(self, request: Request, seed: int = 0) -> Iterator[CoarseStart | None]:
+        """Yield the courses on a coarse mesh, the best first; None if not simple on the fine mesh.
 
         A small mesh has no coarse mesh and so no courses, and none may be found where points are
         close together. `seed` is that of `CourseSurface.courses`.
@@ -114,8 +114,7 @@ class CoarseStarts:
                 nodes = noded(level.surface, places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
                 curve = nodes_on_fine_mesh(self._fine, level.coarse, nodes, controls)
-                if curve is not None:
-                    yield CoarseStart(curve, course.visited)
+                yield None if curve is None else CoarseStart(curve, course.visited)
 
     def by_network(self, request: Request) -> CoarseStart | None:
         """The curve of the coarsest mesh on which the network finds one, or None.

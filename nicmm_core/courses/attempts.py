@@ -1,7 +1,8 @@
 """Decides whether to make another attempt at a curve, from the curves relaxed so far.
 
 The farther a curve winds around limbs, the more courses a search misses. Searches with other
-lengths find others, so the search is repeated while that pays.
+lengths find others, so the search is repeated while that pays. Then the parts that bend most are
+searched for again.
 """
 
 from __future__ import annotations
@@ -27,20 +28,31 @@ EXTREMELY_BENT = 80.0
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 10
-"""Greatest number of repeated searches."""
+FURTHER_SEARCHES = 3
+"""Greatest number of repeated searches for the whole curve."""
 
 FRUITLESS_SEARCHES = 2
 """Number of consecutive searches with little gain after which no further one is made."""
 
+PARTLY_BENT = 30.0
+"""L ∮ κ_g² ds above which the parts that bend most are searched for again."""
+
+SEARCHES_FOR_PARTS, COURSES_OF_A_PART = 8, 2
+"""Greatest number of such searches, and of courses relaxed after each of them."""
+
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_WORK = 3_000
+MOST_FAILURES = 8
+"""Number of courses in a row that are not simple on the mesh after which a repeated search ends.
+
+On rough meshes each of them takes long.
+"""
+
+MOST_WORK = 2_000
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes (`Work`). It takes about five seconds on most meshes, and up to 15 on rough
-ones, where searches cost more than they count for.
+In moves of all nodes (`Work`). It takes about three seconds, and longer on rough meshes.
 """
 
 RESERVED = 800
@@ -61,7 +73,7 @@ class Attempts:
     n_points : int
         Number of control points and via points.
     searches : int
-        Number of searches for courses begun so far.
+        Number of searches for courses begun so far, those for parts included.
     relaxed : list of Relaxed
         The result of each attempt.
     relaxed_after : list of int
@@ -105,6 +117,23 @@ class Attempts:
         fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
         promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
+
+    def part_pays(self, fruitless: int) -> bool:
+        """Whether another search for a part of the best curve is worthwhile and affordable.
+
+        Parameters
+        ----------
+        fruitless : int
+            Number of consecutive searches for parts so far that have gained little.
+        """
+        bent = scaled_bending(self.curves[self.best]) > PARTLY_BENT
+        affordable = self._is_affordable(self._work_of_search)
+        return bent and fruitless < FRUITLESS_SEARCHES and affordable
+
+    def least_energies(self, count: int) -> tuple[float, float]:
+        """The least energy of the first `count` results, and that of all results."""
+        energies = energies_of(self.surface, self.curves, self.smoothness)
+        return min(energies[:count]), min(energies)
 
     def tightening_pays(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""

@@ -111,9 +111,14 @@ def bending_energy(nodes: Nodes) -> float:
     return float(curve_bending(nodes)[0])
 
 
+def node_bending(nodes: Nodes) -> FloatArray:
+    """κ_g² ds at each node, (n,); zero at the ends of open curves."""
+    return nodes.turns.angle**2 / nodes.ds
+
+
 def curve_bending(nodes: Nodes) -> FloatArray:
     """∮ κ_g² ds of each curve, (c,), in 1/length."""
-    return nodes.by_curve(_bending(nodes)).sum(axis=1)
+    return nodes.by_curve(node_bending(nodes)).sum(axis=1)
 
 
 def feature_energy(nodes: Nodes) -> float:
@@ -164,7 +169,7 @@ def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = N
 
     Contacts are computed unless they are given.
     """
-    at_nodes = _bending(nodes) + _tension(nodes, weights) * nodes.ds
+    at_nodes = node_bending(nodes) + _tension(nodes, weights) * nodes.ds
     if weights.held is not None:
         in_lanes = np.minimum(nodes.phi_fea, 1.0) ** 2 - 1.0
         at_nodes += weights.feature * in_lanes * weights.held
@@ -190,11 +195,6 @@ def _tension(nodes: Nodes, weights: Balance) -> FloatArray:
     """Tension at each node, (n,): τ, plus τ_fea times the excess φ_fea² - 1 in an obstacle."""
     excess = np.maximum(nodes.phi_fea**2 - 1.0, 0.0)
     return weights.tension + weights.feature * excess
-
-
-def _bending(nodes: Nodes) -> FloatArray:
-    """κ_g² ds at each node, (n,); zero at the ends of open curves."""
-    return nodes.turns.angle**2 / nodes.ds
 
 
 def _no_pairs() -> IntArray:

@@ -116,11 +116,12 @@ def test_repeated_searches_are_bounded(monkeypatch):
     searched = []
     seek = surface_designer.SurfaceDesigner._course_starts
 
-    def counted(self, request, seed=0):
+    def counted(self, request, seed=0, most_failures=None):
         searched.append(seed)  # runs when the generator is first advanced
-        yield from seek(self, request, seed)
+        yield from seek(self, request, seed, most_failures)
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
+    monkeypatch.setattr(surface_designer, "SEARCHES_FOR_PARTS", 0)
     monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
