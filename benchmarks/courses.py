@@ -326,7 +326,7 @@ def _random_field(generator: np.random.Generator) -> Iterator[None]:
 
 @contextmanager
 def _random_weights(generator: np.random.Generator) -> Iterator[None]:
-    """Multiply the lengths in hop graphs by random factors, and search only once."""
+    """Multiply the lengths in hop graphs by random factors, and search only once, without parts."""
     build = course_search.with_control_points
 
     def with_weights(graph, points, along, legs, factor, tension):  # type: ignore[no-untyped-def]
@@ -337,6 +337,7 @@ def _random_weights(generator: np.random.Generator) -> Iterator[None]:
     with (
         mock.patch.object(course_search, "with_control_points", with_weights),
         mock.patch.object(surface_designer, "FURTHER_SEEDS", ()),
+        mock.patch.object(surface_designer, "SEARCHES_FOR_PARTS", 0),
     ):
         yield
 
