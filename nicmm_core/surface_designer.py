@@ -18,7 +18,6 @@ from .coarsening.coarse_start import CoarseStarts
 from .courses.attempts import (
     COURSES_OF_A_PART,
     FURTHER_SEARCHES,
-    LEAST_GAIN,
     MOST_FAILURES,
     SEARCHES_FOR_PARTS,
     Attempts,
@@ -241,11 +240,11 @@ class SurfaceDesigner:
     ) -> Iterator[tuple[_Start, RelaxationConfig]]:
         """The best curve with other courses in the parts that bend most, as long as it pays."""
         tried: list[FloatArray] = []
-        fruitless = 0
+        attempts.fruitless = 0  # whether parts pay does not follow from the searches before
         for _ in range(SEARCHES_FOR_PARTS):
-            if not attempts.part_pays(fruitless):
+            if not attempts.part_pays():
                 break
-            count, best = len(attempts.relaxed), attempts.best
+            best = attempts.best
             curve = attempts.curves[best]
             part = bent_part(curve, tried)
             if part is None:
@@ -255,11 +254,9 @@ class SurfaceDesigner:
             courses = self._courses_of_part(request, starts[best], curve, part)
             for start in itertools.islice(courses, COURSES_OF_A_PART):
                 yield start, attempts.limited(WARM)
-            before, after = attempts.least_energies(count)
-            if after < (1.0 - LEAST_GAIN) * before:
-                tried, fruitless = [], 0
-            else:
-                fruitless += 1
+            attempts.end_search()
+            if attempts.fruitless == 0:
+                tried = []  # the best curve is another one now
 
     def _courses_of_part(
         self, request: Request, start: _Start, curve: NodedCurve, part: BentPart

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
@@ -32,7 +30,10 @@ FURTHER_SEARCHES = 3
 """Greatest number of repeated searches for the whole curve."""
 
 FRUITLESS_SEARCHES = 2
-"""Number of consecutive searches with little gain after which no further one is made."""
+"""Number of consecutive searches with little gain after which no further one is made.
+
+Searches for parts end after one of them unless the curve is extremely bent.
+"""
 
 PARTLY_BENT = 30.0
 """L ∮ κ_g² ds above which the parts that bend most are searched for again."""
@@ -43,7 +44,7 @@ SEARCHES_FOR_PARTS, COURSES_OF_A_PART = 8, 2
 LEAST_GAIN = 0.02
 """Relative decrease of the energy below which a search counts as fruitless."""
 
-MOST_FAILURES = 8
+MOST_FAILURES = 4
 """Number of courses in a row that are not simple on the mesh after which a repeated search ends.
 
 On rough meshes each of them takes long.
@@ -76,8 +77,8 @@ class Attempts:
         Number of searches for courses begun so far, those for parts included.
     relaxed : list of Relaxed
         The result of each attempt.
-    relaxed_after : list of int
-        Number of results after each completed search.
+    fruitless : int
+        Number of consecutive searches, up to the last one completed, that have gained little.
     """
 
     surface: CurveSurface
@@ -85,7 +86,8 @@ class Attempts:
     n_points: int
     searches: int = 1
     relaxed: list[Relaxed] = field(default_factory=list)
-    relaxed_after: list[int] = field(default_factory=list)
+    fruitless: int = 0
+    _relaxed_before: int = 0  # number of results when the last search ended
 
     @property
     def curves(self) -> list[NodedCurve]:
@@ -95,45 +97,38 @@ class Attempts:
     @property
     def best(self) -> int:
         """Index of the curve of least energy."""
-        return self.by_energy()[0]
+        energies = energies_of(self.surface, self.curves, self.smoothness)
+        return energies.index(min(energies))
 
     def by_energy(self) -> list[int]:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self.surface, self.curves, self.smoothness)
 
     def end_search(self) -> None:
-        """Record that a search has ended, with or without another relaxed curve."""
-        self.relaxed_after.append(len(self.relaxed))
+        """Record that the courses found by a search have been relaxed."""
+        before = self._relaxed_before
+        if before:
+            energies = energies_of(self.surface, self.curves, self.smoothness)
+            gained = min(energies) < (1.0 - LEAST_GAIN) * min(energies[:before])
+            self.fruitless = 0 if gained else self.fruitless + 1
+        self._relaxed_before = len(self.relaxed)
 
     def another_search_pays(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
         A search is worthwhile if the best curve bends, unless the last ones have gained little.
         """
-        energies = energies_of(self.surface, self.curves, self.smoothness)
-        bending = scaled_bending(self.curves[int(np.argmin(energies))])
-        lowest = np.minimum.accumulate(energies)[np.array(self.relaxed_after) - 1]
-        gains = lowest[1:] < (1.0 - LEAST_GAIN) * lowest[:-1]
-        fruitless = len(gains) >= FRUITLESS_SEARCHES and not gains[-FRUITLESS_SEARCHES:].any()
+        bending = self._bending
+        fruitless = self.fruitless >= FRUITLESS_SEARCHES
         promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
-    def part_pays(self, fruitless: int) -> bool:
-        """Whether another search for a part of the best curve is worthwhile and affordable.
-
-        Parameters
-        ----------
-        fruitless : int
-            Number of consecutive searches for parts so far that have gained little.
-        """
-        bent = scaled_bending(self.curves[self.best]) > PARTLY_BENT
-        affordable = self._is_affordable(self._work_of_search)
-        return bent and fruitless < FRUITLESS_SEARCHES and affordable
-
-    def least_energies(self, count: int) -> tuple[float, float]:
-        """The least energy of the first `count` results, and that of all results."""
-        energies = energies_of(self.surface, self.curves, self.smoothness)
-        return min(energies[:count]), min(energies)
+    def part_pays(self) -> bool:
+        """Whether another search for a part of the best curve is worthwhile and affordable."""
+        bending = self._bending
+        allowed = FRUITLESS_SEARCHES if bending > EXTREMELY_BENT else 1
+        promising = bending > PARTLY_BENT and self.fruitless < allowed
+        return promising and self._is_affordable(self._work_of_search)
 
     def tightening_pays(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
@@ -150,7 +145,11 @@ class Attempts:
 
     @property
     def _is_kinked(self) -> bool:
-        return scaled_bending(self.curves[self.best]) > KINKED
+        return self._bending > KINKED
+
+    @property
+    def _bending(self) -> float:
+        return scaled_bending(self.curves[self.best])
 
     @property
     def _work(self) -> float:

@@ -84,7 +84,7 @@ def bent_part(curve: NodedCurve, tried: Sequence[FloatArray]) -> BentPart | None
     untried = np.ones(count, dtype=bool)
     for position in tried:
         untried &= np.linalg.norm(nodes.positions - position, axis=1) >= APART * whole
-    # A closed curve is run through three times, and parts begin in the second time.
+    # Three turns of a closed curve; the middle of a part lies in the second one.
     turns = 3 if curve.closed else 1
     arc = np.cumsum(np.tile(steps, turns)) - np.tile(steps, turns)
     own = np.arange(count) + (count if curve.closed else 0)
