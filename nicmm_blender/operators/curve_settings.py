@@ -12,7 +12,7 @@ import bpy
 from bpy.props import PointerProperty
 
 from .. import settings
-from ..outputs import curve_object, edited_curve, sticky_curves, writing
+from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError
 from .long_solves import answer_all
@@ -95,7 +95,9 @@ def _change(curve, name: str, value) -> None:
     if name in DRAWING:
         opened = edited_curve.open_curve(context, curve)
         drawn = curve_record.drawn_as(curve) or {"spline": "EXACT", "offset": 0.0}
-        curves = curve_record.read_curves(curve, opened.surface) if _has_curve(curve) else []
+        curves = (
+            curve_record.read_curves(curve, opened.surface) if curve_record.has_curve(curve) else []
+        )
         record = curve[curve_record.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
         writing.redraw(curve, opened.surface, curves)
@@ -108,31 +110,17 @@ def _change(curve, name: str, value) -> None:
     edited_curve.write(context, opened, opened.points, curves, None)
 
 
-def _has_curve(curve) -> bool:
-    return curve_record.has_curve(curve)
-
-
 def _get_radius(group) -> float:
     curve = group.id_data
     mesh_object = curve_record.mesh_of(curve) if curve_record.has_record(curve) else None
     if mesh_object is None:
         return 0.0
-    return _radius_in_object_space(curve) * curve_object.scale_in_scene(curve, mesh_object)
-
-
-def _radius_in_object_space(curve) -> float:
-    if curve.type == "CURVES":
-        return sticky_curves.radius_of(curve.data)
-    return curve.data.bevel_depth
+    return tube_radius.radius_of(curve) * curve_object.scale_in_scene(curve, mesh_object)
 
 
 def _set_radius(context, curve, value: float) -> None:
     mesh_object = curve_record.mesh_in_view_layer(context, curve)
-    radius = value / curve_object.scale_in_scene(curve, mesh_object)
-    if curve.type == "CURVES":
-        sticky_curves.set_radius(curve.data, radius)
-    else:
-        curve.data.bevel_depth = radius
+    tube_radius.set_radius(curve, value / curve_object.scale_in_scene(curve, mesh_object))
     curve.data.update_tag()
     surface_cache.note_change()
 

@@ -32,8 +32,13 @@ def new_object(mesh_object, surface, splines, radius: float):
 
 
 def parent_to_mesh(curve_object, mesh_object, surface) -> None:
-    """Make an object a child of the mesh, in the mesh's local space or in an unscaled one."""
+    """Make an object a child of the mesh, in the mesh's local space or in an unscaled one.
+
+    The object loses transforms of its own. It gets some when transforms of the mesh are applied,
+    since Blender then keeps the place of its children.
+    """
     curve_object.parent = mesh_object
+    curve_object.matrix_basis = Matrix()
     if surface.keeps_proportions:
         curve_object.matrix_parent_inverse = Matrix()
         return
@@ -65,15 +70,19 @@ def scale_of(curve_object, surface) -> float:
     """Length in the scene of one unit of the space of a curve object."""
     if not is_child(curve_object):
         return _mean_scale(curve_object.matrix_world)
-    inverse = np.array(curve_object.matrix_parent_inverse)[:3, :3]
-    return surface.scale * float(np.cbrt(abs(np.linalg.det(inverse))))
+    return surface.scale * _mean_scale(_to_mesh_space(curve_object))
 
 
 def scale_in_scene(curve_object, mesh_object) -> float:
     """The same as `scale_of`, from the mesh object instead of its surface."""
     if not is_child(curve_object):
         return _mean_scale(curve_object.matrix_world)
-    return _mean_scale(mesh_object.matrix_world @ curve_object.matrix_parent_inverse)
+    return _mean_scale(mesh_object.matrix_world @ _to_mesh_space(curve_object))
+
+
+def _to_mesh_space(child) -> Matrix:
+    """The matrix from the space of a child of the mesh to the mesh's local space."""
+    return child.matrix_parent_inverse @ child.matrix_basis
 
 
 def _mean_scale(matrix) -> float:
@@ -83,9 +92,10 @@ def _mean_scale(matrix) -> float:
 def to_object_space(curve_object, points: np.ndarray) -> np.ndarray:
     """Transform points (n, 3) from the mesh's local space to the space of a curve object."""
     if is_child(curve_object):
-        if curve_object.matrix_parent_inverse == Matrix():
+        to_mesh = _to_mesh_space(curve_object)
+        if to_mesh == Matrix():
             return points
-        to_curve = np.linalg.inv(np.array(curve_object.matrix_parent_inverse))
+        to_curve = np.array(to_mesh.inverted_safe())
     else:
         in_world = np.array(_mesh_of(curve_object).matrix_world)
         to_curve = np.array(curve_object.matrix_world.inverted_safe()) @ in_world

@@ -9,7 +9,7 @@ import bmesh
 
 from ..scene import curve_record
 from ..scene.messages import InputError, counted, sentence
-from . import curve_object, mesh_cut, sticky_curves
+from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
 SEPARATE = ("CURVE", "STICKY")
@@ -85,14 +85,25 @@ def redraw(drawn, surface, curves) -> None:
     if kind is None:  # an object of an earlier version is in the space of its mesh
         kind = {"spline": EXACT, "offset": 0.0}
     elif curve_object.is_child(drawn):
-        curve_object.parent_to_mesh(drawn, drawn.parent, surface)
-    scale = curve_object.scale_of(drawn, surface)
+        _parent_again(drawn, surface)
+    radius = tube_radius.radius_of(drawn) * curve_object.scale_of(drawn, surface)
+    drawing = Drawing(radius=radius, **kind)
     if drawn.type == "CURVES":
-        radius = sticky_curves.radius_of(drawn.data)
-        sticky_curves.write(drawn, surface, curves, Drawing(radius=radius * scale, **kind))
+        sticky_curves.write(drawn, surface, curves, drawing)
     else:
-        drawing = Drawing(radius=drawn.data.bevel_depth * scale, **kind)
         curve_object.write_splines(drawn, splines(surface, curves, drawing))
+
+
+def _parent_again(drawn, surface) -> None:
+    """Put a child of the mesh in its place again; its radius in the scene is kept.
+
+    The place depends on the scale of the mesh. Applying transforms of the mesh changes it, too.
+    """
+    before = curve_object.scale_of(drawn, surface)
+    curve_object.parent_to_mesh(drawn, drawn.parent, surface)
+    after = curve_object.scale_of(drawn, surface)
+    if abs(after / before - 1.0) > curve_object.SAME_MATRIX:
+        tube_radius.set_radius(drawn, tube_radius.radius_of(drawn) * before / after)
 
 
 def show_unfinished(drawn, surface, curve) -> None:

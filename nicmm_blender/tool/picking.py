@@ -227,12 +227,9 @@ def _uses_modifiers(context, curve) -> bool:
 
 def radius_of(curve, surface) -> float:
     """How far a curve object reaches from its line, in the local space of the mesh."""
-    from ..outputs import curve_object, sticky_curves
+    from ..outputs import curve_object, tube_radius
 
-    if curve.type == "CURVES":
-        radius = sticky_curves.radius_of(curve.data)
-    else:
-        radius = curve.data.bevel_depth
+    radius = tube_radius.radius_of(curve)
     drawn = curve_record.drawn_as(curve)
     offset = 0.0 if drawn is None else abs(drawn["offset"])
     return (radius * curve_object.scale_of(curve, surface) + offset) / surface.scale
