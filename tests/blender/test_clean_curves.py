@@ -240,7 +240,7 @@ def test_a_converted_curve_is_cut_exactly(empty_scene):
 
 
 @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
-@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 0.5, 2.0)])
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 0.5, 2.0), (-1.0, 1.0, 1.0)])
 def test_a_curve_stays_in_place_when_transforms_are_applied(empty_scene, scale, output):
     """Blender compensates for applied transforms of the mesh by transforms of its children."""
     ball = scenes.sphere()
@@ -267,6 +267,6 @@ def radius_in_scene(curve):
         local = scenes.get(curve.data.attributes["radius"].data, "value", 1).max()
     else:
         local = curve.data.bevel_depth
-    scale = np.array(curve.matrix_world.to_scale())
+    scale = np.abs(np.array(curve.matrix_world.to_scale()))
     np.testing.assert_allclose(scale, scale.mean(), rtol=1e-4)  # the tube is round
     return float(local * scale.mean())
