@@ -15,6 +15,7 @@ from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError
+from ..scene.surface import vertex_group
 from .long_solves import answer_all
 
 COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
@@ -104,10 +105,19 @@ def _change(curve, name: str, value) -> None:
         surface_cache.note_change()
         return
     wanted = replace(curve_settings, **{name: value})
+    if name not in edited_curve.MAPS:
+        _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
     opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)
     curves = edited_curve.curves_of(answer_all(requests, lambda _fraction, _points: True))
     edited_curve.write(context, opened, opened.points, curves, None)
+
+
+def _check_maps(mesh_object, wanted) -> None:
+    """Raise an error if a map no longer exists; another setting would drop it otherwise."""
+    for name in edited_curve.MAPS:
+        if getattr(wanted, name):
+            vertex_group(mesh_object, getattr(wanted, name))
 
 
 def _get_radius(group) -> float:

@@ -14,9 +14,6 @@ from mathutils import Matrix
 from ..scene import curve_record
 from .clean_curves import Knots
 
-SAME_MATRIX = 1e-5
-"""Greatest difference of entries of matrices in single precision that should be equal."""
-
 
 def new_object(mesh_object, surface, splines, radius: float):
     """Create a curve object from splines of `clean_curves`; the radius is in scene units."""
@@ -51,19 +48,10 @@ def parent_to_mesh(curve_object, mesh_object, surface) -> None:
 
 
 def is_child(curve_object) -> bool:
-    """Whether the parent of an object is its mesh, and was set by `parent_to_mesh`.
-
-    That function sets the inverse of a stretch without rotation or translation. Blender's own
-    operator sets the inverse of the placement of the parent.
-    """
-    if curve_object.parent is None or curve_object.parent != _mesh_of(curve_object):
-        return False
-    inverse = np.array(curve_object.matrix_parent_inverse)
-    stretch, size = inverse[:3, :3], np.abs(inverse[:3, :3]).max()
-    return bool(
-        np.abs(inverse[:3, 3]).max() <= SAME_MATRIX
-        and np.abs(stretch - stretch.T).max() <= SAME_MATRIX * size
-    )
+    """Whether the parent of an object is its mesh as a whole, and not a vertex of it."""
+    parent = curve_object.parent
+    whole = curve_object.parent_type == "OBJECT"
+    return parent is not None and whole and parent == _mesh_of(curve_object)
 
 
 def scale_of(curve_object, surface) -> float:
@@ -122,6 +110,13 @@ def write_splines(curve_object, splines) -> None:
         spline.use_cyclic_u = given.closed
         if number < len(before):
             before[number].give_to(spline)
+
+
+def largest_point_radius(curve_object) -> float:
+    """The largest radius of the points, a factor of the bevel depth; 1 if there is none."""
+    splines = curve_object.data.splines
+    radii = [_get(_points_of(spline), "radius").max(initial=0.0) for spline in splines]
+    return float(max(radii, default=0.0)) or 1.0
 
 
 def _poly_spline(curve_object, polyline):
@@ -208,17 +203,19 @@ def place(context, mesh_object, curve_object) -> None:
 def link(context, mesh_object, new_object) -> None:
     """Link a new object to the collections of the mesh, and add it to an active local view."""
     for collection in _collections(context, mesh_object):
-        collection.objects.link(new_object)
+        if collection not in new_object.users_collection:
+            collection.objects.link(new_object)
     if getattr(context.space_data, "local_view", None):
         new_object.local_view_set(context.space_data, True)
 
 
 def _collections(context, mesh_object):
     """The collections of the mesh, or the scene collection if all belong to other files."""
+    physics = getattr(context.scene.rigidbody_world, "collection", None)
     editable = [
         found
         for found in mesh_object.users_collection
-        if found.library is None and found.override_library is None
+        if found.library is None and found.override_library is None and found != physics
     ]
     return editable or [context.scene.collection]
 

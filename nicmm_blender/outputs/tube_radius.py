@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The radius of the tube of a curve object of either type, in the space of the object."""
+"""The largest radius of the tube of a curve object of either type, in the space of the object."""
 
-from . import sticky_curves
+from . import curve_object, sticky_curves
 
 
 def radius_of(drawn) -> float:
-    """The radius of a curve object; of hair curves, the largest radius of their points."""
+    """The radius of a curve object at its thickest point."""
     if drawn.type == "CURVES":
         return sticky_curves.radius_of(drawn.data)
-    return drawn.data.bevel_depth
+    return drawn.data.bevel_depth * curve_object.largest_point_radius(drawn)
 
 
 def set_radius(drawn, radius: float) -> None:
-    """Set the radius of a curve object; the radii of hair curves are scaled."""
+    """Set the radius of a curve object at its thickest point; the others keep their proportions."""
     if drawn.type == "CURVES":
         sticky_curves.set_radius(drawn.data, radius)
     else:
-        drawn.data.bevel_depth = radius
+        drawn.data.bevel_depth = radius / curve_object.largest_point_radius(drawn)

@@ -15,6 +15,9 @@ from .clean_curves import EXACT, Drawing, automatic_radius, splines
 SEPARATE = ("CURVE", "STICKY")
 """Outputs that are separate objects."""
 
+SAME_SCALE = 1e-5
+"""Relative difference of scales in single precision that should be equal."""
+
 FACE_SETS = ".sculpt_face_set"
 """Blender's attribute for face sets."""
 
@@ -102,7 +105,7 @@ def _parent_again(drawn, surface) -> None:
     before = curve_object.scale_of(drawn, surface)
     curve_object.parent_to_mesh(drawn, drawn.parent, surface)
     after = curve_object.scale_of(drawn, surface)
-    if abs(after / before - 1.0) > curve_object.SAME_MATRIX:
+    if abs(after / before - 1.0) > SAME_SCALE:
         tube_radius.set_radius(drawn, tube_radius.radius_of(drawn) * before / after)
 
 
@@ -136,6 +139,17 @@ def check_replaceable(designed) -> None:
         )
     if designed.mode != "OBJECT":
         raise InputError(f'"{designed.name}" is being edited. Switch to Object Mode first')
+    hair = designed.type == "CURVES"
+    if not hair and designed.data.shape_keys is not None:
+        raise InputError(
+            f'"{designed.name}" has shape keys, which would hide its new points. Remove them first'
+        )
+    strands = designed.data.curves if hair else designed.data.splines
+    if len(strands) > max(1, curve_record.number_of_curves(designed)):
+        raise InputError(
+            f'"{designed.name}" also contains splines that were not designed. Separate them first '
+            "(Curve > Separate in Edit Mode)"
+        )
 
 
 def replace(designed, request, answer) -> None:

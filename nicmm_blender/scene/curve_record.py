@@ -31,6 +31,9 @@ VERSION = 2
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
 of version 1 do not store whether modifiers are used."""
 
+SAME_PLACE = 1e-5
+"""Distance, in diagonals of the mesh, up to which a control point counts as not moved."""
+
 DIGEST_KEY = "nicmm_designed_on"
 """Custom property of the object's data that holds the digest at the time of the design."""
 
@@ -155,7 +158,8 @@ def write_record(
         "version": VERSION,
         "mesh": mesh_object,
         "cage": [] if surface.cage is None else list(surface.cage.sizes),
-        "faces": _fingerprint(surface),
+        "faces": surface.faces_digest,
+        "triangles": surface.triangles_digest,
         "vertices": len(surface.local_positions),
         "counts": [len(curve.faces) for curve in curves],
         "closed": [int(curve.closed) for curve in curves],
@@ -195,11 +199,6 @@ def digest(mesh_object, surface, settings: CurveSettings) -> str:
             weights = group_weights(mesh_object, name, surface.with_modifiers)
             found.update(weights.tobytes())
     return found.hexdigest()
-
-
-def _fingerprint(surface) -> str:
-    """A hash of the faces of a surface."""
-    return hashlib.blake2b(surface.faces.tobytes(), digest_size=16).hexdigest()
 
 
 def is_current(curve_object, now: str) -> bool:
@@ -245,9 +244,14 @@ def has_record(candidate) -> bool:
     return record_check.is_group(candidate[RECORD_KEY])
 
 
+def number_of_curves(curve_object) -> int:
+    """The number of curves in a designed object; 0 for a drawing that has too few points."""
+    return len(_checked_record(curve_object)["counts"])
+
+
 def has_curve(curve_object) -> bool:
     """Whether a designed curve has enough points for a curve."""
-    return len(_checked_record(curve_object)["counts"]) > 0
+    return number_of_curves(curve_object) > 0
 
 
 def is_unfinished(curve_object) -> bool:
@@ -267,9 +271,14 @@ def mesh_of(curve_object):
 def mesh_in_view_layer(context, curve_object):
     """The mesh object that a curve was designed on; an error if it is not in the view layer."""
     found = mesh_of(curve_object)
-    if found is None or not is_in(context.view_layer, found):
-        raise _missing_mesh_error(curve_object)
-    return found
+    if found is not None and is_in(context.view_layer, found):
+        return found
+    if found is not None and context.scene in found.users_scene:
+        raise InputError(
+            f'"{found.name}", the mesh of "{curve_object.name}", is excluded from this view layer. '
+            "Enable its collection in the Outliner"
+        )
+    raise _missing_mesh_error(curve_object)
 
 
 def mesh_in_any_scene(curve_object):
@@ -480,12 +489,46 @@ def _find_points(record, corners_name: str, weights_name: str, surface):
     corners = np.array(record[corners_name], dtype=np.int64).reshape(-1, 3)
     barycentric = np.array(record[weights_name], dtype=np.float64).reshape(-1, 3)
     faces, order = _find_triangles(surface.faces, corners)
-    generated = bool(record.get("cage")) or surface.cage is not None
-    changed = record["vertices"] > len(surface.local_positions)
-    if changed or (generated and record.get("faces") != _fingerprint(surface)):
-        # Vertices may have been renumbered, so equal indices prove nothing.
+    if not _keeps_indices(record, surface):
         faces = np.full(len(corners), -1, dtype=np.int64)
     return faces, np.take_along_axis(barycentric, order, axis=1)
+
+
+def _keeps_indices(record, surface) -> bool:
+    """Whether vertices of the surface have the indices that they had when a curve was designed.
+
+    A deformation and turned normals keep them. Many operators that add or remove faces do not; then
+    a triangle of the same indices may be elsewhere.
+    """
+    if record.get("faces") == surface.faces_digest:
+        return True
+    generated = bool(record.get("cage")) or surface.cage is not None
+    if generated or record["vertices"] > len(surface.local_positions):
+        return False
+    return record.get("triangles") == surface.triangles_digest or not _is_elsewhere(record, surface)
+
+
+def _is_elsewhere(record, surface) -> bool:
+    """Whether control points found by indices have moved although the surface is still there.
+
+    Where a deformation has moved a point, the surface has left the former position, too.
+    """
+    from ...nicmm_core.geometry.surface_points import nearest_points
+
+    if "control_corners" not in record:  # an early record without control points
+        return False
+    corners = np.array(record["control_corners"], dtype=np.int64).reshape(-1, 3)
+    weights = np.array(record["control_barycentric"], dtype=np.float64).reshape(-1, 3)
+    former = np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
+    faces, order = _find_triangles(surface.faces, corners)
+    there = faces >= 0
+    found = surface.points(faces[there], np.take_along_axis(weights, order, axis=1)[there])
+    moved = np.linalg.norm(found - former[there], axis=1) > SAME_PLACE * surface.diagonal
+    if not moved.any():
+        return False
+    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    _, away = nearest_points(mesh, former[there][moved] @ surface.local_to_core.T)
+    return bool((away <= SAME_PLACE * mesh.diagonal).any())
 
 
 def _find_triangles(faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

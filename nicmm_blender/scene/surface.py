@@ -5,6 +5,7 @@ The mesh without its modifiers is called the cage. In Edit Mode the cage is Blen
 that is being edited.
 """
 
+import hashlib
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -72,6 +73,18 @@ class Surface:
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions in local space of points given by triangle and barycentric coordinates."""
         return np.einsum("nj,njk->nk", barycentric, self.local_positions[self.faces[faces]])
+
+    @cached_property
+    def faces_digest(self) -> str:
+        """A hash of the faces."""
+        return hashlib.blake2b(self.faces.tobytes(), digest_size=16).hexdigest()
+
+    @cached_property
+    def triangles_digest(self) -> str:
+        """A hash of the faces that depends neither on their order nor on their orientation."""
+        generator = np.random.default_rng(0)
+        numbers = generator.integers(2**64, size=len(self.local_positions), dtype=np.uint64)
+        return f"{numbers[self.faces].prod(axis=1).sum():x}"
 
     @cached_property
     def diagonal(self) -> float:

@@ -203,6 +203,8 @@ def _read(context) -> _VisibleCurves:
 
 
 def _other_lines(context, mesh_object, active, surface) -> list:
+    from ...nicmm_core import NicmmError
+
     lines = []
     for curve in curve_record.curves_on(context, mesh_object):
         if curve == active or not _is_shown(context, curve):
@@ -213,7 +215,7 @@ def _other_lines(context, mesh_object, active, surface) -> list:
             if settings.use_modifiers != surface.with_modifiers:
                 on = surface_cache.get(mesh_object, settings.use_modifiers)
             _, line = curve_record.positions_of(curve, on)
-        except InputError:
+        except (InputError, NicmmError):
             continue  # the error is reported where the curve is used
         lines.append(Line(curve.name, line, radius_of(curve, surface)))
     return lines

@@ -1,9 +1,16 @@
-"""Helpers that the tests of the extension share: objects, selections and positions."""
+"""Helpers that the tests of the extension share: modules, objects, selections and positions."""
+
+from importlib import import_module
 
 import bpy
 import numpy as np
 
 import bmesh
+
+
+def module(extension, name):
+    """A module of the installed extension, by its name inside `nicmm_blender`."""
+    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 def sphere(subdivisions=3):

@@ -237,36 +237,3 @@ def test_a_converted_curve_is_cut_exactly(empty_scene):
     draw(monkey, spline="BEZIER", offset=0.1)
     bpy.ops.nicmm.convert_curve(output="CURVE", spline="EXACT")
     np.testing.assert_allclose(in_world(bpy.context.active_object), exact, atol=1e-6)
-
-
-@pytest.mark.parametrize("output", ["CURVE", "STICKY"])
-@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 0.5, 2.0), (-1.0, 1.0, 1.0)])
-def test_a_curve_stays_in_place_when_transforms_are_applied(empty_scene, scale, output):
-    """Blender compensates for applied transforms of the mesh by transforms of its children."""
-    ball = scenes.sphere()
-    ball.location, ball.rotation_euler, ball.scale = (1, 2, 3), (0.3, 0.4, 0.5), scale
-    bpy.context.view_layer.update()
-    bpy.ops.nicmm.design_curve(points="0, 40, 90", radius=0.02, output=output, spline="EXACT")
-    curve = bpy.context.active_object
-    expected = in_world(curve)
-    assert radius_in_scene(curve) == pytest.approx(0.02, rel=1e-4)
-    bpy.ops.object.select_all(action="DESELECT")
-    scenes.activate(ball)
-    bpy.ops.object.transform_apply(location=True, rotation=True, scale=True)
-    np.testing.assert_allclose(in_world(curve), expected, atol=1e-4)
-    scenes.activate(curve)
-    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
-    assert curve_deviation(curve, ball) < SINGLE
-    assert radius_in_scene(curve) == pytest.approx(0.02, rel=1e-4)
-
-
-def radius_in_scene(curve):
-    """The radius of a tube in the scene, from the attributes that Blender draws."""
-    bpy.context.view_layer.update()
-    if curve.type == "CURVES":
-        local = scenes.get(curve.data.attributes["radius"].data, "value", 1).max()
-    else:
-        local = curve.data.bevel_depth
-    scale = np.abs(np.array(curve.matrix_world.to_scale()))
-    np.testing.assert_allclose(scale, scale.mean(), rtol=1e-4)  # the tube is round
-    return float(local * scale.mean())

@@ -1,7 +1,6 @@
 """The list of curves on a mesh, *Update Curves* and *Live*."""
 
 import time
-from importlib import import_module
 from types import SimpleNamespace
 
 import bpy
@@ -9,16 +8,13 @@ import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 
 CONVERGED = 3e-3
 """Largest distance between two results of one request.
 
 An update starts from the current curve and stops when another step gains little.
 """
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 @pytest.fixture

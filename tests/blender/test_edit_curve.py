@@ -1,12 +1,11 @@
 """Setting all control points of a curve in a script, the record of a curve, and the toolbar."""
 
-from importlib import import_module
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
@@ -36,10 +35,6 @@ def refusal(**arguments):
 def expected_curve(core, mesh_object, positions, **arguments):
     from_mesh = core.Mesh(scenes.positions(mesh_object), scenes.triangles(mesh_object))
     return core.design_curve(from_mesh, np.array(positions), **arguments).curves[0]
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Files saved by earlier versions: their curves can still be converted, edited and updated."""
 
-from importlib import import_module
 from pathlib import Path
 
 import bpy
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
@@ -15,10 +15,6 @@ KEPT = Path(__file__).parent / "kept"
 FILES = sorted(KEPT.glob("*.blend"))
 CURVES = ("Closed", "Open", "Maps", "Variational", "Sticky", "Tube", "Placed")
 ROUNDING = 2e-6
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 @pytest.fixture(params=FILES, ids=lambda path: path.stem)

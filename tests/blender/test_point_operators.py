@@ -1,21 +1,16 @@
 """Operators on single points: execution, undo in every mode, drafts, settings and errors."""
 
-from importlib import import_module
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 from tests.blender.test_abuse import DAMAGES
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
 ROUNDING = 2e-6
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 def call(name, **arguments):

@@ -1,7 +1,5 @@
 """Curves lie on the surface that the viewport shows, with its modifiers, pose and frame."""
 
-from importlib import import_module
-
 import bpy
 import igl
 import numpy as np
@@ -10,15 +8,12 @@ import pytest
 from mathutils import Euler
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
 EXACT = 1e-6
 """Largest distance from the shown surface, in diagonals."""
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 def shown(mesh_object):

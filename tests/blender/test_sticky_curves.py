@@ -1,13 +1,11 @@
 """Sticky curves follow the mesh, as strands or as a tube around the strands."""
 
-from importlib import import_module
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender import scenes
-from tests.blender.scenes import evaluated_points, get
+from tests.blender.scenes import evaluated_points, get, module
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
 
@@ -19,10 +17,6 @@ CLOSED = pytest.mark.parametrize("closed", [True, False], ids=["closed", "open"]
 @pytest.fixture
 def monkey(empty_scene):
     return scenes.monkey()
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 def sticky(mesh_object, **settings):

@@ -1,18 +1,13 @@
 """The view: maps pixels to points on the mesh and back, and finds what can be picked."""
 
-from importlib import import_module
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 
 CENTRE = np.array([400.0, 300.0])
-
-
-def module(extension, name):
-    return import_module(f"{extension.name}.nicmm_blender.{name}")
 
 
 def matrices(eye, perspective):
