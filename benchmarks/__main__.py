@@ -43,6 +43,7 @@ MEASUREMENTS = (
     "peers",
     "degraded",
     "degraded_start",
+    "search_effort",
     "courses",
     "course_pictures",
     "symmetry",

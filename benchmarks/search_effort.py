@@ -1,0 +1,143 @@
+"""How much fairer curves become with more searches for their courses, and what that takes."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from itertools import chain
+from unittest import mock
+
+import numpy as np
+
+import nicmm_core as nicmm
+from nicmm_core import surface_designer
+from nicmm_core.courses import attempts
+from nicmm_core.courses.comparison import energies_of
+from nicmm_core.geometry.array_types import IntArray
+from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.relaxation.curve_nodes import curve_surface
+
+from . import collections, report
+from .evidence import Results
+from .samples import random_sets
+from .scale import Scale
+
+TITLE = "Searching longer"
+TIMED = True
+WITHOUT = ("outputs",)
+
+SEED = 31
+
+VARIATIONAL = "variational"
+
+MOST = 4
+"""Greatest effort, relative to the default."""
+
+EFFORTS: Mapping[str, tuple[int, int, int]] = {
+    "one search": (0, 0, 1),
+    "repeated searches": (attempts.FURTHER_SEARCHES, 0, 1),
+    "default": (attempts.FURTHER_SEARCHES, attempts.SEARCHES_FOR_PARTS, 1),
+    f"{MOST} times the default": (
+        MOST * attempts.FURTHER_SEARCHES,
+        MOST * attempts.SEARCHES_FOR_PARTS,
+        MOST,
+    ),
+}
+"""Numbers of repeated searches and of searches for parts, and a factor for the bound on work."""
+
+
+def measure(scale: Scale) -> Results:
+    """Design every request with every effort, and by the variational method."""
+    surfaces = collections.surfaces(scale, scale.choose(24, 4, 1))
+    if scale is not Scale.SMOKE:
+        others = (collections.clean(scale.choose(6, 1)), collections.bodies(scale.choose(6, 1)))
+        surfaces = chain(surfaces, *others)
+    requests = []
+    for name, mesh, points in random_sets(surfaces, 1, SEED):
+        if not requests:
+            _timed(mesh, points, VARIATIONAL)  # warm-up: imports and caches
+        with contextlib.suppress(nicmm.UnreachableError):
+            requests.append({"mesh": name, **_compared(mesh, points)})
+            print(f"  {name}: {requests[-1]}", flush=True)
+    return {
+        "seed": SEED,
+        "meshes": collections.label(scale),
+        "efforts": list(EFFORTS),
+        "requests": requests,
+    }
+
+
+def section(results: Results) -> str:
+    """Energies and times by effort."""
+    requests = results["requests"]
+    rows = []
+    for number, name in enumerate(results["efforts"]):
+        energies = np.array([each["energies"][number] for each in requests])
+        seconds = np.array([each["seconds"][number] for each in requests])
+        ratio = np.median(seconds / np.array([each["variational"] for each in requests]))
+        rows.append(
+            (
+                name,
+                f"{np.exp(np.log(energies).mean()):.3f}",
+                *(f"{value:.2f}" for value in np.percentile(energies, [50, 90, 100])),
+                f"{seconds.mean():.2f}",
+                *(f"{value:.2f}" for value in np.percentile(seconds, [50, 100])),
+                f"{ratio:.2f}",
+            )
+        )
+    header = (
+        "effort", "energy: geometric mean", "median", "90 %", "greatest",
+        "seconds: mean", "median", "greatest", "relative to variational",
+    )  # fmt: skip
+    return (
+        "The table shows how the energy of a curve and the time of its design depend on how long "
+        "courses are searched for. Each row is an effort: a single search, up to "
+        f"{attempts.FURTHER_SEARCHES} repeated searches, these and searches for parts (the "
+        f"default), and {MOST} times as many searches with {MOST} times the bound on work. The "
+        f"statistics are over closed curves on {len(requests)} meshes ({results['meshes']}, and "
+        "closed manifold meshes, people and animals as they are; one set of 3–5 random vertices "
+        f"per mesh, shortest order, seed {results['seed']}). An energy is divided by the least one "
+        "of the request, on a common length scale. The last column is the median of the time "
+        "divided by that of `variational`. The paper has no corresponding measurement.\n\n"
+        + report.table(header, rows)
+    )
+
+
+def _compared(mesh: Mesh, points: IntArray) -> Results:
+    """Energies, relative to the least one, and seconds by effort; seconds of `variational`."""
+    designs, seconds = [], []
+    for effort in EFFORTS.values():
+        with _effort(*effort):
+            design, spent = _timed(mesh, points, "nicmm")
+        designs.append(design)
+        seconds.append(round(spent, 3))
+    found = [design.resumable for design in designs]
+    curves = [each.curve for each in found if each is not None]
+    assert found[0] is not None and len(curves) == len(found)
+    request = found[0].request
+    energies = np.array(energies_of(curve_surface(found[0].mesh), curves, request.smoothness))
+    return {
+        "energies": [round(float(value), 5) for value in energies / energies.min()],
+        "seconds": seconds,
+        "variational": round(_timed(mesh, points, VARIATIONAL)[1], 3),
+    }
+
+
+def _timed(mesh: Mesh, points: IntArray, method: str) -> tuple[nicmm.Design, float]:
+    """Design a closed curve; return it with the time it takes, including the work on the mesh."""
+    started = time.perf_counter()
+    design = nicmm.design_curve(mesh, points, order="shortest", method=method)
+    return design, time.perf_counter() - started
+
+
+@contextmanager
+def _effort(repeated: int, parts: int, work: int) -> Iterator[None]:
+    """Design with other numbers of searches and another bound on work."""
+    with (
+        mock.patch.object(surface_designer, "FURTHER_SEEDS", range(1, 1 + repeated)),
+        mock.patch.object(surface_designer, "SEARCHES_FOR_PARTS", parts),
+        mock.patch.object(attempts, "MOST_WORK", work * attempts.MOST_WORK),
+    ):
+        yield
