@@ -28,7 +28,7 @@ def main(arguments: list) -> int:
         return 0 if not stopped.code else FAILED
     try:
         run(options)
-    except (InputError, RuntimeError) as error:
+    except (InputError, RuntimeError, ValueError, OSError) as error:
         print(f"{COMMAND}: {str(error).removeprefix('Error: ').strip()}", file=sys.stderr)
         return FAILED
     return 0
@@ -80,6 +80,11 @@ def activate(name: str | None) -> None:
 
 def _points(options: argparse.Namespace) -> dict:
     """The control points as arguments of the operator."""
+    for name in ("group", "points"):
+        if getattr(options, name) == "":
+            raise InputError(
+                f"--{name} is empty. Leave it out for the vertices selected in the file"
+            )
     if options.group is not None:
         return {"point_group": options.group}
     if options.points is not None:

@@ -14,7 +14,7 @@ from bpy.props import PointerProperty
 from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
-from ..scene.messages import InputError
+from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
 from .long_solves import answer_all
 
@@ -88,6 +88,7 @@ def _cancel_undo() -> None:
 
 def _change(curve, name: str, value) -> None:
     context = bpy.context
+    check_finite(name, value)
     if name == "radius":
         writing.check_replaceable(curve)
         _set_radius(context, curve, value)
@@ -105,7 +106,7 @@ def _change(curve, name: str, value) -> None:
         surface_cache.note_change()
         return
     wanted = replace(curve_settings, **{name: value})
-    if name not in edited_curve.MAPS:
+    if value or name not in edited_curve.MAPS:
         _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
     opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)

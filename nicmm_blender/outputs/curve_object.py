@@ -101,6 +101,8 @@ def write_splines(curve_object, splines) -> None:
     """Replace the splines of a curve object; their materials, radii and tilts are kept."""
     curve = curve_object.data
     before = [_Profile(spline) for spline in curve.splines]
+    if not splines:  # the points are lost, so their radii cannot be kept
+        curve.bevel_depth *= largest_point_radius(curve_object)
     curve.splines.clear()
     for number, given in enumerate(splines):
         if isinstance(given, Knots):

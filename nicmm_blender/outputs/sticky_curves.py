@@ -84,9 +84,9 @@ def set_radius(data, radius: float) -> None:
     if not len(data.points):
         data[RADIUS] = radius
         return
-    shares, values = _radii(data)
+    _, values = _radii(data)
     greatest = float(values.max())
-    values = values * (radius / greatest) if greatest > 0.0 else np.full(len(shares), radius)
+    values = values * (radius / greatest) if greatest > 0.0 else np.full(len(data.points), radius)
     _set(data, "radius", "FLOAT", "POINT", values)
 
 

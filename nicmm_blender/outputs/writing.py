@@ -8,7 +8,7 @@ import numpy as np
 import bmesh
 
 from ..scene import curve_record
-from ..scene.messages import InputError, counted, sentence
+from ..scene.messages import InputError, check_finite, counted, sentence
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
 
@@ -70,6 +70,8 @@ def apply(context, mesh_object, surface, curves, settings, curve_settings) -> st
 
 def as_object(mesh_object, surface, curves, settings):
     """Create an object that shows curves, without linking it to a collection."""
+    for name in ("radius", "thickness", "offset"):
+        check_finite(name, getattr(settings, name))
     radius = automatic_radius(surface, settings.radius, settings.thickness)
     drawing = Drawing(settings.spline, radius, settings.offset)
     if settings.output == "STICKY":

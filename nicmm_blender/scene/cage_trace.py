@@ -20,6 +20,9 @@ VERTEX, FACE, FACE_COORDINATES = "nicmm_vertex", "nicmm_face", "nicmm_place"
 INSIDE = -1e-4
 """Smallest barycentric coordinate that counts as inside: attributes have single precision."""
 
+COLLAPSING = {"DECIMATE", "WELD"}
+"""Modifiers that move corners of the faces that they keep, so that a face is elsewhere."""
+
 SAME_POSITION = 1e-5
 """Distance up to which two positions count as the same, relative to the surface's diagonal."""
 
@@ -230,8 +233,9 @@ class _Copy:
             for modifier in copy.modifiers:
                 modifier.show_viewport = modifier.show_viewport and modifier.show_in_editmode
         self._write(copy.data)
+        collapses = any(each.show_viewport and each.type in COLLAPSING for each in copy.modifiers)
         with evaluated_in_isolation(copy) as evaluated:
-            return self._read(evaluated, shown, loops)
+            return self._read(evaluated, shown, loops, collapses)
 
     def _write(self, data) -> None:
         starts, totals = (
@@ -248,7 +252,7 @@ class _Copy:
         ):
             data.attributes.new(name, kind, domain).data.foreach_set(field, values.ravel())
 
-    def _read(self, mesh, shown, loops: np.ndarray) -> CageTrace:
+    def _read(self, mesh, shown, loops: np.ndarray, collapses: bool) -> CageTrace:
         positions = positions_of(self.cage)
         vertices = np.full(len(positions), -1)
         faces, coordinates = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
@@ -266,7 +270,7 @@ class _Copy:
                 vertices = _first_equal(
                     self.identities, read(kept[VERTEX].data, "vector", 3, np.float32)
                 )
-            if FACE in kept and FACE_COORDINATES in kept:
+            if FACE in kept and FACE_COORDINATES in kept and not collapses:
                 number = read(kept[FACE].data, "value", 1, np.int32)
                 faces = number[triangle_faces(shown)].astype(np.int64)
                 coordinates = read(kept[FACE_COORDINATES].data, "vector", 3, np.float32)[loops, :2]

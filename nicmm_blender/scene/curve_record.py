@@ -18,7 +18,7 @@ from ...nicmm_core.options import OPTIONS, Kind
 from . import designers, mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, to_cage_points, to_surface_points, with_identity_trace
 from .membership import is_in
-from .messages import InputError
+from .messages import InputError, check_finite
 from .surface import group_weights, read
 
 RECORD_KEY = "nicmm_curve"
@@ -69,6 +69,13 @@ RECORDED = tuple(
 )
 """Options that a record stores."""
 
+
+def _check_finite(settings) -> None:
+    """Raise an error if a setting is NaN or infinite."""
+    for name, value in asdict(settings).items():
+        check_finite(name, value)
+
+
 CurveSettings = make_dataclass(
     "CurveSettings",
     [
@@ -77,7 +84,10 @@ CurveSettings = make_dataclass(
     ]
     + [("use_modifiers", bool, field(default=True))],
     frozen=True,
-    namespace={"__doc__": "The settings of a curve, besides its control points."},
+    namespace={
+        "__doc__": "The settings of a curve, besides its control points.",
+        "__post_init__": _check_finite,
+    },
 )
 
 
@@ -265,6 +275,9 @@ def is_unfinished(curve_object) -> bool:
 def mesh_of(curve_object):
     """The mesh object that a curve was designed on, or None if it no longer exists."""
     found = curve_object[RECORD_KEY].get("mesh")
+    override = getattr(curve_object.parent, "override_library", None)
+    if override is not None and override.reference == found:
+        return curve_object.parent  # a custom property of an override refers to the linked object
     return found if isinstance(found, bpy.types.Object) and found.type == "MESH" else None
 
 

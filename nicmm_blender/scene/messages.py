@@ -1,11 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages for the user: errors, the core's messages reworded for Blender, counted things."""
 
+import math
 import re
 
 
 class InputError(Exception):
     """Blender's data cannot be used; the message says what to change."""
+
+
+def check_finite(name: str, value) -> None:
+    """Raise an error if a setting is NaN or infinite, which scripts can pass."""
+    if isinstance(value, float) and not math.isfinite(value):
+        label = sentence(name.replace("_", " "))
+        raise InputError(f"{label} is {value}. Give a finite number")
 
 
 def user_message(error: Exception, obstacle_group: str = "", vertices=None) -> str:

@@ -138,7 +138,7 @@ def _given_point(word: str, count: int) -> int | np.ndarray:
         point = int(word) if len(numbers) == 1 else np.array(numbers, dtype=np.float64)
     except ValueError:
         point = np.zeros(0)
-    if isinstance(point, np.ndarray) and point.shape != (3,):
+    if isinstance(point, np.ndarray) and (point.shape != (3,) or not np.isfinite(point).all()):
         raise InputError(
             f'The point "{word.strip()}" is neither a vertex index nor three coordinates. Separate '
             'points by commas and coordinates by spaces, such as "12, 80, 0.5 0 1"'

@@ -137,6 +137,39 @@ class TestPlace:
         assert radius_in_scene(curve) == pytest.approx(0.05, rel=1e-4)
 
     @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
+    def test_a_curve_without_points_keeps_its_radius(self, empty_scene, output):
+        """Also if the tube had been thickened in Edit Mode."""
+        ball = scenes.sphere()
+        curve = design(ball, "0, 40", closed=False, radius=0.02, output=output)
+        if output == "CURVE":
+            points = curve.data.splines[0].points
+            points.foreach_set("radius", np.full(len(points), 3.0, dtype=np.float32))
+        radius = radius_in_scene(curve)
+        scenes.activate(curve)
+        assert bpy.ops.nicmm.remove_point(index=0) == {"FINISHED"}
+        assert curve.nicmm_settings.radius == pytest.approx(radius, rel=1e-4)
+        position = np.array([vertex.co for vertex in ball.data.vertices])[90]
+        assert bpy.ops.nicmm.add_point(position=position) == {"FINISHED"}
+        assert radius_in_scene(curve) == pytest.approx(radius, rel=1e-4)
+
+    @pytest.mark.parametrize("kind", ["DECIMATE", "WELD"])
+    def test_control_points_under_modifiers_that_move_corners(self, empty_scene, kind):
+        """A face that such a modifier keeps may be elsewhere."""
+        ball = scenes.sphere(4)
+        modifier = ball.modifiers.new("Collapse", kind)
+        name, values = {"DECIMATE": ("ratio", (0.5, 0.2)), "WELD": ("merge_threshold", (0.1, 0.2))}[
+            kind
+        ]
+        setattr(modifier, name, values[0])
+        curve = design(ball, "0, 40, 90")
+        before = control_positions(curve)
+        setattr(modifier, name, values[1])
+        bpy.context.view_layer.update()
+        update(curve)
+        assert np.linalg.norm(control_positions(curve) - before, axis=1).max() < 0.3
+        assert curve_deviation(curve, ball) < 1e-5
+
+    @pytest.mark.parametrize("output", ["CURVE", "STICKY"])
     @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 0.5, 2.0), (-1.0, 1.0, 1.0)])
     def test_applied_transforms(self, empty_scene, scale, output):
         """Blender compensates for applied transforms of the mesh by transforms of its children."""
@@ -202,6 +235,25 @@ class TestRefusals:
         curve.nicmm_settings.obstacle_group = "Fence"
         curve.nicmm_settings.smoothness = 0.5
         assert curve.nicmm_settings.smoothness == 0.5
+
+    def test_a_map_that_no_longer_exists_can_be_cleared(self, empty_scene):
+        ball = scenes.sphere()
+        group = ball.vertex_groups.new(name="Wall")
+        group.add([20], 1.0, "REPLACE")
+        curve = design(ball, "0, 40, 90", obstacle_group="Wall")
+        ball.vertex_groups.remove(group)
+        curve.nicmm_settings.obstacle_group = ""
+        assert curve.nicmm_settings.obstacle_group == ""
+        problem = module(empty_scene, "operators.curve_settings").problem_of(curve)
+        assert not problem
+
+    @pytest.mark.parametrize("name", ["smoothness", "clearance", "offset", "radius"])
+    def test_settings_that_are_not_finite(self, empty_scene, name):
+        """Blender limits infinite values to those of the property, but passes on NaN."""
+        ball = scenes.sphere()
+        with pytest.raises(RuntimeError, match=f"{name.capitalize()} is nan"):
+            design(ball, "0, 40, 90", **{name: float("nan")})
+        assert not scenes.curves()
 
     def test_a_mesh_in_an_excluded_collection(self, empty_scene):
         ball = scenes.sphere()

@@ -10,6 +10,7 @@ import bmesh
 from mathutils import Matrix
 
 from tests.blender import scenes
+from tests.blender.scenes import module
 from tests.blender.test_shown_surface import in_world
 
 pytestmark = pytest.mark.usefixtures("remembered_designs")
@@ -184,7 +185,14 @@ def test_override_of_another_file(empty_scene, tmp_path):
     bpy.context.scene.collection.objects.link(made)
     bpy.context.view_layer.objects.active = made
     assert bpy.ops.nicmm.design_curve(spline="EXACT", point_group="Cut") == {"FINISHED"}
-    assert_on_surface(empty_scene.core, scenes.curves()[0], made)
+    (curve,) = scenes.curves()
+    assert_on_surface(empty_scene.core, curve, made)
+    scenes.activate(curve)
+    made.scale.x = 2.0
+    bpy.context.view_layer.update()
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert module(empty_scene, "scene.curve_record").mesh_of(curve) == made
+    assert_on_surface(empty_scene.core, curve, made)
 
 
 def test_override_of_a_collection_of_another_file(empty_scene, tmp_path):
@@ -208,6 +216,9 @@ def test_override_of_a_collection_of_another_file(empty_scene, tmp_path):
     (curve,) = scenes.curves()
     assert list(curve.users_collection) == [bpy.context.scene.collection]
     assert_on_surface(empty_scene.core, curve, overridden)
+    scenes.activate(curve)
+    assert bpy.ops.nicmm.update_curves() == {"FINISHED"}
+    assert module(empty_scene, "scene.curve_record").mesh_of(curve) == overridden
 
 
 def test_a_linked_duplicate_is_edited_alone(empty_scene):
