@@ -17,6 +17,7 @@ import numpy as np
 from .coarsening.coarse_start import CoarseStarts
 from .courses.attempts import (
     COURSES_OF_A_PART,
+    COURSES_OF_A_SEARCH,
     FURTHER_SEARCHES,
     MOST_FAILURES,
     SEARCHES_FOR_PARTS,
@@ -174,7 +175,6 @@ class SurfaceDesigner:
             n_points = len(request.points) + sum(map(len, request.via_points.values()))
             attempts = Attempts(start.surface, request.smoothness, n_points)
             attempts.relaxed.append(first)
-            attempts.end_search()
             starts, cancelled = [start], False
             try:
                 further = self._further_starts(request, starts, attempts, courses, by_course)
@@ -209,6 +209,9 @@ class SurfaceDesigner:
         long, so they are made only for alternatives.
         """
         config = _config(request)
+        if by_course:
+            yield from self._other_finalists(request, starts, attempts, courses)
+            attempts.end_search()
         further = [self._course_starts(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         for search in further if by_course else ():
             if not attempts.another_search_pays():
@@ -219,6 +222,7 @@ class SurfaceDesigner:
                 # On rough meshes hardly any course is simple, and each failure takes long.
                 break
             yield start, attempts.limited(config)
+            yield from self._other_finalists(request, starts, attempts, search)
             attempts.end_search()
         if by_course:
             yield from self._starts_with_other_parts(request, starts, attempts)
@@ -235,6 +239,24 @@ class SurfaceDesigner:
             most = MAX_COURSES_RELAXED + 2 * request.alternatives
             yield from ((start, config) for start in itertools.islice(new, most))
 
+    def _other_finalists(
+        self,
+        request: Request,
+        starts: list[_Start],
+        attempts: Attempts,
+        search: Iterator[_Start],
+    ) -> Iterator[tuple[_Start, RelaxationConfig]]:
+        """The next courses of a search as long as its best curve is extremely bent."""
+        before = len(starts) - 1
+        while len(starts) - before < COURSES_OF_A_SEARCH and attempts.another_course_pays(before):
+            known = [
+                start.curve for start in starts[before:] if isinstance(start.curve, NodedCurve)
+            ]
+            start = next((start for start in search if _is_apart(start, known)), None)
+            if start is None:
+                break
+            yield start, attempts.limited(_config(request))
+
     def _starts_with_other_parts(
         self, request: Request, starts: list[_Start], attempts: Attempts
     ) -> Iterator[tuple[_Start, RelaxationConfig]]:
@@ -250,7 +272,7 @@ class SurfaceDesigner:
             if part is None:
                 break
             tried.append(part.middle)
-            attempts.searches += 1
+            attempts.parts += 1
             courses = self._courses_of_part(request, starts[best], curve, part)
             for start in itertools.islice(courses, COURSES_OF_A_PART):
                 yield start, attempts.limited(WARM)

@@ -14,8 +14,8 @@ from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
 from .comparison import distinct_by_energy, energies_of, scaled_bending
 
-STRONGLY_BENT = 14.0
-"""L ∮ κ_g² ds above which the search is repeated, a third of the value of a circle.
+STRONGLY_BENT = 20.0
+"""L ∮ κ_g² ds above which the search is repeated, half the value of a circle.
 
 Curves above it wind around limbs, where a search misses more courses.
 """
@@ -26,8 +26,14 @@ EXTREMELY_BENT = 80.0
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 3
+FURTHER_SEARCHES = 1
 """Greatest number of repeated searches for the whole curve."""
+
+COURSES_OF_A_SEARCH = 3
+"""Greatest number of courses relaxed after a search whose curves are extremely bent.
+
+Their energies with few nodes tell little there.
+"""
 
 FRUITLESS_SEARCHES = 2
 """Number of consecutive searches with little gain after which no further one is made.
@@ -62,6 +68,9 @@ RESERVED = 800
 WORK_OF_SEARCH = 40
 """Approximate work of a search, in the same unit; as much again for each control or via point."""
 
+WORK_OF_PART = 100
+"""Approximate work of a search for a part, in the same unit."""
+
 
 @dataclass
 class Attempts:
@@ -73,8 +82,8 @@ class Attempts:
     smoothness : float
     n_points : int
         Number of control points and via points.
-    searches : int
-        Number of searches for courses begun so far, those for parts included.
+    searches, parts : int
+        Numbers of searches for courses begun so far, of the whole curve and of parts.
     relaxed : list of Relaxed
         The result of each attempt.
     fruitless : int
@@ -85,6 +94,7 @@ class Attempts:
     smoothness: float
     n_points: int
     searches: int = 1
+    parts: int = 0
     relaxed: list[Relaxed] = field(default_factory=list)
     fruitless: int = 0
     _relaxed_before: int = 0  # number of results when the last search ended
@@ -123,12 +133,18 @@ class Attempts:
         promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
+    def another_course_pays(self, first: int) -> bool:
+        """Whether the next course of a search is worthwhile, whose results begin at an index."""
+        least = min(scaled_bending(each.noded_curve) for each in self.relaxed[first:])
+        mean = self._work_of_relaxations / len(self.relaxed)
+        return least > EXTREMELY_BENT and self._is_affordable(mean + RESERVED)
+
     def part_pays(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
         bending = self._bending
         allowed = FRUITLESS_SEARCHES if bending > EXTREMELY_BENT else 1
         promising = bending > PARTLY_BENT and self.fruitless < allowed
-        return promising and self._is_affordable(self._work_of_search)
+        return promising and self._is_affordable(WORK_OF_PART)
 
     def tightening_pays(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
@@ -153,7 +169,8 @@ class Attempts:
 
     @property
     def _work(self) -> float:
-        return self.searches * self._work_of_search + self._work_of_relaxations
+        of_searches = self.searches * self._work_of_search + self.parts * WORK_OF_PART
+        return of_searches + self._work_of_relaxations
 
     @property
     def _work_of_relaxations(self) -> float:

@@ -7,39 +7,48 @@ them, the length of the shortest course (`elastic_energy.comparable_energies`).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.surface_points import SurfacePoints
+from ..geometry.surface_points import SurfacePoints, joined
 from ..maps.guidance import length_factor
 from ..progress import checkpoint, subrange
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.even_nodes import resampled
-from ..relaxation.node_traces import traces_between_nodes
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .comparison import SAME_COURSE
-from .hop_graph import HopGraph, with_control_points
+from .hop_graph import CourseGraph, HopGraph, with_control_points
 from .leg_combinations import (
     cheapest_combinations,
     course_nodes,
-    crossing_routes,
+    crossing_legs,
+    curves_on_routes,
     distinct_combinations,
-    nodes_on_routes,
+    junctions_of_routes,
 )
-from .leg_routes import routes_of_legs
+from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
+from .leg_routes import Routes, leg_choices, routes_of_legs
+from .recombination import recombined
 from .uncrossing import uncrossed
 
-TENSION = 4.0
+TENSIONS = (2.0, 1.0, 4.0)
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path.
 
-It is greater than 1 because hops overestimate bending: they turn only at cells.
+Searches with different seeds take them in turn, since a low tension finds long courses that bend
+little, and a high one short courses. It is greater than 1 by default because hops overestimate
+bending: they turn only at cells.
 """
 
-CANDIDATES, FINALISTS = 24, 6
-"""Number of courses relaxed with few nodes, and number of the best relaxed with twice as many."""
+CANDIDATES = (16, 10, 8)
+"""Numbers of courses relaxed with few nodes, by the rank of their order of the control points."""
+
+RECOMBINED, FINALISTS = 16, 6
+"""Number of courses combined from their legs, and number of the best of all courses that are
+relaxed with twice as many nodes."""
 
 FIRST_STRIDE = 8
 """Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
@@ -59,11 +68,10 @@ Short waves are almost independent at neighbouring cells, which gives the most d
 MOST_LEGS = 60
 """Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
-STAGES = (
-    (TogetherConfig(iterations=12),),
-    (TogetherConfig(iterations=6), TogetherConfig(iterations=8)),
-)
-"""Passes of the joint relaxation: of all candidates, and of the finalists.
+OF_CANDIDATES = (TogetherConfig(iterations=8),)
+OF_RECOMBINED = (TogetherConfig(iterations=8),)
+OF_FINALISTS = (TogetherConfig(iterations=6), TogetherConfig(iterations=8))
+"""Passes of the joint relaxation of all candidates, of recombined courses, and of the finalists.
 
 Before each pass but the first, nodes are placed evenly along the traces. While nodes move, only
 their distances count, which are too short around the edges of thin parts."""
@@ -108,49 +116,104 @@ def find_courses(
         Seed of random factors of the lengths in the graph, which give other courses; 0 for no
         factors.
     """
-    count = len(points) if closed else len(points) - 1
-    if count > MOST_LEGS:
+    legs = legs_of_order(np.arange(len(points)), closed)
+    if len(legs) > MOST_LEGS:
         return
-    ends = np.arange(count)
-    legs = np.stack([ends, (ends + 1) % len(points)], axis=1)
     factor = None if surface.feature_map is None else length_factor(surface.feature_map)
     if seed:
         waves = random_waves(along[:, : len(surface.mesh.vertices)], graph.spacing, seed)
         factor = np.exp(LENGTH_NOISE * waves) * (1.0 if factor is None else factor)
-    tension = TENSION * 4.0 * np.pi**2 / smoothness
+    tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
-    routes = routes_of_legs(courses, legs, closed)
-    if not routes or not all(len(leg.cells) for leg in routes):
+    found = _candidates(courses, surface, closed, smoothness, any_order)
+    if found is None:
         return
-    with subrange(0.2, 0.3):
-        on_routes = nodes_on_routes(courses, routes, smoothness)
-    traces = traces_between_nodes(surface, on_routes)
-    crosses = crossing_routes(courses, routes, on_routes, traces)
-    combinations = cheapest_combinations(courses, routes, crosses, closed)
-    choice = distinct_combinations(routes, combinations, CANDIDATES)
-    if not len(choice):
-        return
-    nodes, at_points = course_nodes(courses, routes, on_routes, traces, choice, closed)
+    nodes, point = found
     # Indices of control points do not count via points.
-    number = np.where(fixed, np.cumsum(fixed) - 1, -1)
-    visit = np.full(len(at_points), -1)
-    visit[at_points] = np.tile(number, len(choice))
-    nodes = nodes_at(surface, nodes.places, closed, nodes.curves)
+    number = np.append(np.where(fixed, np.cumsum(fixed) - 1, -1), -1)
+    nodes, visit, simple = uncrossed(surface, nodes, number[point], any_order)
+    with subrange(0.4, 0.6):
+        nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
     nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
-    for stage, passes in enumerate(STAGES):
-        if stage:
-            best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
-            nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
-            nodes, visit = _resampled(surface, nodes, visit, 2)
-        with subrange(0.4 + 0.6 * stage / len(STAGES), 0.4 + 0.6 * (stage + 1) / len(STAGES)):
-            nodes, visit = _relaxed(surface, nodes, visit, smoothness, passes)
-        nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
+    combined = recombined(surface, nodes, visit, smoothness, RECOMBINED)
+    if combined is not None:
+        new, new_visit, _ = uncrossed(surface, *combined, any_order)
+        with subrange(0.6, 0.7):
+            new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
+        new, new_visit, new_simple = uncrossed(surface, new, new_visit, any_order)
+        places = joined([nodes.places, new.places])
+        nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
+        visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
+    best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
+    nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
+    nodes, visit = _resampled(surface, nodes, visit, 2)
+    with subrange(0.7, 1.0):
+        nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
+    nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
     for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
         for _ in range(2):
             yield own, visited
             own, visited = _resampled(surface, own, visited, 2)
+
+
+def _candidates(
+    courses: CourseGraph, surface: CurveSurface, closed: bool, smoothness: float, any_order: bool
+) -> tuple[Nodes, IntArray] | None:
+    """The cheapest courses in the cheapest orders of the points, and the point at each node.
+
+    None if there is no course.
+    """
+    count = len(courses.points)
+    order = np.arange(count)
+    n_legs = count if closed else count - 1
+    if any_order and count <= MOST_POINTS:
+        pairs = combinations(range(count), 2)
+        choices = leg_choices(courses, pairs, n_legs)
+        orders = cheapest_orders(courses, choices, closed, len(CANDIDATES))
+    else:
+        legs = legs_of_order(order, closed).tolist()
+        choices = leg_choices(courses, ((start, end) for start, end in legs), n_legs)
+        orders = [order]
+    checkpoint()
+    routes: list[list[Routes]] = []
+    possible: list[IntArray] = []
+    for order in orders:
+        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed)
+        if of_order:
+            routes.append(of_order)
+            possible.append(order)
+    if not routes:
+        return None
+    with subrange(0.2, 0.3):
+        curves = curves_on_routes(
+            courses, [leg for of_order in routes for leg in of_order], n_legs, smoothness
+        )
+    crosses = crossing_legs(curves)
+    # The first order takes over the candidates of orders that there are not.
+    shares = [sum(CANDIDATES) - sum(CANDIDATES[1 : len(routes)]), *CANDIDATES[1 : len(routes)]]
+    choice, visit = [], []
+    for number, (of_order, order, share) in enumerate(zip(routes, possible, shares, strict=True)):
+        own = slice(
+            curves.of_leg(number * n_legs).start, curves.of_leg((number + 1) * n_legs - 1).stop
+        )
+        found = cheapest_combinations(
+            [leg.cost for leg in of_order],
+            junctions_of_routes(courses, of_order, closed),
+            crosses[own, own],
+            closed,
+        )
+        found = distinct_combinations([leg.alike for leg in of_order], found, share)
+        choice.append(own.start + found.choice)
+        visit.append(np.tile(order, len(found.choice)))
+    chosen = np.concatenate(choice)
+    if not len(chosen):
+        return None
+    nodes, at_points = course_nodes(curves, chosen, closed)
+    point = np.full(len(at_points), -1)
+    point[at_points] = np.concatenate(visit)
+    return nodes_at(surface, nodes.places, closed, nodes.curves), point
 
 
 def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:

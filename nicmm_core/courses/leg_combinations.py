@@ -1,12 +1,14 @@
-"""Combines one route per leg into whole courses, the cheapest first; crossings add to the cost.
+"""Combines one curve per leg into whole courses, the cheapest first; crossings add to the cost.
 
+The curves of the legs are routes of the hop graph, or legs of relaxed courses (`recombination`).
 Routes are placed on the surface as straight traces between a few nodes. They are relaxed a little,
-so that routes through the same cells separate. Then all routes are tested for crossings together.
+so that routes through the same cells separate. Then all curves are tested for crossings together.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +18,14 @@ from ..geometry.crossings import overlapping_segments, segments_meet
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
-from ..relaxation.curve_nodes import Nodes, nodes_at
+from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.even_nodes import resampled
-from ..relaxation.node_traces import NodeTraces, places_along, traced_segments
+from ..relaxation.node_traces import (
+    NodeTraces,
+    places_along,
+    traced_segments,
+    traces_between_nodes,
+)
 from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, without_rounding_errors
@@ -39,7 +46,7 @@ SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
 """Settings with which routes are relaxed before the test; their end directions are kept."""
 
 CROSSING = 0.1
-"""Cost of a crossing of two routes, relative to the sum of the least costs of all legs.
+"""Cost of a crossing of two legs, relative to the sum of the least costs of all legs.
 
 Crossings are not forbidden, since `uncrossing` may remove them.
 """
@@ -53,13 +60,46 @@ MAX_RELATIVE_COST = 1.5
 
 
 @dataclass(frozen=True)
+class LegCurves:
+    """Curves for the legs of courses, in one or more orders of the control points.
+
+    Attributes
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+        r open curves, sorted by leg.
+    leg : (r,) int array
+        Leg of each curve, ascending.
+    ends : (r, 2) int array
+        Control points at both ends of each curve.
+    n_legs : int
+        Number of legs of a course; the legs of each order are consecutive.
+    """
+
+    surface: CurveSurface
+    nodes: Nodes
+    leg: IntArray
+    ends: IntArray
+    n_legs: int
+
+    @cached_property
+    def traces(self) -> NodeTraces:
+        """Traces between the nodes."""
+        return traces_between_nodes(self.surface, self.nodes)
+
+    def of_leg(self, leg: int) -> slice:
+        """The curves of one leg."""
+        return slice(*np.searchsorted(self.leg, [leg, leg + 1]).tolist())
+
+
+@dataclass(frozen=True)
 class Combinations:
-    """Courses, each given by one route per leg.
+    """Courses, each given by one curve per leg.
 
     Attributes
     ----------
     choice : (c, l) int array
-        Index of the route that each course takes on each leg.
+        Index of the curve of each leg of each course, among all curves.
     cost : (c,) float array
         Cost of each course, ascending.
     """
@@ -68,14 +108,25 @@ class Combinations:
     cost: FloatArray
 
 
-def nodes_on_routes(graph: CourseGraph, routes: list[Routes], smoothness: float) -> Nodes:
+def curves_on_routes(
+    graph: CourseGraph, routes: list[Routes], n_legs: int, smoothness: float
+) -> LegCurves:
     """Place nodes on all routes; each route is an open curve with the same number of nodes.
 
     Routes are relaxed with few nodes. Then the number of nodes is doubled, so that hardly any trace
     between neighbours fails.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+    routes : list of Routes
+        The routes of each leg, in one or more orders of the control points.
+    n_legs : int
+        Number of legs of a course.
+    smoothness : float
     """
     surface = graph.graph.surface
-    count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // len(routes)))
+    count = 1 + max(FEWEST_NODES, min(NODES_OF_A_ROUTE, MOST_NODES // n_legs))
     paths = [path for leg in routes for path in leg.cells]
     cells = np.concatenate(paths)
     begins = np.cumsum([0, *(len(path) for path in paths)])
@@ -104,7 +155,14 @@ def nodes_on_routes(graph: CourseGraph, routes: list[Routes], smoothness: float)
     clamped = np.zeros((len(paths), count), dtype=bool)
     clamped[:, [0, 1, -2, -1]] = True
     nodes = relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
-    return resampled(surface, nodes, clamped.ravel(), 2)[0]
+    numbers = [len(leg.cells) for leg in routes]
+    return LegCurves(
+        surface,
+        resampled(surface, nodes, clamped.ravel(), 2)[0],
+        np.arange(len(routes)).repeat(numbers),
+        np.array([[leg.start, leg.end] for leg in routes]).repeat(numbers, axis=0),
+        n_legs,
+    )
 
 
 def _is_end(count: int, paths: list[IntArray]) -> BoolArray:
@@ -122,28 +180,17 @@ def _places_of_cells(graph: CourseGraph) -> SurfacePoints:
     return joined([SurfacePoints(faces, barycentric), graph.points])
 
 
-def crossing_routes(
-    graph: CourseGraph, routes: list[Routes], nodes: Nodes, traces: NodeTraces
-) -> BoolArray:
-    """Which pairs of routes of different legs cross, and which routes cross themselves, (r, r).
+def crossing_legs(curves: LegCurves) -> BoolArray:
+    """Which pairs of curves cross, of different legs in one order, or a curve itself, (r, r).
 
-    Routes that share a control point may touch there.
-
-    Parameters
-    ----------
-    graph : CourseGraph
-    routes : list of Routes
-    nodes : Nodes
-        Nodes on all routes.
-    traces : NodeTraces
-        Traces between these nodes.
+    Curves that share a control point may touch there.
     """
-    segments = traced_segments(graph.graph.surface.mesh, traces)
-    count = nodes.per_curve
-    legs = np.concatenate([np.full((len(leg.cells), 2), [leg.start, leg.end]) for leg in routes])
-    leg = np.repeat(np.arange(len(routes)), [len(leg.cells) for leg in routes])
-    one, other = overlapping_segments(segments.face, segments.start, segments.end)
-    first, second = segments.node[one] // count, segments.node[other] // count
+    segments = traced_segments(curves.surface.mesh, curves.traces)
+    count, leg, legs = curves.nodes.per_curve, curves.leg, curves.ends
+    curve = segments.node // count
+    group = (leg[curve] // curves.n_legs) * len(curves.surface.mesh.faces) + segments.face
+    one, other = overlapping_segments(group, segments.start, segments.end)
+    first, second = curve[one], curve[other]
     kept = (leg[first] != leg[second]) | ((first == second) & (np.abs(one - other) > 1))
     one, other, first, second = one[kept], other[kept], first[kept], second[kept]
     common = np.zeros(len(one), dtype=bool)
@@ -157,40 +204,58 @@ def crossing_routes(
             )
     one, other, first, second = one[~common], other[~common], first[~common], second[~common]
     meet = segments_meet(segments.start, segments.end, one, other)
-    crosses = np.zeros((nodes.curves, nodes.curves), dtype=bool)
+    crosses = np.zeros((len(leg), len(leg)), dtype=bool)
     crosses[first[meet], second[meet]] = crosses[second[meet], first[meet]] = True
     return crosses
 
 
+def junctions_of_routes(graph: CourseGraph, routes: list[Routes], closed: bool) -> list[FloatArray]:
+    """Cost of the turn at every control point between two legs, for all pairs of their routes."""
+    following = [*routes[1:], *routes[:1]] if closed else routes[1:]
+    return [
+        junction_cost(graph, before.last, after.first)
+        for before, after in zip(routes, following, strict=False)
+    ]
+
+
 def cheapest_combinations(
-    graph: CourseGraph, routes: list[Routes], crosses: BoolArray, closed: bool
+    costs: list[FloatArray],
+    junctions: list[FloatArray],
+    crosses: BoolArray,
+    closed: bool,
 ) -> Combinations:
-    """Find the cheapest combinations of routes by beam search, leg by leg."""
-    count = len(routes)
-    offset = np.cumsum([0] + [len(leg.cells) for leg in routes])
-    price = CROSSING * sum(leg.cost.min() for leg in routes)
+    """Find the cheapest combinations of curves by beam search, leg by leg.
+
+    Parameters
+    ----------
+    costs : list of float arrays
+        Costs of the curves of each leg.
+    junctions : list of (a, b) float arrays
+        Cost of each pair of curves of two consecutive legs; of a closed course, also of the last
+        leg and the first one.
+    crosses : (r, r) bool array
+        Which curves cross, by their indices among the curves of all legs.
+    closed : bool
+    """
+    count = len(costs)
+    offset = np.cumsum([0] + [len(cost) for cost in costs])
+    price = CROSSING * sum(cost.min() for cost in costs)
     of_itself = np.where(np.diagonal(crosses), price, 0.0)
     choice = np.arange(offset[1])[:, None]
-    cost = routes[0].cost + of_itself[: offset[1]]
+    cost = costs[0] + of_itself[: offset[1]]
     for number in range(1, count):
         checkpoint()
         here = slice(offset[number], offset[number + 1])
-        total = cost[:, None] + routes[number].cost + of_itself[here]
-        total = (
-            total
-            + junction_cost(graph, routes[number - 1].last, routes[number].first)[choice[:, -1]]
-        )
+        total = cost[:, None] + costs[number] + of_itself[here]
+        total = total + junctions[number - 1][choice[:, -1] - offset[number - 1]]
         if closed and number == count - 1:
-            total = (
-                total
-                + junction_cost(graph, routes[number].last, routes[0].first)[:, choice[:, 0]].T
-            )
+            total = total + junctions[number][:, choice[:, 0]].T
         for earlier in range(number):
-            total += price * crosses[:, here].take(offset[earlier] + choice[:, earlier], axis=0)
+            total += price * crosses[:, here].take(choice[:, earlier], axis=0)
         best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
-        row, route = np.divmod(best, total.shape[1])
-        choice = np.concatenate([choice[row], route[:, None]], axis=1)
+        row, curve = np.divmod(best, total.shape[1])
+        choice = np.concatenate([choice[row], offset[number] + curve[:, None]], axis=1)
         cost = total.ravel()[best]
     return Combinations(choice, cost)
 
@@ -203,41 +268,41 @@ def _least(values: FloatArray, most: int) -> IntArray:
     return among[np.argsort(values[among], kind="stable")[:most]]
 
 
-def distinct_combinations(routes: list[Routes], combinations: Combinations, most: int) -> IntArray:
-    """The cheapest combinations, no two of which run beside each other on all legs, (d, l)."""
-    choice = combinations.choice
+def distinct_combinations(
+    alike: list[BoolArray], combinations: Combinations, most: int
+) -> Combinations:
+    """The cheapest combinations, no two of which run beside each other on all legs.
+
+    Parameters
+    ----------
+    alike : list of (a, a) bool arrays
+        Pairs of curves of each leg that run beside each other.
+    combinations : Combinations
+    most : int
+        Greatest number of combinations.
+    """
+    offset = np.cumsum([0] + [len(pairs) for pairs in alike])[:-1]
+    choice = combinations.choice - offset
     left = combinations.cost <= MAX_RELATIVE_COST * combinations.cost.min(initial=np.inf)
     chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())
         chosen.append(best)
         same = np.ones(len(choice), dtype=bool)
-        for leg, route in enumerate(routes):
-            same &= route.alike[choice[best, leg]][choice[:, leg]]
+        for leg, pairs in enumerate(alike):
+            same &= pairs[choice[best, leg]][choice[:, leg]]
         left &= ~same
-    return choice[chosen]
+    return Combinations(combinations.choice[chosen], combinations.cost[chosen])
 
 
-def course_nodes(
-    graph: CourseGraph,
-    routes: list[Routes],
-    nodes: Nodes,
-    traces: NodeTraces,
-    choice: IntArray,
-    closed: bool,
-) -> tuple[Nodes, BoolArray]:
+def course_nodes(curves: LegCurves, choice: IntArray, closed: bool) -> tuple[Nodes, BoolArray]:
     """Place nodes on whole courses.
 
     Parameters
     ----------
-    graph : CourseGraph
-    routes : list of Routes
-    nodes : Nodes
-        Nodes on all routes.
-    traces : NodeTraces
-        Traces between these nodes.
+    curves : LegCurves
     choice : (c, l) int array
-        Index of the route that each course takes on each leg.
+        Index of the curve that each course takes on each leg.
     closed : bool
 
     Returns
@@ -247,25 +312,25 @@ def course_nodes(
     (n,) bool array
         Which of their nodes are ends of legs.
     """
-    surface = graph.graph.surface
+    surface, nodes = curves.surface, curves.nodes
     size = nodes.per_curve
-    offset = np.cumsum([0] + [len(leg.cells) for leg in routes])[:-1]
-    curve = offset + choice
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
-    counts = _node_counts(lengths[curve])
+    counts = _node_counts(lengths[choice])
     course = np.arange(len(choice)).repeat(counts.sum(axis=1))
     of_legs = counts.ravel()
-    leg = np.tile(np.arange(len(routes)), len(choice)).repeat(of_legs)
+    leg = np.tile(np.arange(choice.shape[1]), len(choice)).repeat(of_legs)
     place = np.arange(len(leg)) - (of_legs.cumsum() - of_legs).repeat(of_legs)
     at = place * (size - 1) / of_legs.repeat(of_legs)
     node = np.floor(at).astype(np.int64)
-    places = places_along(surface, nodes, traces, curve[course, leg] * size + node, at - node)
+    places = places_along(
+        surface, nodes, curves.traces, choice[course, leg] * size + node, at - node
+    )
     starts = place == 0
-    own = nodes.places[(curve * size).ravel()]
+    own = nodes.places[(choice * size).ravel()]
     faces, barycentric = places.faces.copy(), places.barycentric.copy()
     faces[starts], barycentric[starts] = own.faces, own.barycentric
     if not closed:
-        last = nodes.places[curve[:, -1] * size + size - 1]
+        last = nodes.places[choice[:, -1] * size + size - 1]
         after = np.arange(1, len(choice) + 1) * (len(leg) // len(choice))
         faces = np.insert(faces, after, last.faces)
         barycentric = np.insert(barycentric, after, last.barycentric, axis=0)

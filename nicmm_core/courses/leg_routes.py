@@ -7,6 +7,7 @@ ends.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,13 +73,47 @@ class Routes:
 
 
 @dataclass(frozen=True)
-class _ByState:
-    """The best leg through each of some states."""
+class LegStates:
+    """The best leg through each of some states, by ascending cost.
+
+    Attributes
+    ----------
+    state : (s,) int array
+    cost : (s,) float array
+        Cost of the leg through each state.
+    first, last : (s,) int array
+        First and last state of each leg.
+    """
 
     state: IntArray
     cost: FloatArray
-    first: IntArray  # first and last state of each leg
+    first: IntArray
     last: IntArray
+
+    def backward(self, graph: CourseGraph) -> LegStates:
+        """The same legs in the opposite direction."""
+        reverse = graph.reverse
+        return LegStates(reverse[self.state], self.cost, reverse[self.last], reverse[self.first])
+
+
+@dataclass(frozen=True)
+class LegChoices:
+    """Legs between two control points among which routes are chosen.
+
+    Attributes
+    ----------
+    by_direction : LegStates
+        The best legs with different pairs of end directions.
+    by_cell : LegStates
+        The best legs through different cells.
+    """
+
+    by_direction: LegStates
+    by_cell: LegStates
+
+    def backward(self, graph: CourseGraph) -> LegChoices:
+        """The same legs in the opposite direction."""
+        return LegChoices(self.by_direction.backward(graph), self.by_cell.backward(graph))
 
 
 @dataclass(frozen=True)
@@ -89,20 +124,22 @@ class _Paths:
     begins: IntArray  # (p + 1,) where each path begins, and the end
 
 
-def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Routes]:
-    """Find routes of consecutive legs, (l, 2).
+def leg_choices(
+    graph: CourseGraph, pairs: Iterable[tuple[int, int]], n_legs: int
+) -> dict[tuple[int, int], LegChoices]:
+    """Find choices for legs between pairs of control points, in both directions.
 
-    Some routes are chosen because their directions fit those of the other legs, some because they
-    run elsewhere. The result is empty if any leg has no route.
+    Parameters
+    ----------
+    graph : CourseGraph
+    pairs : iterable of (int, int)
+        Indices of two control points each.
+    n_legs : int
+        Number of legs of a course.
     """
-    beside = _cells_beside(graph)
-    share = max(1, len(legs))
-    n_directions = min(DIRECTIONS, max(20, ALL_DIRECTIONS // share))
-    n_routes = max(6, ALL_ROUTES // share)
-    n_aligned = min(ALIGNED, (2 * n_routes) // 3)
-    n_different = min(DIFFERENT, n_routes // 3)
-    by_direction, by_cell = [], []
-    for start, end in legs.tolist():
+    n_directions = min(DIRECTIONS, max(20, ALL_DIRECTIONS // n_legs))
+    found = {}
+    for start, end in pairs:
         total = without_rounding_errors(graph.by_state(start, end))
         first, last = graph.first[start], graph.reverse[graph.first[end][graph.reverse]]
         ascending = np.argsort(total, kind="stable")
@@ -112,13 +149,36 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
         cells = _least_of_each(graph.hops.end[ascending], ascending, total)
         cells = cells[total[cells] <= MAX_RELATIVE_ROUTE_COST * total[cells[:1]]]
         cells = cells[:: max(1, -(-len(cells) // VIA_CELLS))]
-        by_direction.append(
-            _ByState(directions, total[directions], first[directions], last[directions])
+        choices = LegChoices(
+            *(
+                LegStates(state, total[state], first[state], last[state])
+                for state in (directions, cells)
+            )
         )
-        by_cell.append(_ByState(cells, total[cells], first[cells], last[cells]))
+        found[start, end], found[end, start] = choices, choices.backward(graph)
+    return found
+
+
+def routes_of_legs(
+    graph: CourseGraph,
+    choices: Mapping[tuple[int, int], LegChoices],
+    legs: IntArray,
+    closed: bool,
+) -> list[Routes]:
+    """Find routes of consecutive legs, (l, 2).
+
+    Some routes are chosen because their directions fit those of the other legs, some because they
+    run elsewhere. The result is empty if any leg has no route.
+    """
+    beside = _cells_beside(graph)
+    n_routes = max(6, ALL_ROUTES // max(1, len(legs)))
+    n_aligned = min(ALIGNED, (2 * n_routes) // 3)
+    n_different = min(DIFFERENT, n_routes // 3)
+    by_direction = [choices[start, end].by_direction for start, end in legs.tolist()]
+    by_cell = [choices[start, end].by_cell for start, end in legs.tolist()]
     if not all(len(choice.state) for choice in by_direction):
         return []
-    totals = _least_totals(graph, by_direction, closed)
+    totals = least_totals(graph, by_direction, closed)
     routes = []
     for (start, end), aligned, other, least in zip(
         legs.tolist(), by_direction, by_cell, totals, strict=True
@@ -148,7 +208,7 @@ def routes_of_legs(graph: CourseGraph, legs: IntArray, closed: bool) -> list[Rou
                 alike[np.ix_(chosen, chosen)],
             )
         )  # fmt: skip
-    return routes
+    return routes if all(len(leg.cells) for leg in routes) else []
 
 
 def junction_cost(graph: CourseGraph, arriving: IntArray, leaving: IntArray) -> FloatArray:
@@ -174,7 +234,7 @@ def _least_of_each(key: IntArray, ascending: IntArray, cost: FloatArray) -> IntA
     return least[np.argsort(cost[least], kind="stable")]
 
 
-def _least_totals(graph: CourseGraph, legs: list[_ByState], closed: bool) -> list[FloatArray]:
+def least_totals(graph: CourseGraph, legs: list[LegStates], closed: bool) -> list[FloatArray]:
     """For each leg, the least cost of a whole curve through each of its choices.
 
     Viterbi's algorithm runs forward and backward; on a closed curve, it does so for every choice of

@@ -152,16 +152,35 @@ def comparable_energies(
     scale : float
         L₀, in mesh units.
     """
+    at_nodes, lanes, weight = comparable_terms(surface, nodes, smoothness, scale)
     length = nodes.by_curve(nodes.step_lengths).sum(axis=1)
-    tension = (2.0 * np.pi / scale) ** 2 / smoothness
-    energy = scale * (curve_bending(nodes) + tension * length)
-    if surface.feature_map is not None:
-        weight = surface.feature_weight / smoothness + OVER_TENSION * tension
-        excess, ds = nodes.phi_fea**2 - 1.0, nodes.ds
-        outside = nodes.by_curve(np.maximum(excess, 0.0) * ds).sum(axis=1)
-        inside = nodes.by_curve(np.minimum(excess, 0.0) * ds).sum(axis=1) / length
-        energy += scale * weight * (outside + scale * inside)
-    return energy
+    return (
+        nodes.by_curve(at_nodes).sum(axis=1) + weight * nodes.by_curve(lanes).sum(axis=1) / length
+    )
+
+
+def comparable_terms(
+    surface: CurveSurface, nodes: Nodes, smoothness: float, scale: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """The terms of `comparable_energies` at the nodes.
+
+    Returns
+    -------
+    (n,) float array
+        All of E but the term of a.
+    (n,) float array
+        min(φ_fea² - 1, 0) ds, whose sum over a curve is L a.
+    float
+        Factor of a in E; 0 without a map.
+    """
+    tension, ds = (2.0 * np.pi / scale) ** 2 / smoothness, nodes.ds
+    energy = scale * (node_bending(nodes) + tension * ds)
+    if surface.feature_map is None:
+        return energy, np.zeros(len(ds)), 0.0
+    weight = scale * (surface.feature_weight / smoothness + OVER_TENSION * tension)
+    excess = nodes.phi_fea**2 - 1.0
+    energy += weight * np.maximum(excess, 0.0) * ds
+    return energy, np.minimum(excess, 0.0) * ds, scale * weight
 
 
 def curve_energies(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> FloatArray:

@@ -225,6 +225,7 @@ def _along_edges(
         for number, row in zip(left[found].tolist(), source[found].tolist(), strict=True):
             here, arc = int(end[number]), length[row]
             wanted = share[number] * arc[here]
+            high[number] = here
             while arc[here] > wanted:
                 high[number], here = here, int(previous[row, here])
             low[number] = here

@@ -36,7 +36,7 @@ def fan(count):
     )
 
 
-MOST_CALLS = 60_000
+MOST_CALLS = 75_000
 """Greatest number of calls in Python and C by one design on a mesh with 4,002 vertices."""
 
 
@@ -122,6 +122,7 @@ def test_repeated_searches_are_bounded(monkeypatch):
 
     monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
     monkeypatch.setattr(surface_designer, "SEARCHES_FOR_PARTS", 0)
+    monkeypatch.setattr(surface_designer, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
@@ -131,7 +132,7 @@ def test_repeated_searches_are_bounded(monkeypatch):
     searched.clear()
     monkeypatch.setattr(attempts, "FRUITLESS_SEARCHES", 100)
     nicmm.design_curve(body, chosen)
-    assert searched == list(range(1 + attempts.FURTHER_SEARCHES))
+    assert searched == list(range(6))
     searched.clear()
     monkeypatch.setattr(attempts, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)

@@ -10,7 +10,7 @@ from nicmm_core.courses.hop_graph import (
     distances_along_edges,
     with_control_points,
 )
-from nicmm_core.courses.leg_routes import routes_of_legs
+from nicmm_core.courses.leg_routes import leg_choices, routes_of_legs
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.core.checks import grid, points_near
 
@@ -22,6 +22,12 @@ def graph_through(mesh, positions, legs=LEGS, tension=160.0):
     points = points_near(mesh, np.asarray(positions, dtype=float))
     along = distances_along_edges(surface, points)
     return with_control_points(build_hop_graph(surface), points, along, legs, None, tension)
+
+
+def routes_through(graph, legs, closed):
+    """The routes of consecutive legs."""
+    choices = leg_choices(graph, map(tuple, legs.tolist()), len(legs))
+    return routes_of_legs(graph, choices, legs, closed)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +71,7 @@ def test_a_straight_leg_costs_at_least_its_length_and_not_much_more(on_square):
 
 
 def test_routes_run_along_hops_and_are_simple(on_body):
-    routes = routes_of_legs(on_body, LEGS, closed=True)
+    routes = routes_through(on_body, LEGS, closed=True)
     hops = set(zip(on_body.hops.start.tolist(), on_body.hops.end.tolist(), strict=True))
     for leg in routes:
         assert len(leg.cells) > 5
@@ -85,7 +91,7 @@ def test_routes_pass_a_tube_on_both_sides():
     graph = graph_through(torus, places, np.array([[0, 1]]))
     sides = {
         bool(np.sign(graph.positions[path[len(path) // 2], 1]) > 0)
-        for path in routes_of_legs(graph, np.array([[0, 1]]), closed=False)[0].cells
+        for path in routes_through(graph, np.array([[0, 1]]), closed=False)[0].cells
     }
     assert sides == {True, False}
 
@@ -96,7 +102,7 @@ def test_hops_between_neighbouring_control_points_need_no_cell():
     graph = graph_through(square, near)
     for start, end in LEGS:
         assert np.isfinite(graph.by_state(start, end)).any()
-    assert all(len(leg.cells) for leg in routes_of_legs(graph, LEGS, closed=True))
+    assert all(len(leg.cells) for leg in routes_through(graph, LEGS, closed=True))
 
 
 @pytest.mark.slow

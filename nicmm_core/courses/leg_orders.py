@@ -1,0 +1,88 @@
+"""Finds orders of the control points in which a curve may bend least, by the costs of legs.
+
+The shortest order is seldom the one in which the fairest curve visits its points. An order that
+reverses a section of the shortest one ("2-opt": Croes, "A method for solving traveling-salesman
+problems", 1958) is often better, and the hop graph tells which.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..geometry.array_types import IntArray
+from .hop_graph import CourseGraph
+from .leg_routes import LegChoices, LegStates, least_totals
+
+MOST_POINTS = 7
+"""Number of points above which only the given order is tried; there are too many pairs of points
+then, and crossing legs are uncrossed later anyway."""
+
+DIRECTIONS = 24
+"""Number of pairs of end directions of a leg with which an order is tried."""
+
+MAX_RELATIVE_COST = 1.6
+"""Cost of an order, relative to the cheapest, above which it is left out."""
+
+
+def reversals(count: int, closed: bool) -> list[IntArray]:
+    """The order 0 … count - 1, and every order that reverses a section of it, each once.
+
+    A closed order starts at 0, and is the same in the opposite direction.
+    """
+    base = np.arange(count)
+    orders = [base]
+    for first, last in itertools.combinations(range(int(closed), count), 2):
+        if last - first < count - 1 - closed:  # not the whole order
+            section = base[first : last + 1][::-1]
+            orders.append(np.concatenate([base[:first], section, base[last + 1 :]]))
+    return orders
+
+
+def legs_of_order(order: IntArray, closed: bool) -> IntArray:
+    """The points at both ends of every leg, (l, 2)."""
+    legs = np.stack([order, np.roll(order, -1)], axis=1)
+    return legs if closed else legs[:-1]
+
+
+def cheapest_orders(
+    graph: CourseGraph,
+    choices: Mapping[tuple[int, int], LegChoices],
+    closed: bool,
+    most: int,
+) -> list[IntArray]:
+    """Find the cheapest orders of all control points of a graph, by ascending cost.
+
+    The cost of an order is that of its cheapest legs whose directions fit each other. Crossings do
+    not count.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+        Its k control points are in an order that makes a short tour.
+    choices : mapping
+        Choices for the legs between all pairs of points.
+    closed : bool
+    most : int
+        Greatest number of orders.
+    """
+    orders, costs = [], []
+    for order in reversals(len(graph.points), closed):
+        legs = [
+            _first_choices(choices[start, end].by_direction)
+            for start, end in legs_of_order(order, closed).tolist()
+        ]
+        if all(len(leg.state) for leg in legs):
+            orders.append(order)
+            costs.append(float(least_totals(graph, legs, closed)[0].min()))
+    cost = np.array(costs)
+    ascending = np.argsort(cost, kind="stable")
+    cheap = ascending[cost[ascending] <= MAX_RELATIVE_COST * cost.min(initial=np.inf)]
+    return [orders[number] for number in cheap[:most].tolist()]
+
+
+def _first_choices(legs: LegStates) -> LegStates:
+    kept = slice(DIRECTIONS)
+    return LegStates(legs.state[kept], legs.cost[kept], legs.first[kept], legs.last[kept])

@@ -1,0 +1,229 @@
+"""Combines legs of relaxed courses into new courses.
+
+Relaxation makes every course as good as its neighbours in the graph allow, but hardly any course is
+good everywhere. Legs of different courses start and end at the same control points. So the best
+legs of all courses are combined, as routes of the graph were before, now with the energies of
+relaxed legs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry import tolerances
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.surface_points import SurfacePoints
+from ..geometry.vectors import lengths, unit
+from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
+from ..relaxation.elastic_energy import comparable_energies, comparable_terms
+from ..relaxation.node_traces import places_along, traces_between_nodes
+from .comparison import SAME_COURSE
+from .leg_combinations import (
+    LegCurves,
+    cheapest_combinations,
+    course_nodes,
+    crossing_legs,
+    distinct_combinations,
+)
+
+NODES_OF_A_LEG = 24
+"""Number of nodes of a leg while legs are combined."""
+
+FEWEST_POINTS = 3
+"""Number of control points below which there is nothing to combine."""
+
+
+def recombined(
+    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float, most: int
+) -> tuple[Nodes, IntArray] | None:
+    """Combine the legs of courses into new courses in the order of the best course.
+
+    Parameters
+    ----------
+    surface : CurveSurface
+    nodes : Nodes
+        c courses that begin at a control point; open ones also end at one.
+    visit : (n,) int array
+        Index of the control point at each node, -1 where there is none.
+    smoothness : float
+        Divisor of the tension.
+    most : int
+        Greatest number of new courses.
+
+    Returns
+    -------
+    (Nodes, (m,) int array) or None
+        The new courses, and the control point at each of their nodes. None if there are too few
+        control points, or if no legs can be combined.
+    """
+    scale = float(nodes.by_curve(nodes.step_lengths).sum(axis=1).min())
+    energy = comparable_energies(surface, nodes, smoothness, scale)
+    visits = nodes.by_curve(visit)
+    place = np.nonzero(visits >= 0)[1].reshape(nodes.curves, -1)  # of the control points
+    if place.shape[1] < FEWEST_POINTS:
+        return None
+    order = visits[np.arange(nodes.curves)[:, None], place]
+    best = order[int(energy.argmin())]
+    course, begin, end, leg, backward = _legs_in_order(place, order, best, nodes)
+    curves = LegCurves(
+        surface,
+        _nodes_on_legs(surface, nodes, course, begin, end, backward),
+        leg,
+        np.stack([best, np.roll(best, -1)], axis=1)[leg],
+        int(leg[-1]) + 1,
+    )
+    legs = [curves.of_leg(number) for number in range(curves.n_legs)]
+    cost = _costs(
+        nodes, comparable_terms(surface, nodes, smoothness, scale), course, begin, end, leg
+    )
+    turns = _turning_costs(curves.nodes, legs, nodes.closed, scale)
+    crosses = crossing_legs(curves)
+    found = cheapest_combinations([cost[each] for each in legs], turns, crosses, nodes.closed)
+    alike = [_alike(curves.nodes, each, SAME_COURSE * surface.mesh.diagonal) for each in legs]
+    found = distinct_combinations(alike, found, most)
+    if not len(found.choice):
+        return None
+    new, at_points = course_nodes(curves, found.choice, nodes.closed)
+    new_visit = np.full(len(at_points), -1)
+    new_visit[at_points] = np.tile(best, len(found.choice))
+    return new, new_visit
+
+
+def _legs_in_order(
+    place: IntArray, order: IntArray, wanted: IntArray, nodes: Nodes
+) -> tuple[IntArray, IntArray, IntArray, IntArray, BoolArray]:
+    """The legs of all courses that also occur in one order of the control points, sorted by leg.
+
+    Parameters
+    ----------
+    place : (c, k) int array
+        Places of the control points among the nodes of their course.
+    order : (c, k) int array
+        Control points in the order that each course visits them.
+    wanted : (k,) int array
+        The order whose legs are wanted.
+    nodes : Nodes
+
+    Returns
+    -------
+    course, begin, end, leg : (r,) int arrays
+        The course of each leg, the places of its ends, and its number in the wanted order. The last
+        leg of a closed course ends at the place after its last node.
+    backward : (r,) bool array
+        Whether the course runs along the leg in the other direction.
+    """
+    count = len(wanted) if nodes.closed else len(wanted) - 1
+    number = np.full((wanted.max() + 1,) * 2, -1)
+    number[wanted[:count], np.roll(wanted, -1)[:count]] = np.arange(count)
+    begin, end = place, np.append(place[:, 1:], np.full((len(place), 1), nodes.per_curve), axis=1)
+    one, other = order, np.roll(order, -1, axis=1)
+    begin, end, one, other = (each[:, :count] for each in (begin, end, one, other))
+    forward, reverse = number[one, other], number[other, one]
+    leg = np.where(forward >= 0, forward, reverse)
+    course, which = np.nonzero(leg >= 0)
+    ascending = np.argsort(leg[course, which], kind="stable")
+    course, which = course[ascending], which[ascending]
+    found = (course, which)
+    return course, begin[found], end[found], leg[found], forward[found] < 0
+
+
+def _nodes_on_legs(
+    surface: CurveSurface,
+    nodes: Nodes,
+    course: IntArray,
+    begin: IntArray,
+    end: IntArray,
+    backward: BoolArray,
+) -> Nodes:
+    """Place nodes evenly along legs of courses; each leg is an open curve."""
+    size = nodes.per_curve
+    steps = nodes.by_curve(nodes.step_lengths)
+    arc = np.zeros((nodes.curves, size + 1))
+    steps.cumsum(axis=1, out=arc[:, 1:])
+    arc += (arc[:, -1].cumsum() - arc[:, -1])[:, None]
+    first, last = arc[course, begin][:, None], arc[course, end][:, None]
+    share = np.linspace(0.0, 1.0, NODES_OF_A_LEG)
+    share = np.where(backward[:, None], 1.0 - share, share)
+    wanted = first + share * (last - first)
+    step = np.searchsorted(arc.ravel(), wanted, side="right") - 1 - course[:, None] * (size + 1)
+    step = step.clip(begin[:, None], end[:, None] - 1)
+    row = course[:, None]
+    along = (wanted - arc[row, step]) / np.maximum(steps[row, step], tolerances.TINY)
+    traces = traces_between_nodes(surface, nodes)
+    places = places_along(
+        surface, nodes, traces, (row * size + step).ravel(), along.clip(0.0, 1.0).ravel()
+    )
+    # Control points stay exactly where they are.
+    ends = course[:, None] * size + np.stack([begin, end % size], axis=1)
+    ends = np.where(backward[:, None], ends[:, ::-1], ends)
+    at = np.arange(len(course))[:, None] * NODES_OF_A_LEG + [0, NODES_OF_A_LEG - 1]
+    faces, barycentric = places.faces.copy(), places.barycentric.copy()
+    faces[at], barycentric[at] = nodes.places.faces[ends], nodes.places.barycentric[ends]
+    return nodes_at(surface, SurfacePoints(faces, barycentric), False, len(course))
+
+
+def _costs(
+    nodes: Nodes,
+    terms: tuple[FloatArray, FloatArray, float],
+    course: IntArray,
+    begin: IntArray,
+    end: IntArray,
+    leg: IntArray,
+) -> FloatArray:
+    """Energies of legs, (r,), from the terms of `comparable_terms`; never negative.
+
+    The term of lanes is a mean along the whole curve. So the mean along a leg counts by the typical
+    share of this leg in the length of a course, and is increased by 1, for all curves of a leg.
+    """
+    at_nodes, lanes, weight = terms
+
+    def along_legs(values: FloatArray) -> FloatArray:
+        """Sums of values at nodes along legs; a value at an end counts half."""
+        rows = nodes.by_curve(values)
+        rows = np.append(rows, rows[:, :1], axis=1)
+        before = np.append(np.zeros((len(rows), 1)), rows.cumsum(axis=1), axis=1)
+        whole = before[course, end + 1] - before[course, begin]
+        result: FloatArray = whole - 0.5 * (rows[course, begin] + rows[course, end])
+        return result
+
+    length = np.maximum(along_legs(nodes.ds), tolerances.TINY)
+    share = length / nodes.by_curve(nodes.step_lengths).sum(axis=1)[course]
+    typical = np.bincount(leg, share) / np.bincount(leg)
+    return along_legs(at_nodes) + weight * typical[leg] * (1.0 + along_legs(lanes) / length)
+
+
+def _turning_costs(
+    legs: Nodes, of_legs: list[slice], closed: bool, scale: float
+) -> list[FloatArray]:
+    """Cost of joining two legs at a control point, for all pairs of curves of consecutive legs.
+
+    Two legs with an angle θ between them share it: each end turns by θ / 2. Turning one end of a
+    clamped elastic rod of length ℓ by an angle α takes the energy 4 α² / ℓ, so together they cost
+    θ² / ℓ for each leg.
+    """
+    count = legs.per_curve
+    positions, normals = (each.reshape(-1, count, 3) for each in (legs.positions, legs.normals))
+    length = legs.by_curve(legs.step_lengths).sum(axis=1)
+
+    def tangents(one: int, other: int, at: int) -> FloatArray:
+        step, normal = positions[:, other] - positions[:, one], normals[:, at]
+        step = step - (step * normal).sum(axis=1, keepdims=True) * normal
+        return unit(step.T).T
+
+    leaving, arriving = tangents(0, 1, 0), tangents(-2, -1, -1)
+    following = [*of_legs[1:], *of_legs[:1]] if closed else of_legs[1:]
+    costs = []
+    for before, after in zip(of_legs, following, strict=False):
+        angle = np.arccos((arriving[before] @ leaving[after].T).clip(-1.0, 1.0))
+        inverse = 1.0 / np.maximum(length, tolerances.TINY)
+        costs.append(scale * angle**2 * (inverse[before, None] + inverse[after]))
+    return costs
+
+
+def _alike(legs: Nodes, of_leg: slice, limit: float) -> BoolArray:
+    """Pairs of curves of one leg whose nodes are nowhere farther apart than a limit."""
+    positions = legs.positions.reshape(-1, legs.per_curve, 3)[of_leg]
+    apart = (positions[:, None] - positions).reshape(-1, 3).T
+    farthest = lengths(apart).reshape(len(positions), len(positions), -1).max(axis=2)
+    result: BoolArray = farthest <= limit
+    return result

@@ -1,0 +1,63 @@
+"""Tests of the orders of control points that a search tries."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import nicmm_core as nicmm
+from nicmm_core import shapes
+from nicmm_core.courses.leg_orders import cheapest_orders, legs_of_order, reversals
+from nicmm_core.courses.leg_routes import leg_choices
+from tests.core.checks import assert_valid_design, grid
+from tests.core.courses.test_hop_graph import graph_through
+
+
+def tour(order, closed):
+    """An order as a set of legs without directions."""
+    return frozenset(map(frozenset, legs_of_order(np.array(order), closed).tolist()))
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 7])
+def test_reversals_are_different_tours_of_all_points(count, closed):
+    if closed and count == 2:
+        pytest.skip("a closed curve has three points")
+    orders = reversals(count, closed)
+    np.testing.assert_array_equal(orders[0], np.arange(count))
+    tours = {tour(order, closed) for order in orders}
+    assert len(tours) == len(orders)
+    assert all(sorted(order.tolist()) == list(range(count)) for order in orders)
+    if count <= (4 if closed else 3):  # then a single reversal leads to every tour
+        everything = itertools.permutations(range(count))
+        assert tours == {tour(order, closed) for order in everything}
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_cheapest_order_on_a_plane_has_the_gentlest_turns(closed):
+    """Points in the order of a bow tie: an order without the bow costs less."""
+    corners = [[0.2, 0.2, 0.0], [0.8, 0.8, 0.0], [0.8, 0.2, 0.0], [0.2, 0.8, 0.0]]
+    legs = legs_of_order(np.arange(4), closed)
+    graph = graph_through(grid(40), corners, legs)
+    choices = leg_choices(graph, itertools.combinations(range(4), 2), len(legs))
+    orders = cheapest_orders(graph, choices, closed, 3)
+    assert 1 <= len(orders) <= 3
+    best = tour(orders[0], closed)
+    around = {frozenset(pair) for pair in ([0, 2], [2, 1], [1, 3], [3, 0])}
+    assert best <= around
+
+
+@pytest.mark.slow
+def test_the_fairest_curve_may_visit_points_in_another_order():
+    """On some bodies it does; an order that is given is kept."""
+    changed = 0
+    for seed in range(4):
+        body = shapes.creature(seed, resolution=32, faces=1500)
+        chosen = np.random.default_rng(seed).choice(len(body.vertices), 4, replace=False)
+        free = nicmm.design_curve(body, chosen, order="shortest")
+        assert_valid_design(body, free)
+        visited = free.resumable.visited
+        given = nicmm.design_curve(body, chosen)
+        np.testing.assert_array_equal(given.resumable.visited, np.arange(4))
+        changed += tour(visited, True) != tour(np.arange(4), True)
+    assert changed
