@@ -108,7 +108,8 @@ class Designer:
             A curve on this mesh from which the design starts; only with the method "nicmm". Its
             course and the order of its points are kept, so the result may differ from a design
             without a start, and `via_points` have no effect. Obstacles, maps and smoothness may
-            differ from those of the start. Control points may have been added, removed, or moved by
+            differ from those of the start; if only painted weights differ, only the curve near them
+            moves. Control points may have been added, removed, or moved by
             up to a tenth of the curve's length. The cost depends on the curve and not on the size
             of the mesh, so a start suits interactive dragging of a point.
         max_iterations : int, optional

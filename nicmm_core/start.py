@@ -24,7 +24,7 @@ from .relaxation.node_spacing import arc_lengths
 from .relaxation.noded_curve import NodedCurve, is_simple, noded_curve
 from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, with_moved_controls
-from .request import Request
+from .request import Request, same_request
 
 WITHOUT_START = "; leave start out"
 
@@ -54,6 +54,8 @@ class Resumable:
     collisions : int
         Number of the following designs in which strands are assumed to collide, so that every
         iteration is traced.
+    unsettled : (u,) int array or None
+        Vertices near which the curve may not have converged; None if that may be so everywhere.
     given : Mesh or None
         The mesh of the caller. Meshes that differ in position or numbering have equal copies.
     """
@@ -63,7 +65,33 @@ class Resumable:
     curve: NodedCurve
     visited: IntArray
     collisions: int = 0
+    unsettled: IntArray | None = None
     given: Mesh | None = None
+
+
+def unsettled_vertices(start: Resumable, request: Request) -> IntArray | None:
+    """Vertices near which a start may move, if the request differs in painted weights only.
+
+    Elsewhere the curve has converged, and a map that changes far away should not move it.
+
+    Returns
+    -------
+    (u,) int array or None
+        Vertices whose weights changed, and those near which the start has not converged. None if
+        the whole curve may move.
+    """
+    before, none = start.request, np.zeros(len(start.mesh.vertices))
+    unpainted = [replace(each, obstacles=None, alignment=None) for each in (before, request)]
+    if start.unsettled is None or not same_request(*unpainted):
+        return None
+    changed = none != 0.0
+    changed[start.unsettled] = True
+    for one, other in (
+        (before.obstacles, request.obstacles),
+        (before.alignment, request.alignment),
+    ):
+        changed |= (none if one is None else one) != (none if other is None else other)
+    return np.flatnonzero(changed)
 
 
 def moved_start(

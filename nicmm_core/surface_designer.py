@@ -46,9 +46,9 @@ from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from .relaxation.noded_curve import NodedCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed, relax
 from .relaxation.simple_curve import simple_curve
-from .relaxation.warm_start import WARM
+from .relaxation.warm_start import WARM, movable_near
 from .request import Request, same_maps
-from .start import Resumable, moved_start
+from .start import Resumable, moved_start, unsettled_vertices
 from .status import Status
 
 START_FRACTION = 0.6
@@ -83,6 +83,7 @@ class _Start:
     unit: float  # square root of the surface's area
     breaking: int = 0
     collisions: int = 0
+    unsettled: IntArray | None = None  # vertices near which it may move; None if everywhere
 
 
 class SurfaceDesigner:
@@ -153,10 +154,19 @@ class SurfaceDesigner:
         """Move a start to the control points and relax it."""
         surface = self._curve_surface(request)
         curve, visited = moved_start(surface, start, request)
-        collisions = start.collisions if isinstance(start, Resumable) else 0
+        collisions, unsettled = 0, None
+        if isinstance(start, Resumable):
+            collisions, unsettled = start.collisions, unsettled_vertices(start, request)
         # If strands collide, an attempt without tracing every iteration would fail.
         config = replace(WARM, defer_tracing=not collisions)
-        begin = _Start(curve, visited, surface, self._unit(request), collisions=collisions)
+        begin = _Start(
+            curve,
+            visited,
+            surface,
+            self._unit(request),
+            collisions=collisions,
+            unsettled=unsettled,
+        )
         relaxed = _relaxed(request, begin, config, max_iterations)
         return self._relaxed_design(request, begin, relaxed, started)
 
@@ -360,6 +370,7 @@ class SurfaceDesigner:
         feature = 0.0 if start.surface.feature_map is None else 0.5 * relaxed.feature / unit
         # φ is exactly the distance to the curve, so two terms of Eq. 2 vanish.
         energy = {"sdf": 0.0, "int": 0.0, "smooth": 0.5 * relaxed.bending * unit, "fea": feature}
+        converged = relaxed.status is Status.CONVERGED
         collisions = COLLISIONS if relaxed.collided else max(start.collisions - 1, 0)
         return Design(
             status=relaxed.status,
@@ -369,7 +380,14 @@ class SurfaceDesigner:
             energy=energy,
             breaking_vertices=start.breaking,
             find_field=partial(curve_field, self.mesh, relaxed.curve),
-            resumable=Resumable(self.mesh, request, relaxed.noded_curve, start.visited, collisions),
+            resumable=Resumable(
+                self.mesh,
+                request,
+                relaxed.noded_curve,
+                start.visited,
+                collisions,
+                np.zeros(0, np.int64) if converged else start.unsettled,
+            ),
         )
 
     def _level_set_design(
@@ -452,7 +470,10 @@ def _relaxed(
         checkpoint(1.0 - (1.0 - done) ** LIMIT_TO_USUAL_ITERATIONS, lambda: points)
         return True
 
-    return relax(start.surface, start.curve, request.smoothness, config, watch)
+    movable = None
+    if start.unsettled is not None:
+        movable = movable_near(start.surface.mesh, start.unsettled)
+    return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
 
 
 def _is_apart(start: _Start, curves: list[NodedCurve]) -> bool:

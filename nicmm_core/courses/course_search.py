@@ -35,12 +35,11 @@ from .leg_routes import Routes, leg_choices, routes_of_legs
 from .recombination import recombined
 from .uncrossing import uncrossed
 
-TENSIONS = (2.0, 1.0, 4.0)
+TENSIONS = (2.0, 1.0)
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path.
 
 Searches with different seeds take them in turn, since a low tension finds long courses that bend
-little, and a high one short courses. It is greater than 1 by default because hops overestimate
-bending: they turn only at cells.
+little. It is greater than 1 by default because hops overestimate bending: they turn only at cells.
 """
 
 CANDIDATES = (16, 10, 8)

@@ -170,6 +170,9 @@ class Relaxed:
 
 Watch = Callable[[float, FloatArray], bool]
 
+Movable = Callable[[FloatArray], BoolArray]
+"""Tells which nodes may move, (n,), from their positions, (n, 3)."""
+
 
 def relax(
     surface: CurveSurface,
@@ -177,6 +180,7 @@ def relax(
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
+    movable: Movable | None = None,
 ) -> Relaxed:
     """Relax a curve.
 
@@ -193,6 +197,8 @@ def relax(
         `RelaxationConfig.iterations`, and the positions of the nodes, (n, 3). Relaxation stops when
         it returns False. It also stops, with the last traced curve, when `progress.checkpoint`
         raises `CancelledError`.
+    movable : callable, optional
+        Which nodes may move; by default all but the control points.
 
     Returns
     -------
@@ -206,7 +212,7 @@ def relax(
     iterations, work, collided = 0, 0.0, False
     for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
         attempt = _Attempt(
-            surface, smoothness, config, watch, traces_every_iteration, first, iterations
+            surface, smoothness, config, watch, movable, traces_every_iteration, first, iterations
         )
         curve = attempt.run()
         iterations, work = attempt.iterations, work + attempt.work.spent
@@ -240,11 +246,12 @@ class _State:
     here: Linearised
     held: BoolArray  # (n,) which nodes must not move
     stepping: Stepping
+    movable: BoolArray | None  # (n,) None if all nodes may move
 
     @property
     def free(self) -> BoolArray:
         """Which nodes may move, (n,)."""
-        free = ~self.held
+        free = ~self.held if self.movable is None else self.movable & ~self.held
         free[self.curve.control_nodes] = False
         return free
 
@@ -285,12 +292,13 @@ class _Attempt:
         smoothness: float,
         config: RelaxationConfig,
         watch: Watch | None,
+        movable: Movable | None,
         traces_every_iteration: bool,
         start: NodedCurve,
         iterations: int,
     ) -> None:
         self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
-        self.traces_every_iteration = traces_every_iteration
+        self.movable, self.traces_every_iteration = movable, traces_every_iteration
         self.iterations = iterations  # including those of earlier attempts
         self.last_iteration = min(iterations + config.iterations, config.most_iterations)
         self.work = Work(config.work)
@@ -377,7 +385,8 @@ class _Attempt:
         )
         strands = NearStrands(nodes) if self.traces_every_iteration else None
         stepping = Stepping(self.surface, weights, self.config.stepping, self.work, strands)
-        return _State(curve, linearised(stepping, nodes), held, stepping)
+        movable = None if self.movable is None else self.movable(nodes.positions)
+        return _State(curve, linearised(stepping, nodes), held, stepping, movable)
 
     def _iteration(self, state: _State, damping: float) -> _Iteration | None:
         """Take steps and retrace the curve, unless deferred; None if no step lowers the energy."""

@@ -1,20 +1,23 @@
-"""Moves the control points of a relaxed curve, and nearby nodes with them, as a start.
+"""Starts the relaxation from a relaxed curve: moves its control points, or lets only a part move.
 
 The move of a node decreases smoothly with its distance from the control point, so that relaxation
-starts from a curve without a kink. This works for small moves only; `start` rejects others.
+starts from a curve without a kink. This works for small moves only; `start` rejects others. If only
+the weights of a map have changed, only the nodes near these weights move.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .levenberg_marquardt import StepConfig
 from .noded_curve import NodedCurve, is_simple, shifted, traced_through
-from .relaxing import RelaxationConfig
+from .relaxing import Movable, RelaxationConfig
 
 WARM = RelaxationConfig(
     levels=(512,),
@@ -26,6 +29,9 @@ WARM = RelaxationConfig(
 
 Since tracing is deferred, an iteration consists of only one step.
 """
+
+REACH = 0.2
+"""Distance from changed weights of a map up to which a curve may move, relative to the diagonal."""
 
 LONGEST_MOVE = 0.1
 """Greatest distance that a control point may have moved, relative to the curve's length."""
@@ -89,3 +95,17 @@ def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray
             share = np.clip(1.0 - away / reach, 0.0, 1.0)
             shift += (share * share * (3.0 - 2.0 * share))[:, None] * vector
     return shift
+
+
+def movable_near(mesh: Mesh, vertices: IntArray) -> Movable:
+    """Let only the nodes near some vertices of a mesh move."""
+    reach = REACH * mesh.diagonal
+    if not len(vertices):
+        return lambda positions: np.zeros(len(positions), dtype=bool)
+    tree = cKDTree(mesh.vertices[vertices])
+
+    def movable(positions: FloatArray) -> BoolArray:
+        near: BoolArray = tree.query(positions, distance_upper_bound=reach)[0] <= reach
+        return near
+
+    return movable

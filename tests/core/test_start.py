@@ -467,3 +467,77 @@ def test_iterations_are_few_from_afar_and_fewer_from_a_start():
                 dragged.append(design.iterations)
     assert np.median(from_afar) <= 10
     assert np.median(dragged) <= 3
+
+
+class TestPaintedBesideACurve:
+    """If only the weights of a map change, only the curve near them moves."""
+
+    FAR = 0.3
+    """Distance from the dab, relative to the diagonal; larger than the reach of a change."""
+
+    @pytest.fixture
+    def designer(self, ball):
+        return nicmm.Designer(ball)
+
+    @pytest.fixture
+    def before(self, ball, designer):
+        return designer.design(on_ball(ball))
+
+    @pytest.fixture
+    def dab(self, ball):
+        """A place beside the middle of the first leg, and weights around it."""
+        middle = circle(np.array([0.65]))[0] + [0.0, 0.0, 0.12]
+        place = middle / np.linalg.norm(middle)
+        away = np.linalg.norm(ball.vertices - place, axis=1)
+        return place, np.clip(1.0 - (away / 0.15) ** 2, 0.0, None)
+
+    def moved(self, ball, before, after, place):
+        """Greatest distances between two curves, far from the dab and near it, in diagonals."""
+        points = before.curves[0].points
+        away = distances_to_polyline(points, after.curves[0].points) / ball.diagonal
+        far = np.linalg.norm(points - place, axis=1) > self.FAR * ball.diagonal
+        assert far.any() and not far.all()
+        return away[far].max(), away[~far].max()
+
+    @pytest.mark.parametrize("kind", ["alignment", "obstacles"])
+    def test_the_rest_stays(self, ball, designer, before, dab, kind):
+        place, weights = dab
+        points = on_ball(ball)
+        after = designer.design(points, start=before, **{kind: weights})
+        assert after.status is nicmm.Status.CONVERGED
+        assert_valid_design(ball, after, points.positions(ball))
+        far, near = self.moved(ball, before, after, place)
+        assert far < 1e-3 < 1e-2 < near
+        whole = designer.design(points, **{kind: weights})
+        _, difference = self.moved(ball, whole, after, place)
+        assert difference < 0.5 * near
+
+    def test_it_also_stays_while_iterations_are_few(self, ball, designer, before, dab):
+        place, weights = dab
+        after, calls = converged(designer, on_ball(ball), before, 1, alignment=weights)
+        assert calls > 1
+        far, near = self.moved(ball, before, after, place)
+        assert far < 1e-3 < 1e-2 < near
+
+    def test_without_the_dab_the_curve_is_the_first_one(self, ball, designer, before, dab):
+        place, weights = dab
+        points = on_ball(ball)
+        after = designer.design(points, start=before, alignment=weights)
+        back = designer.design(points, start=after)
+        assert max(self.moved(ball, before, back, place)) < 3e-3
+
+    def test_a_moved_point_moves_the_whole_curve_too(self, ball, designer, before, dab):
+        place, weights = dab
+        points = on_ball(ball, raised=0.05)
+        after = designer.design(points, start=before, alignment=weights)
+        assert_valid_design(ball, after, points.positions(ball))
+        whole = designer.design(points, alignment=weights)
+        assert max(self.moved(ball, whole, after, place)) < 5e-3
+
+
+def distances_to_polyline(points, line):
+    """Distance of each point to a closed polyline."""
+    start, step = line, np.roll(line, -1, axis=0) - line
+    share = np.einsum("psd,sd->ps", points[:, None] - start, step) / (step**2).sum(axis=1)
+    nearest = start + share.clip(0.0, 1.0)[..., None] * step
+    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
