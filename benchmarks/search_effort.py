@@ -93,9 +93,9 @@ def section(results: Results) -> str:
     )  # fmt: skip
     return (
         "The table shows how the energy of a curve and the time of its design depend on how long "
-        "courses are searched for. Each row is an effort: a single search, up to "
-        f"{attempts.FURTHER_SEARCHES} repeated searches, these and searches for parts (the "
-        f"default), and {MOST} times as many searches with {MOST} times the bound on work. The "
+        "courses are searched for. Each row is an effort: a single search, repeated searches (up "
+        f"to {attempts.FURTHER_SEARCHES}), these and searches for parts (the default), and "
+        f"{MOST} times as many searches with {MOST} times the bound on work. The "
         f"statistics are over closed curves on {len(requests)} meshes ({results['meshes']}, and "
         "closed manifold meshes, people and animals as they are; one set of 3–5 random vertices "
         f"per mesh, shortest order, seed {results['seed']}). An energy is divided by the least one "

@@ -108,10 +108,10 @@ class Designer:
             A curve on this mesh from which the design starts; only with the method "nicmm". Its
             course and the order of its points are kept, so the result may differ from a design
             without a start, and `via_points` have no effect. Obstacles, maps and smoothness may
-            differ from those of the start; if only painted weights differ, only the curve near them
-            moves. Control points may have been added, removed, or moved by
-            up to a tenth of the curve's length. The cost depends on the curve and not on the size
-            of the mesh, so a start suits interactive dragging of a point.
+            differ from those of the start. If the start is a converged Design and only painted
+            weights differ, only the curve near them moves. Control points may have been added,
+            removed, or moved by up to a tenth of the curve's length. The cost depends on the curve
+            and not on the size of the mesh, so a start suits interactive dragging of a point.
         max_iterations : int, optional
             Limit on the iterations of the relaxation; only with the method "nicmm". If the curve
             has not converged by then, the status is `ITERATION_LIMIT`. For interactive drawing,
@@ -249,8 +249,8 @@ def design_curve(
         Whether the curve is closed. An open curve runs from the first point visited to the last.
     order : {"given", "shortest"}
         Whether the curve visits the points in the given order or in the order of the shortest path
-        through them, which is cyclic for a closed curve. With "shortest", a course that would cross
-        itself may visit them in yet another order. The shortest order is not always the fairest.
+        through them, which is cyclic for a closed curve. With "shortest", the curve may visit them
+        in yet another order, if it is fairer then or would cross itself otherwise.
     via_points : mapping, optional
         Points that select one of several courses between two control points, such as
         ``{1: [57]}``. The key is the index of a control point. The value has points, in any form

@@ -80,17 +80,22 @@ def unsettled_vertices(start: Resumable, request: Request) -> IntArray | None:
         Vertices whose weights changed, and those near which the start has not converged. None if
         the whole curve may move.
     """
-    before, none = start.request, np.zeros(len(start.mesh.vertices))
-    unpainted = [replace(each, obstacles=None, alignment=None) for each in (before, request)]
+    before = start.request
+    # Neither alternatives nor via points matter to a design with a start.
+    unpainted = [
+        replace(each, obstacles=None, alignment=None, alternatives=0, via_points={})
+        for each in (before, request)
+    ]
     if start.unsettled is None or not same_request(*unpainted):
         return None
-    changed = none != 0.0
+    changed = np.zeros(len(start.mesh.vertices), dtype=bool)
     changed[start.unsettled] = True
+    nothing = np.zeros(len(changed))
     for one, other in (
         (before.obstacles, request.obstacles),
         (before.alignment, request.alignment),
     ):
-        changed |= (none if one is None else one) != (none if other is None else other)
+        changed |= (nothing if one is None else one) != (nothing if other is None else other)
     return np.flatnonzero(changed)
 
 

@@ -214,9 +214,9 @@ class SurfaceDesigner:
         """What to relax next, as long as it pays.
 
         The caller adds each start and its relaxed curve to `starts` and `attempts` before it asks
-        for the next one. The remaining `courses` of the first search are for alternatives. If no
-        course was simple (`by_course` is False), further searches would hardly find one and take
-        long, so they are made only for alternatives.
+        for the next one. The `courses` of the first search that then remain are for alternatives.
+        If no course was simple (`by_course` is False), further searches would hardly find one and
+        take long, so they are made only for alternatives.
         """
         config = _config(request)
         if by_course:
@@ -472,7 +472,7 @@ def _relaxed(
 
     movable = None
     if start.unsettled is not None:
-        movable = movable_near(start.surface.mesh, start.unsettled)
+        movable = movable_near(start.surface.mesh, start.unsettled, start.unit)
     return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
 
 

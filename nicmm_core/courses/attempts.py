@@ -1,8 +1,8 @@
 """Decides whether to make another attempt at a curve, from the curves relaxed so far.
 
-The farther a curve winds around limbs, the more courses a search misses. Searches with other
-lengths find others, so the search is repeated while that pays. Then the parts that bend most are
-searched for again.
+The farther a curve winds around limbs, the more courses a search misses. A search with other
+lengths and another tension finds others, so it is made if the curve bends. Then the parts that bend
+most are searched for again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FURTHER_SEARCHES = 1
 COURSES_OF_A_SEARCH = 3
 """Greatest number of courses relaxed after a search whose curves are extremely bent.
 
-Their energies with few nodes tell little there.
+The order of their energies with few nodes is unreliable.
 """
 
 FRUITLESS_SEARCHES = 2
@@ -48,7 +48,7 @@ SEARCHES_FOR_PARTS, COURSES_OF_A_PART = 8, 2
 """Greatest number of such searches, and of courses relaxed after each of them."""
 
 LEAST_GAIN = 0.02
-"""Relative decrease of the energy below which a search counts as fruitless."""
+"""Decrease of the energy, relative to the elastic energy, below which a search is fruitless."""
 
 MOST_FAILURES = 4
 """Number of courses in a row that are not simple on the mesh after which a repeated search ends.
@@ -119,7 +119,12 @@ class Attempts:
         before = self._relaxed_before
         if before:
             energies = energies_of(self.surface, self.curves, self.smoothness)
-            gained = min(energies) < (1.0 - LEAST_GAIN) * min(energies[:before])
+            earlier = min(energies[:before])
+            # With lanes energies may be negative, so decreases are relative to the elastic energy.
+            best = self.curves[energies.index(earlier)]
+            unpainted = replace(self.surface, feature_map=None)
+            (elastic,) = energies_of(unpainted, [best], self.smoothness)
+            gained = earlier - min(energies) > LEAST_GAIN * elastic
             self.fruitless = 0 if gained else self.fruitless + 1
         self._relaxed_before = len(self.relaxed)
 

@@ -29,9 +29,10 @@ from .leg_combinations import (
     curves_on_routes,
     distinct_combinations,
     junctions_of_routes,
+    steps_of_course,
 )
 from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
-from .leg_routes import Routes, leg_choices, routes_of_legs
+from .leg_routes import Routes, cells_beside, leg_choices, routes_of_legs
 from .recombination import recombined
 from .uncrossing import uncrossed
 
@@ -39,7 +40,7 @@ TENSIONS = (2.0, 1.0)
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path.
 
 Searches with different seeds take them in turn, since a low tension finds long courses that bend
-little. It is greater than 1 by default because hops overestimate bending: they turn only at cells.
+little. The first one is greater than 1 because hops overestimate bending: they turn only at cells.
 """
 
 CANDIDATES = (16, 10, 8)
@@ -110,7 +111,8 @@ def find_courses(
     smoothness : float
         Divisor of the tension.
     any_order : bool
-        Whether a course may visit the control points in another order to avoid crossing itself.
+        Whether a course may visit the control points in another order, to avoid crossing itself or
+        because it is cheaper.
     seed : int
         Seed of random factors of the lengths in the graph, which give other courses; 0 for no
         factors.
@@ -131,11 +133,11 @@ def find_courses(
     nodes, point = found
     # Indices of control points do not count via points.
     number = np.append(np.where(fixed, np.cumsum(fixed) - 1, -1), -1)
-    nodes, visit, simple = uncrossed(surface, nodes, number[point], any_order)
+    nodes, visit, _ = uncrossed(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
     nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
-    combined = recombined(surface, nodes, visit, smoothness, RECOMBINED)
+    combined = recombined(surface, nodes, visit, simple, smoothness, RECOMBINED)
     if combined is not None:
         new, new_visit, _ = uncrossed(surface, *combined, any_order)
         with subrange(0.6, 0.7):
@@ -170,7 +172,7 @@ def _candidates(
     if any_order and count <= MOST_POINTS:
         pairs = combinations(range(count), 2)
         choices = leg_choices(courses, pairs, n_legs)
-        orders = cheapest_orders(courses, choices, closed, len(CANDIDATES))
+        orders = [*cheapest_orders(courses, choices, closed), order]
     else:
         legs = legs_of_order(order, closed).tolist()
         choices = leg_choices(courses, ((start, end) for start, end in legs), n_legs)
@@ -178,11 +180,16 @@ def _candidates(
     checkpoint()
     routes: list[list[Routes]] = []
     possible: list[IntArray] = []
+    beside = cells_beside(courses)
     for order in orders:
-        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed)
+        if any(np.array_equal(order, other) for other in possible):
+            continue
+        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed, beside)
         if of_order:
             routes.append(of_order)
             possible.append(order)
+        if len(routes) == len(CANDIDATES):
+            break
     if not routes:
         return None
     with subrange(0.2, 0.3):
@@ -209,9 +216,10 @@ def _candidates(
     chosen = np.concatenate(choice)
     if not len(chosen):
         return None
-    nodes, at_points = course_nodes(curves, chosen, closed)
+    nodes, at_points = course_nodes(curves, chosen, closed, steps_of_course(n_legs))
     point = np.full(len(at_points), -1)
     point[at_points] = np.concatenate(visit)
+    # Legs were placed on the surface without maps.
     return nodes_at(surface, nodes.places, closed, nodes.curves), point
 
 

@@ -257,7 +257,8 @@ def cheapest_combinations(
         row, curve = np.divmod(best, total.shape[1])
         choice = np.concatenate([choice[row], offset[number] + curve[:, None]], axis=1)
         cost = total.ravel()[best]
-    return Combinations(choice, cost)
+    ascending = np.argsort(cost, kind="stable")  # the loop does not run for a single leg
+    return Combinations(choice[ascending], cost[ascending])
 
 
 def _least(values: FloatArray, most: int) -> IntArray:
@@ -295,7 +296,14 @@ def distinct_combinations(
     return Combinations(combinations.choice[chosen], combinations.cost[chosen])
 
 
-def course_nodes(curves: LegCurves, choice: IntArray, closed: bool) -> tuple[Nodes, BoolArray]:
+def steps_of_course(n_legs: int) -> int:
+    """Number of steps between the nodes of a course."""
+    return max(NODES, FEWEST_SHARED + FEWEST_NODES * n_legs)
+
+
+def course_nodes(
+    curves: LegCurves, choice: IntArray, closed: bool, steps: int
+) -> tuple[Nodes, BoolArray]:
     """Place nodes on whole courses.
 
     Parameters
@@ -304,6 +312,8 @@ def course_nodes(curves: LegCurves, choice: IntArray, closed: bool) -> tuple[Nod
     choice : (c, l) int array
         Index of the curve that each course takes on each leg.
     closed : bool
+    steps : int
+        Number of steps of each course.
 
     Returns
     -------
@@ -315,7 +325,7 @@ def course_nodes(curves: LegCurves, choice: IntArray, closed: bool) -> tuple[Nod
     surface, nodes = curves.surface, curves.nodes
     size = nodes.per_curve
     lengths = nodes.by_curve(nodes.step_lengths).sum(axis=1)
-    counts = _node_counts(lengths[choice])
+    counts = _step_counts(lengths[choice], steps)
     course = np.arange(len(choice)).repeat(counts.sum(axis=1))
     of_legs = counts.ravel()
     leg = np.tile(np.arange(choice.shape[1]), len(choice)).repeat(of_legs)
@@ -339,12 +349,12 @@ def course_nodes(curves: LegCurves, choice: IntArray, closed: bool) -> tuple[Nod
     return nodes_at(surface, places, closed, len(choice)), starts
 
 
-def _node_counts(lengths: FloatArray) -> IntArray:
-    """Numbers of nodes of the legs of courses, (c, l), from the lengths of the legs, (c, l).
+def _step_counts(lengths: FloatArray, steps: int) -> IntArray:
+    """Numbers of steps of the legs of courses, (c, l), from the lengths of the legs, (c, l).
 
-    All courses have the same number of nodes.
+    All courses have the same number of steps.
     """
-    shared = max(NODES - FEWEST_NODES * lengths.shape[1], FEWEST_SHARED)
+    shared = steps - FEWEST_NODES * lengths.shape[1]
     total = np.cumsum(lengths, axis=1)
     ends = np.round(shared * total / np.maximum(total[:, -1:], tolerances.TINY)).astype(np.int64)
     return FEWEST_NODES + np.diff(ends, axis=1, prepend=0)

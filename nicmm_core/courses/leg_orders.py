@@ -1,8 +1,8 @@
 """Finds orders of the control points in which a curve may bend least, by the costs of legs.
 
-The shortest order is seldom the one in which the fairest curve visits its points. An order that
+The fairest curve often visits its points in another order than the shortest one. An order that
 reverses a section of the shortest one ("2-opt": Croes, "A method for solving traveling-salesman
-problems", 1958) is often better, and the hop graph tells which.
+problems", 1958) may be better, and the hop graph tells which.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 
 from ..geometry.array_types import IntArray
 from .hop_graph import CourseGraph
-from .leg_routes import LegChoices, LegStates, least_totals
+from .leg_routes import LegChoices, LegStates, least_totals, without_rounding_errors
 
 MOST_POINTS = 7
-"""Number of points above which only the given order is tried; there are too many pairs of points
+"""Number of points above which only the shortest order is tried; there are too many pairs of points
 then, and crossing legs are uncrossed later anyway."""
 
 DIRECTIONS = 24
@@ -51,9 +51,8 @@ def cheapest_orders(
     graph: CourseGraph,
     choices: Mapping[tuple[int, int], LegChoices],
     closed: bool,
-    most: int,
 ) -> list[IntArray]:
-    """Find the cheapest orders of all control points of a graph, by ascending cost.
+    """Find cheap orders of all control points of a graph, by ascending cost.
 
     The cost of an order is that of its cheapest legs whose directions fit each other. Crossings do
     not count.
@@ -65,8 +64,6 @@ def cheapest_orders(
     choices : mapping
         Choices for the legs between all pairs of points.
     closed : bool
-    most : int
-        Greatest number of orders.
     """
     orders, costs = [], []
     for order in reversals(len(graph.points), closed):
@@ -77,10 +74,10 @@ def cheapest_orders(
         if all(len(leg.state) for leg in legs):
             orders.append(order)
             costs.append(float(least_totals(graph, legs, closed)[0].min()))
-    cost = np.array(costs)
+    cost = without_rounding_errors(np.array(costs))
     ascending = np.argsort(cost, kind="stable")
     cheap = ascending[cost[ascending] <= MAX_RELATIVE_COST * cost.min(initial=np.inf)]
-    return [orders[number] for number in cheap[:most].tolist()]
+    return [orders[number] for number in cheap.tolist()]
 
 
 def _first_choices(legs: LegStates) -> LegStates:

@@ -164,13 +164,23 @@ def routes_of_legs(
     choices: Mapping[tuple[int, int], LegChoices],
     legs: IntArray,
     closed: bool,
+    beside: sparse.csr_array,
 ) -> list[Routes]:
     """Find routes of consecutive legs, (l, 2).
 
     Some routes are chosen because their directions fit those of the other legs, some because they
     run elsewhere. The result is empty if any leg has no route.
+
+    Parameters
+    ----------
+    graph : CourseGraph
+    choices : mapping
+        Choices for each of the legs, by its two points.
+    legs : (l, 2) int array
+    closed : bool
+    beside : sparse array
+        The result of `cells_beside`.
     """
-    beside = _cells_beside(graph)
     n_routes = max(6, ALL_ROUTES // max(1, len(legs)))
     n_aligned = min(ALIGNED, (2 * n_routes) // 3)
     n_different = min(DIFFERENT, n_routes // 3)
@@ -290,7 +300,7 @@ def _states_before(graph: CourseGraph, control: int, states: IntArray) -> IntArr
         rows.append(before)
 
 
-def _cells_beside(graph: CourseGraph) -> sparse.csr_array:
+def cells_beside(graph: CourseGraph) -> sparse.csr_array:
     """Which cells lie beside each other, (n + k, n + k)."""
     scale = max(float(np.median(graph.hops.length)), tolerances.TINY)
     places = np.concatenate([graph.positions / scale, NORMAL_WEIGHT * graph.normals], axis=1)

@@ -13,28 +13,41 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
-from ..geometry.vectors import lengths, unit
+from ..geometry.vectors import lengths
+from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies, comparable_terms
 from ..relaxation.node_traces import places_along, traces_between_nodes
+from ..relaxation.relaxing_together import curves_of
 from .comparison import SAME_COURSE
+from .hop_graph import tangents
 from .leg_combinations import (
+    Combinations,
     LegCurves,
     cheapest_combinations,
     course_nodes,
     crossing_legs,
     distinct_combinations,
 )
+from .leg_orders import legs_of_order
 
 NODES_OF_A_LEG = 24
 """Number of nodes of a leg while legs are combined."""
+
+MOST_LEGS, FEWEST_COURSES = 300, 4
+"""Number of legs of all courses together, and number of courses that are combined anyway."""
 
 FEWEST_POINTS = 3
 """Number of control points below which there is nothing to combine."""
 
 
 def recombined(
-    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float, most: int
+    surface: CurveSurface,
+    nodes: Nodes,
+    visit: IntArray,
+    simple: BoolArray,
+    smoothness: float,
+    most: int,
 ) -> tuple[Nodes, IntArray] | None:
     """Combine the legs of courses into new courses in the order of the best course.
 
@@ -45,6 +58,8 @@ def recombined(
         c courses that begin at a control point; open ones also end at one.
     visit : (n,) int array
         Index of the control point at each node, -1 where there is none.
+    simple : (c,) bool array
+        Which courses do not cross themselves.
     smoothness : float
         Divisor of the tension.
     most : int
@@ -53,40 +68,49 @@ def recombined(
     Returns
     -------
     (Nodes, (m,) int array) or None
-        The new courses, and the control point at each of their nodes. None if there are too few
-        control points, or if no legs can be combined.
+        The new courses, with as many nodes each as the given ones, and the control point at each of
+        their nodes. None if there are too few control points, or if there is no new course.
     """
     scale = float(nodes.by_curve(nodes.step_lengths).sum(axis=1).min())
     energy = comparable_energies(surface, nodes, smoothness, scale)
-    visits = nodes.by_curve(visit)
-    place = np.nonzero(visits >= 0)[1].reshape(nodes.curves, -1)  # of the control points
-    if place.shape[1] < FEWEST_POINTS:
+    size = nodes.per_curve
+    place = np.nonzero(nodes.by_curve(visit) >= 0)[1].reshape(nodes.curves, -1)
+    count = place.shape[1]
+    if count < FEWEST_POINTS:
         return None
-    order = visits[np.arange(nodes.curves)[:, None], place]
-    best = order[int(energy.argmin())]
-    course, begin, end, leg, backward = _legs_in_order(place, order, best, nodes)
+    kept = np.argsort(energy, kind="stable")[: max(FEWEST_COURSES, MOST_LEGS // count)]
+    best = kept[np.argmax(simple[kept])]  # the first simple one, or else the first one
+    kept = np.union1d(kept, best)
+    nodes, visit, place = curves_of(nodes, kept), nodes.by_curve(visit)[kept], place[kept]
+    order = np.take_along_axis(visit, place, axis=1)
+    wanted = order[np.searchsorted(kept, best)]
+    course, begin, end, leg, backward = _legs_in_order(place, order, wanted, nodes)
+    checkpoint()
     curves = LegCurves(
         surface,
         _nodes_on_legs(surface, nodes, course, begin, end, backward),
         leg,
-        np.stack([best, np.roll(best, -1)], axis=1)[leg],
+        legs_of_order(wanted, nodes.closed)[leg],
         int(leg[-1]) + 1,
     )
     legs = [curves.of_leg(number) for number in range(curves.n_legs)]
-    cost = _costs(
-        nodes, comparable_terms(surface, nodes, smoothness, scale), course, begin, end, leg
-    )
+    terms = comparable_terms(surface, nodes, smoothness, scale)
+    cost = _costs(nodes, terms, course, begin, end, leg)
     turns = _turning_costs(curves.nodes, legs, nodes.closed, scale)
-    crosses = crossing_legs(curves)
-    found = cheapest_combinations([cost[each] for each in legs], turns, crosses, nodes.closed)
+    found = cheapest_combinations(
+        [cost[each] for each in legs], turns, crossing_legs(curves), nodes.closed
+    )
+    new = (course[found.choice] != course[found.choice[:, :1]]).any(axis=1)
+    found = Combinations(found.choice[new], found.cost[new])
     alike = [_alike(curves.nodes, each, SAME_COURSE * surface.mesh.diagonal) for each in legs]
-    found = distinct_combinations(alike, found, most)
-    if not len(found.choice):
+    choice = distinct_combinations(alike, found, most).choice
+    if not len(choice):
         return None
-    new, at_points = course_nodes(curves, found.choice, nodes.closed)
-    new_visit = np.full(len(at_points), -1)
-    new_visit[at_points] = np.tile(best, len(found.choice))
-    return new, new_visit
+    steps = size if nodes.closed else size - 1
+    joined, at_points = course_nodes(curves, choice, nodes.closed, steps)
+    point = np.full(len(at_points), -1)
+    point[at_points] = np.tile(wanted, len(choice))
+    return joined, point
 
 
 def _legs_in_order(
@@ -173,7 +197,7 @@ def _costs(
     """Energies of legs, (r,), from the terms of `comparable_terms`; never negative.
 
     The term of lanes is a mean along the whole curve. So the mean along a leg counts by the typical
-    share of this leg in the length of a course, and is increased by 1, for all curves of a leg.
+    share of this leg in the length of a course, and relative to the least one of this leg.
     """
     at_nodes, lanes, weight = terms
 
@@ -189,7 +213,10 @@ def _costs(
     length = np.maximum(along_legs(nodes.ds), tolerances.TINY)
     share = length / nodes.by_curve(nodes.step_lengths).sum(axis=1)[course]
     typical = np.bincount(leg, share) / np.bincount(leg)
-    return along_legs(at_nodes) + weight * typical[leg] * (1.0 + along_legs(lanes) / length)
+    mean = along_legs(lanes) / length
+    least = np.zeros(len(typical))
+    np.minimum.at(least, leg, mean)
+    return along_legs(at_nodes) + weight * typical[leg] * (mean - least[leg])
 
 
 def _turning_costs(
@@ -204,18 +231,13 @@ def _turning_costs(
     count = legs.per_curve
     positions, normals = (each.reshape(-1, count, 3) for each in (legs.positions, legs.normals))
     length = legs.by_curve(legs.step_lengths).sum(axis=1)
-
-    def tangents(one: int, other: int, at: int) -> FloatArray:
-        step, normal = positions[:, other] - positions[:, one], normals[:, at]
-        step = step - (step * normal).sum(axis=1, keepdims=True) * normal
-        return unit(step.T).T
-
-    leaving, arriving = tangents(0, 1, 0), tangents(-2, -1, -1)
+    leaving = tangents(positions[:, 1] - positions[:, 0], normals[:, 0])
+    arriving = tangents(positions[:, -1] - positions[:, -2], normals[:, -1])
+    inverse = 1.0 / np.maximum(length, tolerances.TINY)
     following = [*of_legs[1:], *of_legs[:1]] if closed else of_legs[1:]
     costs = []
     for before, after in zip(of_legs, following, strict=False):
         angle = np.arccos((arriving[before] @ leaving[after].T).clip(-1.0, 1.0))
-        inverse = 1.0 / np.maximum(length, tolerances.TINY)
         costs.append(scale * angle**2 * (inverse[before, None] + inverse[after]))
     return costs
 

@@ -413,7 +413,11 @@ class _Attempt:
 
     def _traced(self, curve: NodedCurve, nodes: Nodes) -> NodedCurve:
         """The curve traced through its nodes if they have moved since the last trace."""
-        changed = curve if nodes is curve.nodes else traced_through(self.surface, curve, nodes)
+        changed: NodedCurve | None = curve
+        if nodes is not curve.nodes:
+            # A straight trace may fail where the start has a bypass and nodes may not move.
+            still = None if self.movable is None else ~self.movable(nodes.positions)
+            changed = traced_through(self.surface, curve, nodes, still)
         if changed is None:
             raise _TraceError
         return changed

@@ -31,7 +31,10 @@ Since tracing is deferred, an iteration consists of only one step.
 """
 
 REACH = 0.2
-"""Distance from changed weights of a map up to which a curve may move, relative to the diagonal."""
+"""Distance from changed weights of a map up to which a curve may move.
+
+It is relative to the diagonal or √area, whichever is larger; maps reach as far as √area tells.
+"""
 
 LONGEST_MOVE = 0.1
 """Greatest distance that a control point may have moved, relative to the curve's length."""
@@ -97,9 +100,9 @@ def _shifts(nodes: Nodes, at_controls: IntArray, move: FloatArray) -> FloatArray
     return shift
 
 
-def movable_near(mesh: Mesh, vertices: IntArray) -> Movable:
-    """Let only the nodes near some vertices of a mesh move."""
-    reach = REACH * mesh.diagonal
+def movable_near(mesh: Mesh, vertices: IntArray, unit: float) -> Movable:
+    """Let only the nodes near some vertices of a mesh move; `unit` is √area."""
+    reach = REACH * max(mesh.diagonal, unit)
     if not len(vertices):
         return lambda positions: np.zeros(len(positions), dtype=bool)
     tree = cKDTree(mesh.vertices[vertices])

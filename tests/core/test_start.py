@@ -519,6 +519,14 @@ class TestPaintedBesideACurve:
         far, near = self.moved(ball, before, after, place)
         assert far < 1e-3 < 1e-2 < near
 
+    def test_alternatives_of_the_start_do_not_matter(self, ball, designer, before, dab):
+        place, weights = dab
+        points = on_ball(ball)
+        start = designer.design(points, alternatives=1)
+        after = designer.design(points, start=start, alignment=weights)
+        far, near = self.moved(ball, start, after, place)
+        assert far < 1e-3 < 1e-2 < near
+
     def test_without_the_dab_the_curve_is_the_first_one(self, ball, designer, before, dab):
         place, weights = dab
         points = on_ball(ball)

@@ -75,6 +75,15 @@ def test_courses_pass_their_points(body, closed):
                 np.testing.assert_array_equal(order, np.arange(4))
 
 
+@pytest.mark.parametrize("closed", [True, False])
+def test_many_legs_with_via_points(body, closed):
+    """Courses of more than eight legs have more nodes; via points are no control points."""
+    chosen = [20, 250, 600, 900, 1100, 1300]
+    via = {0: [100, 150], 2: [700], 3: [1000]}
+    design = nicmm.design_curve(body, chosen, closed=closed, via_points=via)
+    assert_valid_design(body, design, body.vertices[chosen], closed)
+
+
 def test_the_best_course_round_a_ball_is_a_great_circle():
     ball = shapes.sphere(4)
     surface = curve_surface(ball)

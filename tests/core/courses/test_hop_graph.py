@@ -10,7 +10,7 @@ from nicmm_core.courses.hop_graph import (
     distances_along_edges,
     with_control_points,
 )
-from nicmm_core.courses.leg_routes import leg_choices, routes_of_legs
+from nicmm_core.courses.leg_routes import cells_beside, leg_choices, routes_of_legs
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.core.checks import grid, points_near
 
@@ -27,7 +27,7 @@ def graph_through(mesh, positions, legs=LEGS, tension=160.0):
 def routes_through(graph, legs, closed):
     """The routes of consecutive legs."""
     choices = leg_choices(graph, map(tuple, legs.tolist()), len(legs))
-    return routes_of_legs(graph, choices, legs, closed)
+    return routes_of_legs(graph, choices, legs, closed, cells_beside(graph))
 
 
 @pytest.fixture(scope="module")

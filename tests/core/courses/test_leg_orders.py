@@ -40,8 +40,8 @@ def test_the_cheapest_order_on_a_plane_has_the_gentlest_turns(closed):
     legs = legs_of_order(np.arange(4), closed)
     graph = graph_through(grid(40), corners, legs)
     choices = leg_choices(graph, itertools.combinations(range(4), 2), len(legs))
-    orders = cheapest_orders(graph, choices, closed, 3)
-    assert 1 <= len(orders) <= 3
+    orders = cheapest_orders(graph, choices, closed)
+    assert len(orders)
     best = tour(orders[0], closed)
     around = {frozenset(pair) for pair in ([0, 2], [2, 1], [1, 3], [3, 0])}
     assert best <= around

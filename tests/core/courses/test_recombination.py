@@ -50,7 +50,7 @@ def test_the_best_legs_of_two_courses_are_combined(closed):
     bulges = np.zeros((2, count))
     bulges[0, 0] = bulges[1, 2] = 0.3
     surface, nodes, visit = courses(closed, bulges)
-    new, new_visit = recombined(surface, nodes, visit, 1.0, 4)
+    new, new_visit = recombined(surface, nodes, visit, np.ones(nodes.curves, bool), 1.0, 4)
     before = nodes.by_curve(nodes.step_lengths).sum(axis=1)
     after = new.by_curve(new.step_lengths).sum(axis=1)
     arc = RADIUS * (2.0 * np.pi if closed else ANGLES[-1])
@@ -63,7 +63,7 @@ def test_the_best_legs_of_two_courses_are_combined(closed):
 def test_new_courses_pass_the_points_in_the_order_of_the_best_course(closed):
     generator = np.random.default_rng(0)
     surface, nodes, visit = courses(closed, generator.uniform(-0.2, 0.2, (5, 4 if closed else 3)))
-    new, new_visit = recombined(surface, nodes, visit, 1.0, 6)
+    new, new_visit = recombined(surface, nodes, visit, np.ones(nodes.curves, bool), 1.0, 6)
     assert 1 <= new.curves <= 6
     for number in range(new.curves):
         own = new.by_curve(new_visit)[number]
@@ -78,7 +78,7 @@ def test_two_points_leave_nothing_to_combine():
     surface = curve_surface(mesh)
     places = points_near(mesh, np.array([[0.2, 0.2, 0.0], [0.5, 0.5, 0.0], [0.8, 0.8, 0.0]]))
     nodes = nodes_at(surface, places, closed=False)
-    assert recombined(surface, nodes, np.array([0, -1, 1]), 1.0, 4) is None
+    assert recombined(surface, nodes, np.array([0, -1, 1]), np.ones(1, bool), 1.0, 4) is None
 
 
 def test_a_leg_in_the_other_direction_counts_as_the_same_leg():
@@ -94,5 +94,7 @@ def test_a_leg_in_the_other_direction_counts_as_the_same_leg():
     both = nodes_at(surface, joined([nodes.places, crossed]), True, 2)
     other_visit = np.full(nodes.per_curve, -1)
     other_visit[PER_LEG * np.arange(4)] = other_order
-    new, new_visit = recombined(surface, both, np.append(visit, other_visit), 1.0, 8)
+    new, new_visit = recombined(
+        surface, both, np.append(visit, other_visit), np.ones(2, bool), 1.0, 8
+    )
     np.testing.assert_array_equal(new_visit[new_visit >= 0].reshape(-1, 4)[0], np.arange(4))
