@@ -10,7 +10,7 @@ import pytest
 from tests.blender import scenes
 from tests.blender.scenes import module
 
-CONVERGED = 3e-3
+CONVERGED = 4e-3
 """Largest distance between two results of one request.
 
 An update starts from the current curve and stops when another step gains little.
