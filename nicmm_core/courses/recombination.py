@@ -35,7 +35,8 @@ NODES_OF_A_LEG = 24
 """Number of nodes of a leg while legs are combined."""
 
 MOST_LEGS, FEWEST_COURSES = 300, 4
-"""Number of legs of all courses together, and number of courses that are combined anyway."""
+"""Number of legs up to which the best courses are combined, in all courses together; and number of
+courses that are combined anyway."""
 
 FEWEST_POINTS = 3
 """Number of control points below which there is nothing to combine."""
@@ -57,7 +58,7 @@ def recombined(
     nodes : Nodes
         c courses that begin at a control point; open ones also end at one.
     visit : (n,) int array
-        Index of the control point at each node, -1 where there is none.
+        Index of the control point at each node, -1 elsewhere.
     simple : (c,) bool array
         Which courses do not cross themselves.
     smoothness : float

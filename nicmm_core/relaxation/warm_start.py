@@ -33,7 +33,8 @@ Since tracing is deferred, an iteration consists of only one step.
 REACH = 0.2
 """Distance from changed weights of a map up to which a curve may move.
 
-It is relative to the diagonal or √area, whichever is larger; maps reach as far as √area tells.
+It is relative to the diagonal or to √area, whichever is larger. The reach of a map is relative to
+√area.
 """
 
 LONGEST_MOVE = 0.1
