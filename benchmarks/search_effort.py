@@ -14,10 +14,10 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import surface_designer
 from nicmm_core.courses import attempts
-from nicmm_core.courses.comparison import energies_of
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.relaxation.curve_nodes import curve_surface
+from nicmm_core.relaxation.noded_energies import energies_of
 
 from . import collections, report
 from .evidence import Results

@@ -10,13 +10,14 @@ from scipy.spatial import cKDTree
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.courses.comparison import energies_of, farthest_between
+from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import nearest_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface, curve_surface
 from nicmm_core.relaxation.noded_curve import NodedCurve
+from nicmm_core.relaxation.noded_energies import energies_of
 from nicmm_core.relaxation.relaxing import relax
 from nicmm_core.relaxation.simple_curve import simple_curve
 from nicmm_core.relaxation.warm_start import WARM

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
+from ..relaxation.noded_energies import energies_of, scaled_bending
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
-from .comparison import distinct_by_energy, energies_of, scaled_bending
+from .comparison import distinct_by_energy
 
 STRONGLY_BENT = 20.0
 """L ∮ κ_g² ds above which the search is repeated, half the value of a circle.

@@ -11,24 +11,14 @@ from ..geometry.array_types import FloatArray
 from ..geometry.curve import SurfaceCurve, resample
 from ..geometry.mesh import Mesh
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.elastic_energy import bending_energy, comparable_energies
 from ..relaxation.noded_curve import NodedCurve
+from ..relaxation.noded_energies import energies_of
 
 SAME_COURSE = 0.02
 """Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
 
 SAMPLES = 500
 """Number of points at which two curves are compared."""
-
-
-def energies_of(
-    surface: CurveSurface, curves: Sequence[NodedCurve], smoothness: float
-) -> list[float]:
-    """Energies of curves, with the least length among them as the common length scale."""
-    scale = min(curve.length for curve in curves)
-    return [
-        float(comparable_energies(surface, curve.nodes, smoothness, scale)[0]) for curve in curves
-    ]
 
 
 def distinct_by_energy(
@@ -47,11 +37,6 @@ def is_apart(surface: CurveSurface, curve: NodedCurve, others: Sequence[NodedCur
     limit = SAME_COURSE * surface.mesh.diagonal
     positions = curve.nodes.positions
     return all(farthest_between(positions, other.nodes.positions) > limit for other in others)
-
-
-def scaled_bending(curve: NodedCurve) -> float:
-    """L ∮ κ_g² ds, which does not depend on the unit of length."""
-    return bending_energy(curve.nodes) * curve.length
 
 
 def current_course(mesh: Mesh, curve: SurfaceCurve, courses: Sequence[SurfaceCurve]) -> int | None:

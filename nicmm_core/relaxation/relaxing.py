@@ -5,7 +5,11 @@ of its mesh, and in it strands a few edges apart block each other. From the star
 the surface until the energy of Eq. 6 and 7 along the curve converges (`elastic_energy`).
 
 A curve with few nodes moves far in a step, and a curve with many nodes resolves detail. So the
-number of nodes increases from level to level. An iteration takes several steps of the nodes
+number of nodes increases from level to level. A start that bends little needs only the last level:
+fewer nodes would not resolve thin parts of the surface, and the curve would lose its shape there.
+If its energy is higher after that level than before, it is relaxed again on all levels.
+
+An iteration takes several steps of the nodes
 (`levenberg_marquardt`) and then retraces the curve. A node whose trace fails or would cross another
 trace stays where it was for that iteration, so the curve is simple after every iteration. A contact
 term repels strands.
@@ -18,7 +22,7 @@ crosses itself, it is relaxed again from the start, with a trace in every iterat
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -49,6 +53,7 @@ from .noded_curve import (
     traced_through,
     without_short_segments,
 )
+from .noded_energies import energies_of, scaled_bending
 from .strand_contact import NearStrands
 
 
@@ -80,6 +85,8 @@ class RelaxationConfig:
     tension_factor : float
         Factor of the tension in an additional first pass with the fewest nodes; there is no such
         pass if it is 1.
+    fine_below : float
+        L ∮ κ_g² ds of a start with nodes below which only the last level is used.
     """
 
     levels: tuple[int, ...] = (128, 512)
@@ -92,9 +99,12 @@ class RelaxationConfig:
     work: float = 800.0
     defer_tracing: bool = False
     tension_factor: float = 1.0
+    fine_below: float = 1e3
 
 
-GUIDED = RelaxationConfig(levels=(64, 128, 512), least_decrease_before=1e-2, tension_factor=30.0)
+GUIDED = RelaxationConfig(
+    levels=(64, 128, 512), least_decrease_before=1e-2, tension_factor=30.0, fine_below=0.0
+)
 """Settings for maps with lanes, in which the curve must find a lane while it has few nodes.
 
 Many nodes hardly move. Few nodes take long steps, which may inflate a fold of the start into an arc
@@ -102,10 +112,16 @@ from lane to lane, a local minimum far above the lowest energy. So a first pass 
 tension removes folds; lanes still hold the curve during that pass.
 """
 
-TIGHTENED = RelaxationConfig(levels=(64, 128, 512), tension_factor=10.0)
+TIGHTENED = RelaxationConfig(levels=(64, 128, 512), tension_factor=10.0, fine_below=0.0)
 """Settings for another attempt where a curve has kinks, as on rough surfaces.
 
 The kinks are local minima. Tightening the start first leads to others, half of them lower.
+"""
+
+ACCEPTABLE = 80.0
+"""L ∮ κ_g² ds up to which the energy may be higher than that of the start; twice that of a circle.
+
+With the fewer nodes of the start, the energy of the same curve is slightly lower.
 """
 
 RELEASES = 2
@@ -205,29 +221,76 @@ def relax(
     Relaxed
         The start itself, with the status `UNRELAXED`, if no simple relaxed curve was found.
     """
-    if isinstance(start, NodedCurve):
-        first, start = start, start.surface_curve(surface.mesh)
-    else:
+    relaxing = _Relaxing(surface, smoothness, config, watch, movable)
+    if isinstance(start, SurfaceCurve):
         first = noded_curve(surface, start, config.levels[0])
-    iterations, work, collided = 0, 0.0, False
-    for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
-        attempt = _Attempt(
-            surface, smoothness, config, watch, movable, traces_every_iteration, first, iterations
-        )
-        curve = attempt.run()
-        iterations, work = attempt.iterations, work + attempt.work.spent
-        good = curve is not None and is_simple(surface, curve)
-        if good or attempt.status is Status.CANCELLED:
-            break
-        collided = not traces_every_iteration
-    status = attempt.status
-    if curve is not None and good:
-        result = without_short_segments(surface.mesh, curve)
-    else:
-        curve, result = first, start
-        status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
-    bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
-    return Relaxed(result, curve, bending, feature, iterations, status, work, collided)
+        return relaxing.on_levels(config.levels, first, start)
+    whole = start.surface_curve(surface.mesh)
+    if len(config.levels) == 1 or scaled_bending(start) >= config.fine_below:
+        return relaxing.on_levels(config.levels, start, whole)
+    fine = relaxing.on_levels(config.levels[-1:], start, whole)
+    stopped = fine.status is Status.CANCELLED or fine.iterations >= config.most_iterations
+    before, after = energies_of(surface, [start, fine.noded_curve], smoothness)
+    if stopped or after <= before or scaled_bending(fine.noded_curve) <= ACCEPTABLE:
+        return fine
+    again = relaxing.on_levels(config.levels, start, whole, fine)
+    one, other = energies_of(surface, [fine.noded_curve, again.noded_curve], smoothness)
+    if other < one:
+        return again
+    return replace(fine, iterations=again.iterations, work=again.work, status=again.status)
+
+
+@dataclass(frozen=True)
+class _Relaxing:
+    """The arguments of `relax` that are the same for all attempts."""
+
+    surface: CurveSurface
+    smoothness: float
+    config: RelaxationConfig
+    watch: Watch | None
+    movable: Movable | None
+
+    def on_levels(
+        self,
+        levels: tuple[int, ...],
+        first: NodedCurve,
+        start: SurfaceCurve,
+        before: Relaxed | None = None,
+    ) -> Relaxed:
+        """Relax on some levels, at first without tracing the curve if that may be deferred.
+
+        The result includes the iterations and the work of the attempt `before`.
+        """
+        config, surface = replace(self.config, levels=levels), self.surface
+        iterations, work, collided = 0, 0.0, False
+        if before is not None:
+            iterations, work = before.iterations, before.work
+            config = replace(config, work=config.work - work)
+        for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
+            attempt = _Attempt(
+                surface,
+                self.smoothness,
+                config,
+                self.watch,
+                self.movable,
+                traces_every_iteration,
+                first,
+                iterations,
+            )
+            curve = attempt.run()
+            iterations, work = attempt.iterations, work + attempt.work.spent
+            good = curve is not None and is_simple(surface, curve)
+            if good or attempt.status is Status.CANCELLED:
+                break
+            collided = not traces_every_iteration
+        status = attempt.status
+        if curve is not None and good:
+            result = without_short_segments(surface.mesh, curve)
+        else:
+            curve, result = first, start
+            status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
+        bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
+        return Relaxed(result, curve, bending, feature, iterations, status, work, collided)
 
 
 def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:

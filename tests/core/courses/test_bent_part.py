@@ -6,7 +6,6 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes, surface_designer
 from nicmm_core.courses import attempts
-from nicmm_core.courses.attempts import scaled_bending
 from nicmm_core.courses.bent_part import (
     APART,
     DIRECTION,
@@ -17,6 +16,7 @@ from nicmm_core.courses.bent_part import (
 )
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from nicmm_core.relaxation.noded_curve import is_simple, noded
+from nicmm_core.relaxation.noded_energies import scaled_bending
 from nicmm_core.relaxation.simple_curve import simple_curve
 from tests.core.checks import points_near
 

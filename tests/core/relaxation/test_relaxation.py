@@ -12,9 +12,10 @@ from nicmm_core.geometry.crossings import crossing_segments
 from nicmm_core.geometry.curve import geodesic_curvature, resample
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.relaxation import levenberg_marquardt
+from nicmm_core.relaxation import levenberg_marquardt, relaxing
 from nicmm_core.relaxation.curve_nodes import FEATURE_TENSION, CurveSurface, nodes_at
 from nicmm_core.relaxation.elastic_energy import OVER_TENSION, bending_energy, feature_energy
+from nicmm_core.relaxation.noded_curve import noded_curve
 from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from nicmm_core.status import Status
 from tests.core.checks import (
@@ -424,6 +425,47 @@ def test_more_levels_end_at_the_same_curve(flat_disc):
 
 
 @pytest.mark.slow
+def node_counts(mesh, start, config=DEFAULT):
+    """Numbers of nodes in the iterations of a relaxation, without repetitions, and its result."""
+    counts = []
+
+    def watch(done, points):
+        if not counts or abs(counts[-1] - len(points)) > 20:
+            counts.append(len(points))
+        return True
+
+    surface = CurveSurface(mesh, unsigned_normals(mesh))
+    return counts, relax(surface, start, 1.0, config, watch)
+
+
+def with_nodes(mesh, curve, count):
+    return noded_curve(CurveSurface(mesh, unsigned_normals(mesh)), curve, count)
+
+
+def test_a_start_that_bends_little_needs_no_coarse_level(flat_disc):
+    curve = star(flat_disc, wave=0.05)
+    fine, result = node_counts(flat_disc, with_nodes(flat_disc, curve, 192))
+    assert len(fine) == 1
+    assert fine[0] == pytest.approx(512, abs=20)
+    config = replace(DEFAULT, fine_below=0.0)
+    both, on_levels = node_counts(flat_disc, with_nodes(flat_disc, curve, 192), config)
+    assert both[0] == pytest.approx(128, abs=20)
+    assert apart(result.curve.points, on_levels.curve.points) < 2e-2
+    bent, _ = node_counts(flat_disc, with_nodes(flat_disc, star(flat_disc, wave=0.4), 192))
+    assert bent[0] == pytest.approx(128, abs=20)
+
+
+def test_if_the_energy_rises_all_levels_are_used(flat_disc, monkeypatch):
+    """With ten nodes, the polygon through them has less energy than the relaxed curve."""
+    monkeypatch.setattr(relaxing, "ACCEPTABLE", 0.0)
+    start = with_nodes(flat_disc, star(flat_disc, wave=0.0), 10)
+    counts, result = node_counts(flat_disc, start)
+    assert counts[:2] == pytest.approx([512, 128], abs=20)
+    for config in (replace(DEFAULT, levels=(512,)), replace(DEFAULT, fine_below=0.0)):
+        _, other = node_counts(flat_disc, start, config)
+        assert result.bending <= 1.001 * other.bending
+
+
 def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
     """Each control point is kept exactly."""
     near = points_near(ball, [[0.2, 0.1, 1.0]])
