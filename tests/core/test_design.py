@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nicmm_core as nicmm
-from nicmm_core import progress, shapes
+from nicmm_core import progress, shapes, surface_designer
 from nicmm_core.geometry.curve import resample
 from nicmm_core.progress import INTERVAL
 from tests.core.checks import (
@@ -349,10 +349,10 @@ class TestProgress:
 
         def stop(fraction, points):
             calls.append(fraction)
-            return fraction < 0.7
+            return fraction <= surface_designer.START_FRACTION
 
         design = nicmm.design_curve(body, CHOSEN, order="shortest", progress=stop)
-        assert sum(fraction >= 0.7 for fraction in calls) == 1
+        assert sum(fraction > surface_designer.START_FRACTION for fraction in calls) == 1
         assert design.status is nicmm.Status.CANCELLED
         assert 0 < design.iterations < 200
         (curve,) = design.curves
