@@ -69,10 +69,18 @@ class Resumable:
     given: Mesh | None = None
 
 
-def unsettled_vertices(start: Resumable, request: Request) -> IntArray | None:
+def unsettled_vertices(start: Resumable, request: Request, visited: IntArray) -> IntArray | None:
     """Vertices near which a start may move, if the request differs in painted weights only.
 
-    Elsewhere the curve has converged, and a map that changes far away should not move it.
+    Elsewhere the curve has converged, and a map that changes far away should not move it. The
+    control points may be numbered in another way, as long as their positions are the same.
+
+    Parameters
+    ----------
+    start : Resumable
+    request : Request
+    visited : (k,) int array
+        For each control node of the start, the index of its control point in the request.
 
     Returns
     -------
@@ -80,10 +88,25 @@ def unsettled_vertices(start: Resumable, request: Request) -> IntArray | None:
         Vertices whose weights changed, and those near which the start has not converged. None if
         the whole curve may move.
     """
-    before = start.request
+    before, mesh = start.request, start.mesh
+    points = before.points[start.visited].positions(mesh)
+    now = request.points[visited].positions(mesh)
+    if (
+        points.shape != now.shape
+        or np.abs(points - now).max() > tolerances.SAME_POSITION * mesh.diagonal
+    ):
+        return None
     # Neither alternatives nor via points matter to a design with a start.
     unpainted = [
-        replace(each, obstacles=None, alignment=None, alternatives=0, via_points={})
+        replace(
+            each,
+            points=before.points,
+            order=before.order,
+            obstacles=None,
+            alignment=None,
+            alternatives=0,
+            via_points={},
+        )
         for each in (before, request)
     ]
     if start.unsettled is None or not same_request(*unpainted):

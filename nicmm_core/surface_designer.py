@@ -156,7 +156,7 @@ class SurfaceDesigner:
         curve, visited = moved_start(surface, start, request)
         collisions, unsettled = 0, None
         if isinstance(start, Resumable):
-            collisions, unsettled = start.collisions, unsettled_vertices(start, request)
+            collisions, unsettled = start.collisions, unsettled_vertices(start, request, visited)
         # If strands collide, an attempt without tracing every iteration would fail.
         config = replace(WARM, defer_tracing=not collisions)
         begin = _Start(

@@ -112,7 +112,9 @@ def for_curve(curve_object, mesh_object, surface, settings: CurveSettings) -> De
     start = None
     if settings.method == "NICMM" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
-        start = curves[0] if len(curves) == 1 else None
+        if len(curves) == 1:
+            arrays = surface.core_positions, surface.faces
+            start = designers.design_of(*arrays, curves[0]) or curves[0]
     return replace(request, start=start, moved=moved)
 
 
@@ -124,11 +126,15 @@ def answer(request: DesignRequest, progress):
     with designers.exclusive(request.surface.core_positions, request.surface.faces) as designer:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
+            design = None
             if request.start is not None:
                 # If the curve cannot keep its course, the core searches for a new one below.
                 with contextlib.suppress(nicmm.CurveError):
-                    return designer.design(request.points, start=request.start, **arguments)
-            return designer.design(request.points, **arguments)
+                    design = designer.design(request.points, start=request.start, **arguments)
+            if design is None:
+                design = designer.design(request.points, **arguments)
+            designers.keep_design(designer, design)
+            return design
         except nicmm.MissingPackageError:
             raise
         except nicmm.NicmmError as error:

@@ -2,7 +2,9 @@
 """Caches the core's designers, with their factorisations, for the most recently used meshes.
 
 The cache pays off because the redo panel runs the operator again, on the same mesh, whenever a
-setting changes.
+setting changes. The latest designs on each of these meshes are kept, too: an update that starts
+from a design, and not only from its curve, knows the weights of before and moves the curve only
+near those that have changed.
 """
 
 import hashlib
@@ -19,6 +21,15 @@ _in_use: dict = {}
 
 _fingerprints: dict = {}
 """Fingerprints computed before, by the identity of the arrays."""
+
+_designs = weakref.WeakKeyDictionary()
+"""The latest designs by designer, the oldest first."""
+
+MOST_DESIGNS = 32
+"""Greatest number of designs that are kept for a mesh."""
+
+SAME_PLACE = 1e-12
+"""Difference of barycentric coordinates up to which two curves are the same."""
 
 
 def designer_for(vertices: np.ndarray, faces: np.ndarray):
@@ -52,6 +63,28 @@ def mesh_for(vertices: np.ndarray, faces: np.ndarray):
     if fingerprint in _in_use:
         return _in_use[fingerprint].mesh
     return designer_for(vertices, faces).mesh
+
+
+def keep_design(designer, design) -> None:
+    """Keep a design and its alternatives; the oldest designs beyond the limit are dropped."""
+    kept = [*_designs.get(designer, []), design, *design.alternatives]
+    _designs[designer] = kept[-MOST_DESIGNS:]
+
+
+def design_of(vertices: np.ndarray, faces: np.ndarray, curve):
+    """The kept design of a curve of the core on a mesh, or None."""
+    designer = _designers.get(_fingerprint(vertices, faces))
+    for design in reversed(_designs.get(designer, [])) if designer is not None else ():
+        if len(design.curves) == 1 and _is_same(design.curves[0], curve):
+            return design
+    return None
+
+
+def _is_same(one, other) -> bool:
+    """Whether two curves of the core on the same mesh have the same points."""
+    return np.array_equal(one.faces, other.faces) and np.allclose(
+        one.barycentric, other.barycentric, rtol=0.0, atol=SAME_PLACE
+    )
 
 
 def is_prepared(vertices: np.ndarray, faces: np.ndarray) -> bool:

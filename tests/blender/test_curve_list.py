@@ -54,14 +54,18 @@ def pull(mesh_object, share=0.2):
     bpy.context.view_layer.update()
 
 
+def distances_to_line(points, line):
+    """Distance of each point from a polyline."""
+    start, step = line[:-1], np.diff(line, axis=0)
+    share = np.einsum("psd,sd->ps", points[:, None] - start, step) / (step**2).sum(axis=1)
+    nearest = start + share.clip(0.0, 1.0)[..., None] * step
+    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
+
+
 def assert_same_curve(one, other):
     """Assert that the points of each polyline lie on the other polyline."""
     for points, line in ((one, other), (other, one)):
-        start, step = line[:-1], np.diff(line, axis=0)
-        share = np.einsum("psd,sd->ps", points[:, None] - start, step) / (step**2).sum(axis=1)
-        nearest = start + share.clip(0.0, 1.0)[..., None] * step
-        away = np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
-        assert away.max() <= CONVERGED
+        assert distances_to_line(points, line).max() <= CONVERGED
 
 
 @pytest.mark.slow
@@ -315,6 +319,30 @@ def test_live_update_follows_weights_and_edit_mode(live, sphere):
     bpy.ops.transform.translate(value=(0, 0, 1))
     run_timer(live)
     assert places(curve)[:, 2].min() > 0.5
+
+
+def paint_near(mesh_object, group, place, radius=0.25):
+    """Paint weights around a place, full in its middle."""
+    away = np.linalg.norm(scenes.positions(mesh_object) - place, axis=1)
+    for vertex in np.flatnonzero(away < radius).tolist():
+        group.add([vertex], 1.0 - away[vertex] / radius, "REPLACE")
+    mesh_object.data.update_tag()
+
+
+@pytest.mark.slow
+def test_painting_moves_only_the_curve_nearby(live, sphere):
+    """Each dab is painted beside the curve as it is then; the rest of the curve stays."""
+    group = sphere.vertex_groups.new(name="Along")
+    curve = draw(sphere, alignment_group="Along")
+    for number in (0.15, 0.65):
+        run_timer(live)
+        before = places(curve)
+        place = before[int(number * len(before))] + [0.0, 0.0, 0.15]
+        paint_near(sphere, group, place)
+        run_timer(live)
+        moved = distances_to_line(before, places(curve))
+        far = np.linalg.norm(before - place, axis=1) > 1.2
+        assert moved[far].max() < 1e-4 < 1e-2 < moved[~far].max()
 
 
 @pytest.mark.slow

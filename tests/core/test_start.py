@@ -512,6 +512,18 @@ class TestPaintedBesideACurve:
         _, difference = self.moved(ball, whole, after, place)
         assert difference < 0.5 * near
 
+    def test_the_numbers_of_the_points_do_not_matter(self, ball, designer, dab):
+        """As in Blender, where an update gives the points in the order visited."""
+        place, weights = dab
+        first = on_ball(ball)[np.array([2, 0, 4, 1, 3])]
+        start = designer.design(first, order="shortest")
+        index = start.curves[0].control_index
+        curve = start.curves[0]
+        points = nicmm.SurfacePoints(curve.faces[index], curve.barycentric[index])
+        after = designer.design(points, start=start, alignment=weights)
+        far, near = self.moved(ball, start, after, place)
+        assert far < 1e-3 < 1e-2 < near
+
     def test_it_also_stays_while_iterations_are_few(self, ball, designer, before, dab):
         place, weights = dab
         after, calls = converged(designer, on_ball(ball), before, 1, alignment=weights)
