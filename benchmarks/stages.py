@@ -17,7 +17,7 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core import design, repaired_surface, shapes, surface_designer
 from nicmm_core.coarsening import coarse_start
-from nicmm_core.courses import course_search, course_surface
+from nicmm_core.courses import course_candidates, course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set import problem, zero_set
@@ -61,17 +61,17 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     ],
     "least costs, routes": [
         (course_search, "with_control_points"),
-        (course_search, "leg_choices"),
-        (course_search, "cheapest_orders"),
-        (course_search, "routes_of_legs"),
+        (course_candidates, "leg_choices"),
+        (course_candidates, "cheapest_orders"),
+        (course_candidates, "routes_of_legs"),
     ],
     "combinations": [
-        (course_search, "curves_on_routes"),
-        (course_search, "crossing_legs"),
-        (course_search, "junctions_of_routes"),
-        (course_search, "cheapest_combinations"),
-        (course_search, "distinct_combinations"),
-        (course_search, "course_nodes"),
+        (course_candidates, "curves_on_routes"),
+        (course_candidates, "crossing_legs"),
+        (course_candidates, "junctions_of_routes"),
+        (course_candidates, "cheapest_combinations"),
+        (course_candidates, "distinct_combinations"),
+        (course_candidates, "course_nodes"),
     ],
     "legs recombined": [(course_search, "recombined")],
     "crossings removed": [(course_search, "uncrossed")],

@@ -7,7 +7,6 @@ them, the length of the shortest course (`elastic_energy.comparable_energies`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,18 +20,9 @@ from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.even_nodes import resampled
 from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .comparison import SAME_COURSE
-from .hop_graph import CourseGraph, HopGraph, with_control_points
-from .leg_combinations import (
-    cheapest_combinations,
-    course_nodes,
-    crossing_legs,
-    curves_on_routes,
-    distinct_combinations,
-    junctions_of_routes,
-    steps_of_course,
-)
-from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
-from .leg_routes import Routes, cells_beside, leg_choices, routes_of_legs
+from .course_candidates import candidates
+from .hop_graph import HopGraph, with_control_points
+from .leg_orders import legs_of_order
 from .recombination import recombined
 from .uncrossing import uncrossed
 
@@ -42,9 +32,6 @@ TENSIONS = (2.0, 1.0)
 Searches with different seeds take them in turn, since a low tension finds long courses that bend
 little. The first one is greater than 1 because hops overestimate bending: they turn only at cells.
 """
-
-CANDIDATES = (16, 10, 8)
-"""Numbers of courses relaxed with few nodes, by the rank of their order of the control points."""
 
 RECOMBINED, FINALISTS = 16, 6
 """Number of courses combined from their legs, and number of the best of all courses that are
@@ -127,7 +114,7 @@ def find_courses(
     tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
-    found = _candidates(courses, surface, closed, smoothness, any_order)
+    found = candidates(courses, surface, closed, smoothness, any_order)
     if found is None:
         return
     nodes, point = found
@@ -157,70 +144,6 @@ def find_courses(
         for _ in range(2):
             yield own, visited
             own, visited = _resampled(surface, own, visited, 2)
-
-
-def _candidates(
-    courses: CourseGraph, surface: CurveSurface, closed: bool, smoothness: float, any_order: bool
-) -> tuple[Nodes, IntArray] | None:
-    """The cheapest courses in the cheapest orders of the points, and the point at each node.
-
-    None if there is no course.
-    """
-    count = len(courses.points)
-    order = np.arange(count)
-    n_legs = count if closed else count - 1
-    if any_order and count <= MOST_POINTS:
-        pairs = combinations(range(count), 2)
-        choices = leg_choices(courses, pairs, n_legs)
-        orders = [*cheapest_orders(courses, choices, closed), order]
-    else:
-        legs = legs_of_order(order, closed).tolist()
-        choices = leg_choices(courses, ((start, end) for start, end in legs), n_legs)
-        orders = [order]
-    checkpoint()
-    routes: list[list[Routes]] = []
-    possible: list[IntArray] = []
-    beside = cells_beside(courses)
-    for order in orders:
-        if any(np.array_equal(order, other) for other in possible):
-            continue
-        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed, beside)
-        if of_order:
-            routes.append(of_order)
-            possible.append(order)
-        if len(routes) == len(CANDIDATES):
-            break
-    if not routes:
-        return None
-    with subrange(0.2, 0.3):
-        curves = curves_on_routes(
-            courses, [leg for of_order in routes for leg in of_order], n_legs, smoothness
-        )
-    crosses = crossing_legs(curves)
-    # The first order takes over the candidates of orders that there are not.
-    shares = [sum(CANDIDATES) - sum(CANDIDATES[1 : len(routes)]), *CANDIDATES[1 : len(routes)]]
-    choice, visit = [], []
-    for number, (of_order, order, share) in enumerate(zip(routes, possible, shares, strict=True)):
-        own = slice(
-            curves.of_leg(number * n_legs).start, curves.of_leg((number + 1) * n_legs - 1).stop
-        )
-        found = cheapest_combinations(
-            [leg.cost for leg in of_order],
-            junctions_of_routes(courses, of_order, closed),
-            crosses[own, own],
-            closed,
-        )
-        found = distinct_combinations([leg.alike for leg in of_order], found, share)
-        choice.append(own.start + found.choice)
-        visit.append(np.tile(order, len(found.choice)))
-    chosen = np.concatenate(choice)
-    if not len(chosen):
-        return None
-    nodes, at_points = course_nodes(curves, chosen, closed, steps_of_course(n_legs))
-    point = np.full(len(at_points), -1)
-    point[at_points] = np.concatenate(visit)
-    # Legs were placed on the surface without maps.
-    return nodes_at(surface, nodes.places, closed, nodes.curves), point
 
 
 def random_waves(distances: FloatArray, spacing: float, seed: int) -> FloatArray:

@@ -20,10 +20,10 @@ MOST_POINTS = 7
 """Number of points above which only the shortest order is tried; there are too many pairs of points
 then, and crossing legs are uncrossed later anyway."""
 
-DIRECTIONS = 24
+DIRECTIONS_OF_A_LEG = 24
 """Number of pairs of end directions of a leg with which an order is tried."""
 
-MAX_RELATIVE_COST = 1.6
+MAX_COST_OF_ORDER = 1.6
 """Cost of an order, relative to the cheapest, above which it is left out."""
 
 
@@ -76,10 +76,10 @@ def cheapest_orders(
             costs.append(float(least_totals(graph, legs, closed)[0].min()))
     cost = without_rounding_errors(np.array(costs))
     ascending = np.argsort(cost, kind="stable")
-    cheap = ascending[cost[ascending] <= MAX_RELATIVE_COST * cost.min(initial=np.inf)]
+    cheap = ascending[cost[ascending] <= MAX_COST_OF_ORDER * cost.min(initial=np.inf)]
     return [orders[number] for number in cheap.tolist()]
 
 
 def _first_choices(legs: LegStates) -> LegStates:
-    kept = slice(DIRECTIONS)
+    kept = slice(DIRECTIONS_OF_A_LEG)
     return LegStates(legs.state[kept], legs.cost[kept], legs.first[kept], legs.last[kept])

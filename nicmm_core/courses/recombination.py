@@ -34,7 +34,7 @@ from .leg_orders import legs_of_order
 NODES_OF_A_LEG = 24
 """Number of nodes of a leg while legs are combined."""
 
-MOST_LEGS, FEWEST_COURSES = 300, 4
+MOST_COMBINED_LEGS, FEWEST_COURSES = 300, 4
 """Number of legs up to which the best courses are combined, in all courses together; and number of
 courses that are combined anyway."""
 
@@ -79,7 +79,7 @@ def recombined(
     count = place.shape[1]
     if count < FEWEST_POINTS:
         return None
-    kept = np.argsort(energy, kind="stable")[: max(FEWEST_COURSES, MOST_LEGS // count)]
+    kept = np.argsort(energy, kind="stable")[: max(FEWEST_COURSES, MOST_COMBINED_LEGS // count)]
     best = kept[np.argmax(simple[kept])]  # the first simple one, or else the first one
     kept = np.union1d(kept, best)
     nodes, visit, place = curves_of(nodes, kept), nodes.by_curve(visit)[kept], place[kept]

@@ -237,7 +237,8 @@ def relax(
     one, other = energies_of(surface, [fine.noded_curve, again.noded_curve], smoothness)
     if other < one:
         return again
-    return replace(fine, iterations=again.iterations, work=again.work, status=again.status)
+    status = Status.CANCELLED if again.status is Status.CANCELLED else fine.status
+    return replace(fine, iterations=again.iterations, work=again.work, status=status)
 
 
 @dataclass(frozen=True)
