@@ -231,7 +231,8 @@ def relax(
     fine = relaxing.on_levels(config.levels[-1:], start, whole)
     stopped = fine.status is Status.CANCELLED or fine.iterations >= config.most_iterations
     before, after = energies_of(surface, [start, fine.noded_curve], smoothness)
-    if stopped or after <= before or scaled_bending(fine.noded_curve) <= ACCEPTABLE:
+    good = after <= before or scaled_bending(fine.noded_curve) <= ACCEPTABLE
+    if stopped or (good and fine.status is not Status.UNRELAXED):
         return fine
     again = relaxing.on_levels(config.levels, start, whole, fine)
     one, other = energies_of(surface, [fine.noded_curve, again.noded_curve], smoothness)
