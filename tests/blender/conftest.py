@@ -83,13 +83,14 @@ _designs: dict = {}
 def remembered_designs(extension, monkeypatch):
     """Compute equal designs once, for tests of what becomes of a curve in Blender.
 
-    That equal requests get equal curves is tested with the core. Bounded steps, as of a drag, and
-    cancelled designs are not remembered.
+    That equal requests get equal curves is tested with the core. Bounded steps, as of a drag,
+    designs that start from other ones and cancelled designs are not remembered.
     """
     plain = extension.core.Designer.design
 
     def design(self, points, *, progress=None, **options):
-        if options.get("max_iterations") is not None:
+        continues = isinstance(options.get("start"), extension.core.Design)
+        if continues or options.get("max_iterations") is not None:
             return plain(self, points, progress=progress, **options)
         key = _key((self.mesh.vertices, self.mesh.faces, points, sorted(options.items())))
         if key not in _designs:
