@@ -28,7 +28,7 @@ _designs = weakref.WeakKeyDictionary()
 MOST_DESIGNS = 32
 """Greatest number of designs that are kept for a mesh."""
 
-SAME_PLACE = 1e-12
+SAME_COORDINATES = 1e-12
 """Difference of barycentric coordinates up to which two curves are the same."""
 
 
@@ -83,7 +83,7 @@ def design_of(vertices: np.ndarray, faces: np.ndarray, curve):
 def _is_same(one, other) -> bool:
     """Whether two curves of the core on the same mesh have the same points."""
     return np.array_equal(one.faces, other.faces) and np.allclose(
-        one.barycentric, other.barycentric, rtol=0.0, atol=SAME_PLACE
+        one.barycentric, other.barycentric, rtol=0.0, atol=SAME_COORDINATES
     )
 
 

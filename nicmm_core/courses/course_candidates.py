@@ -50,7 +50,7 @@ def candidates(
     Returns
     -------
     (Nodes, (n,) int array) or None
-        The courses, and the control point at each node, -1 where there is none. None if there is no
+        The courses, and the control point at each node, -1 at all other nodes. None without any
         course.
     """
     count = len(courses.points)

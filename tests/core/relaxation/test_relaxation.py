@@ -424,7 +424,6 @@ def test_more_levels_end_at_the_same_curve(flat_disc):
     assert coarse.bending == pytest.approx(fine.bending, rel=0.02)
 
 
-@pytest.mark.slow
 def node_counts(mesh, start, config=DEFAULT):
     """Numbers of nodes in the iterations of a relaxation, without repetitions, and its result."""
     counts = []
@@ -455,6 +454,7 @@ def test_a_start_that_bends_little_needs_no_coarse_level(flat_disc):
     assert bent[0] == pytest.approx(128, abs=20)
 
 
+@pytest.mark.slow
 def test_if_the_energy_rises_all_levels_are_used(flat_disc, monkeypatch):
     """With ten nodes, the polygon through them has less energy than the relaxed curve."""
     monkeypatch.setattr(relaxing, "ACCEPTABLE", 0.0)
@@ -466,6 +466,7 @@ def test_if_the_energy_rises_all_levels_are_used(flat_disc, monkeypatch):
         assert result.bending <= 1.001 * other.bending
 
 
+@pytest.mark.slow
 def test_control_points_at_vertices_on_edges_and_in_faces_are_kept(ball):
     """Each control point is kept exactly."""
     near = points_near(ball, [[0.2, 0.1, 1.0]])
