@@ -58,7 +58,7 @@ FIELDS, GRAPHS = "paths over random fields", "hop graphs with random weights"
 
 KIND = {True: "closed", False: "open"}
 
-WORKERS = max(1, (os.cpu_count() or 1) // 2)
+WORKERS = os.cpu_count() or 1
 """Number of processes; a request is measured by one of them, so results do not depend on it."""
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -219,23 +219,11 @@ class SurfaceDesigner:
         take long, so they are made only for alternatives.
         """
         config = _config(request)
+        further = [self._course_starts(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         if by_course:
             yield from self._other_finalists(request, starts, attempts, courses)
             attempts.end_search()
-        further = [self._course_starts(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
-        for search in further if by_course else ():
-            if not attempts.another_search_pays():
-                break
-            attempts.searches += 1
-            start = next(search, None)
-            if start is None:
-                # On rough meshes hardly any course is simple, and each failure takes long.
-                break
-            yield start, attempts.limited(config)
-            yield from self._other_finalists(request, starts, attempts, search)
-            attempts.end_search()
-        if by_course:
-            yield from self._starts_with_other_parts(request, starts, attempts)
+            yield from self._starts_of_further_searches(request, starts, attempts, further)
         if attempts.tightening_pays():
             yield starts[attempts.best], attempts.limited(TIGHTENED)
         if by_course and attempts.network_pays():
@@ -244,10 +232,50 @@ class SurfaceDesigner:
             with contextlib.suppress(NicmmError):
                 yield self._start_by_network(request), attempts.limited(config)
         if request.alternatives:
-            others = itertools.chain(courses, *further)
+            others = itertools.chain(courses, *further[: max(attempts.searches - 1, 1)])
             new = (start for start in others if _is_apart(start, attempts.curves))
             most = MAX_COURSES_RELAXED + 2 * request.alternatives
             yield from ((start, config) for start in itertools.islice(new, most))
+
+    def _starts_of_further_searches(
+        self,
+        request: Request,
+        starts: list[_Start],
+        attempts: Attempts,
+        further: Sequence[Iterator[_Start]],
+    ) -> Iterator[tuple[_Start, RelaxationConfig]]:
+        """The courses of one repeated search, other parts, and more searches as long as it pays."""
+        found = True
+        for search in further[:1]:
+            if attempts.another_search_pays():
+                found = yield from self._searched(request, starts, attempts, search)
+        yield from self._starts_with_other_parts(request, starts, attempts)
+        for search in further[1:]:
+            if not (found and attempts.another_search_pays()):
+                break
+            found = yield from self._searched(request, starts, attempts, search)
+            if attempts.fruitless == 0:
+                yield from self._starts_with_other_parts(request, starts, attempts)
+
+    def _searched(
+        self,
+        request: Request,
+        starts: list[_Start],
+        attempts: Attempts,
+        search: Iterator[_Start],
+    ) -> Generator[tuple[_Start, RelaxationConfig], None, bool]:
+        """The best courses of a repeated search; returns whether another search may find any.
+
+        On rough meshes hardly any course is simple, and each failure takes long.
+        """
+        attempts.searches += 1
+        start = next(search, None)
+        if start is None:
+            return False
+        yield start, attempts.limited(_config(request))
+        yield from self._other_finalists(request, starts, attempts, search)
+        attempts.end_search()
+        return True
 
     def _other_finalists(
         self,

@@ -2,7 +2,8 @@
 
 The farther a curve winds around limbs, the more courses a search misses. A search with other
 lengths and another tension finds others, so it is made if the curve bends. Then the parts that bend
-most are searched for again.
+most are searched for again. If even the best curve then bends more than a circle, further searches
+follow.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ STRONGLY_BENT = 20.0
 Curves above it wind around limbs, where a search misses more courses.
 """
 
-EXTREMELY_BENT = 80.0
-"""L ∮ κ_g² ds above which searches go on even if they gain little; twice the value of a circle."""
+EXTREMELY_BENT = 50.0
+"""L ∮ κ_g² ds above which searches go on even if they gain little; a circle has 4π², about 40."""
 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
-FURTHER_SEARCHES = 1
-"""Greatest number of repeated searches for the whole curve."""
+FURTHER_SEARCHES = 3
+"""Greatest number of repeated searches for the whole curve; extremely bent curves get all."""
 
 COURSES_OF_A_SEARCH = 3
 """Greatest number of courses relaxed after a search whose curves are extremely bent.
@@ -36,11 +37,9 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-FRUITLESS_SEARCHES = 2
-"""Number of consecutive searches with little gain after which no further one is made.
-
-Searches for parts end after one of them unless the curve is extremely bent.
-"""
+FRUITLESS_PARTS = 2
+"""Number of consecutive searches for parts of an extremely bent curve with little gain after which
+no further one is made. Those for parts of other curves end after one."""
 
 PARTLY_BENT = 30.0
 """L ∮ κ_g² ds above which the parts that bend most are searched for again."""
@@ -57,10 +56,10 @@ MOST_FAILURES = 4
 On rough meshes each of them takes long.
 """
 
-MOST_WORK = 2_000
+MOST_WORK = 3_000
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes (`Work`). It takes about three seconds, and longer on rough meshes.
+In moves of all nodes (`Work`). It takes about four seconds, and longer on rough meshes.
 """
 
 RESERVED = 800
@@ -132,12 +131,11 @@ class Attempts:
     def another_search_pays(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
-        A search is worthwhile if the best curve bends, unless the last ones have gained little.
+        The first repeated search is worthwhile if the best curve bends; those after it, only if it
+        is still extremely bent.
         """
-        bending = self._bending
-        fruitless = self.fruitless >= FRUITLESS_SEARCHES
-        promising = bending > EXTREMELY_BENT or (bending > STRONGLY_BENT and not fruitless)
-        return promising and self._is_affordable(self._work / self.searches + RESERVED)
+        least = STRONGLY_BENT if self.searches == 1 else EXTREMELY_BENT
+        return self._bending > least and self._is_affordable(self._work / self.searches + RESERVED)
 
     def another_course_pays(self, first: int) -> bool:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
@@ -148,7 +146,7 @@ class Attempts:
     def part_pays(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
         bending = self._bending
-        allowed = FRUITLESS_SEARCHES if bending > EXTREMELY_BENT else 1
+        allowed = FRUITLESS_PARTS if bending > EXTREMELY_BENT else 1
         promising = bending > PARTLY_BENT and self.fruitless < allowed
         return promising and self._is_affordable(WORK_OF_PART)
 

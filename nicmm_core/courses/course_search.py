@@ -7,10 +7,12 @@ them, the length of the shortest course (`elastic_energy.comparable_energies`).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints, joined
 from ..maps.guidance import length_factor
@@ -35,7 +37,7 @@ little. The first one is greater than 1 because hops overestimate bending: they 
 
 RECOMBINED, FINALISTS = 16, 6
 """Number of courses combined from their legs, and number of the best of all courses that are
-relaxed with twice as many nodes."""
+relaxed with twice as many nodes, unless they have had enough doublings."""
 
 FIRST_STRIDE = 8
 """Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
@@ -55,10 +57,22 @@ Short waves are almost independent at neighbouring cells, which gives the most d
 MOST_LEGS = 60
 """Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
+TRUE_ENERGY = 1.5
+"""Growth of the elastic energy when nodes are doubled from which it counts as false.
+
+Straight lines between nodes that are far apart pass through thin limbs, so courses around limbs
+seem to bend less than they do.
+"""
+
+MOST_DOUBLINGS = 2
+"""Number of times that the nodes of courses are doubled at most."""
+
 OF_CANDIDATES = (TogetherConfig(iterations=8),)
+OF_DOUBLED = (TogetherConfig(iterations=6),)
 OF_RECOMBINED = (TogetherConfig(iterations=8),)
 OF_FINALISTS = (TogetherConfig(iterations=6), TogetherConfig(iterations=8))
-"""Passes of the joint relaxation of all candidates, of recombined courses, and of the finalists.
+"""Passes of the joint relaxation of all candidates, of candidates with twice as many nodes, of
+recombined courses, and of the finalists.
 
 Before each pass but the first, nodes are placed evenly along the traces. While nodes move, only
 their distances count, which are too short around the edges of thin parts."""
@@ -123,6 +137,7 @@ def find_courses(
     nodes, visit, _ = uncrossed(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
+        nodes, visit, doublings = _with_true_energies(surface, nodes, visit, smoothness)
     nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
     combined = recombined(surface, nodes, visit, simple, smoothness, RECOMBINED)
     if combined is not None:
@@ -135,7 +150,7 @@ def find_courses(
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
     best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
     nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
-    nodes, visit = _resampled(surface, nodes, visit, 2)
+    nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
     nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
@@ -186,6 +201,25 @@ def _relaxed(
         with subrange(number / len(passes), (number + 1) / len(passes)):
             nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
     return nodes, visit
+
+
+def _with_true_energies(
+    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float
+) -> tuple[Nodes, IntArray, int]:
+    """Relaxed courses with as many nodes as their energies need, and how often these were doubled.
+
+    The median over the best courses decides, so that the nodes of all are doubled or none.
+    """
+    unpainted = replace(surface, feature_map=None)  # with lanes, energies may be negative
+    for doublings in range(MOST_DOUBLINGS):
+        doubled, visit_doubled = _resampled(surface, nodes, visit, 2)
+        best = np.argsort(_energies(surface, nodes, smoothness), kind="stable")[:FINALISTS]
+        before, after = (_energies(unpainted, each, smoothness) for each in (nodes, doubled))
+        growth = after[best] / np.maximum(before[best], tolerances.TINY)
+        if np.median(growth) < TRUE_ENERGY:
+            return nodes, visit, doublings
+        nodes, visit = _relaxed(surface, doubled, visit_doubled, smoothness, OF_DOUBLED)
+    return nodes, visit, MOST_DOUBLINGS
 
 
 def _resampled(

@@ -157,9 +157,9 @@ def test_searches_for_parts_are_bounded(monkeypatch):
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert parts == list(range(attempts.FRUITLESS_SEARCHES))
+    assert parts == list(range(attempts.FRUITLESS_PARTS))
     parts.clear()
-    monkeypatch.setattr(attempts, "FRUITLESS_SEARCHES", 100)
+    monkeypatch.setattr(attempts, "FRUITLESS_PARTS", 100)
     nicmm.design_curve(body, chosen)
     assert len(parts) <= attempts.SEARCHES_FOR_PARTS
     assert all(b == a + 1 for a, b in itertools.pairwise(parts))

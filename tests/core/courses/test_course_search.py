@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.courses import course_surface
+from nicmm_core.courses import course_search, course_surface
 from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.courses.course_search import find_courses, random_waves
 from nicmm_core.courses.hop_graph import build_hop_graph, distances_along_edges
@@ -17,7 +17,7 @@ from nicmm_core.courses.leg_combinations import (
     junctions_of_routes,
 )
 from nicmm_core.geometry.refinement import refined
-from nicmm_core.relaxation.curve_nodes import curve_surface
+from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.elastic_energy import bending_energy, comparable_energies
 from tests.core.checks import assert_valid_design, points_near, random_surface_points
 from tests.core.courses.test_hop_graph import LEGS, graph_through, routes_through
@@ -96,6 +96,38 @@ def test_the_best_course_round_a_ball_is_a_great_circle():
     assert np.abs(nodes.positions[:, 2]).max() < 0.02
     energy = comparable_energies(surface, nodes, 1.0, 2.0 * np.pi)
     assert energy[0] == pytest.approx(4.0 * np.pi**2, rel=0.01)
+
+
+def winding_of_a_thin_torus(windings, count):
+    """A curve that winds around the tube of a thin torus."""
+    minor = 0.06
+    ring = shapes.torus(1.0, minor, 240, 24)
+    surface = curve_surface(ring)
+    angle = 2.0 * np.pi * np.arange(count) / count
+    away, height = 1.0 + minor * np.cos(windings * angle), minor * np.sin(windings * angle)
+    wound = np.column_stack([away * np.cos(angle), away * np.sin(angle), height])
+    return surface, nodes_at(surface, points_near(ring, wound), closed=True)
+
+
+@pytest.mark.parametrize(("windings", "doubled"), [(4, False), (24, True)])
+def test_nodes_are_doubled_until_energies_are_true(windings, doubled):
+    """Four nodes a winding are too few: lines between them pass through the tube."""
+    count = 96
+    surface, nodes = winding_of_a_thin_torus(windings, count)
+    visit = np.full(count, -1)
+    visit[0] = 0
+
+    def growth(nodes, visit):
+        """Of the energy, with twice as many nodes along the traces."""
+        twice, _ = course_search._resampled(surface, nodes, visit, 2)
+        before, after = (course_search._energies(surface, each, 1.0) for each in (nodes, twice))
+        return after[0] / before[0]
+
+    assert (growth(nodes, visit) > course_search.TRUE_ENERGY) == doubled
+    found, visit, doublings = course_search._with_true_energies(surface, nodes, visit, 1.0)
+    assert (doublings > 0) == doubled
+    assert found.per_curve == count * 2**doublings
+    assert growth(found, visit) < course_search.TRUE_ENERGY
 
 
 @pytest.mark.slow
