@@ -15,7 +15,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import design, repaired_surface, shapes, surface_designer
+from nicmm_core import design, repaired_surface, shapes, start_search, surface_designer
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_candidates, course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
@@ -52,7 +52,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
         (coarse_start, "renumbered"),
         (design, "design_on_original"),
     ],
-    "normals": [(surface_designer, "curve_surface"), (course_surface, "curve_surface")],
+    "normals": [(start_search, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "hop graph": [(course_surface, "build_hop_graph")],
     "distances, order of the points": [
@@ -77,7 +77,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "crossings removed": [(course_search, "uncrossed")],
     "courses relaxed together": [(course_search, "relax_together")],
     "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
-    "course traced": [(surface_designer, "simple_curve")],
+    "course traced": [(start_search, "simple_curve")],
     "initial path": [(problem, "build_initial_loop")],
     "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
     "network": [(single_pass, "infer_level_set")],

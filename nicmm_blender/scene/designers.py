@@ -66,8 +66,12 @@ def mesh_for(vertices: np.ndarray, faces: np.ndarray):
 
 
 def keep_design(designer, design) -> None:
-    """Keep a design and its alternatives; the oldest designs beyond the limit are dropped."""
-    kept = [*_designs.get(designer, []), design, *design.alternatives]
+    """Keep a design and its alternatives; the oldest designs beyond the limit are dropped.
+
+    Only designs that another one may start from are kept.
+    """
+    new = [each for each in (design, *design.alternatives) if each.resumable is not None]
+    kept = [*_designs.get(designer, []), *new]
     _designs[designer] = kept[-MOST_DESIGNS:]
 
 

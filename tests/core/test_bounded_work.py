@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import further_starts, shapes, start_search
 from nicmm_core.courses import attempts
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
@@ -114,15 +114,15 @@ def test_forty_points_back_and_forth(monkeypatch):
 def test_repeated_searches_are_bounded(monkeypatch):
     """Courses are searched again once if a curve bends, and more often if it is extremely bent."""
     searched = []
-    seek = surface_designer.SurfaceDesigner._course_starts
+    seek = start_search.StartSearch.courses
 
     def counted(self, request, seed=0, most_failures=None):
         searched.append(seed)  # runs when the generator is first advanced
         yield from seek(self, request, seed, most_failures)
 
-    monkeypatch.setattr(surface_designer.SurfaceDesigner, "_course_starts", counted)
-    monkeypatch.setattr(surface_designer, "SEARCHES_FOR_PARTS", 0)
-    monkeypatch.setattr(surface_designer, "FURTHER_SEEDS", range(1, 6))
+    monkeypatch.setattr(start_search.StartSearch, "courses", counted)
+    monkeypatch.setattr(further_starts, "SEARCHES_FOR_PARTS", 0)
+    monkeypatch.setattr(further_starts, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "EXTREMELY_BENT", 1e9)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes, surface_designer
+from nicmm_core import further_starts, shapes, start_search
 from nicmm_core.courses import attempts
 from nicmm_core.courses.bent_part import (
     APART,
@@ -127,14 +127,14 @@ def test_the_result_never_crosses_itself(surface):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
-    designer = surface_designer.SurfaceDesigner(surface.mesh)
+    search = start_search.StartSearch(surface.mesh)
     curve = wavy_curve(surface, closed)
     controls = curve.nodes.places[curve.control_nodes]
     design = nicmm.design_curve(surface.mesh, controls, closed=closed)
     request = design.resumable.request
-    start = surface_designer._Start(curve, np.arange(4), surface, 1.0)
+    start = start_search.Start(curve, np.arange(4), surface, 1.0)
     part = bent_part(curve, [])
-    changed = next(designer._courses_of_part(request, start, curve, part))
+    changed = next(search.with_other_part(request, start, curve, part))
     assert scaled_bending(changed.curve) < 0.5 * scaled_bending(curve)
     np.testing.assert_array_equal(changed.visited, np.arange(4))
     found = changed.curve.nodes.places[changed.curve.control_nodes]
@@ -143,14 +143,14 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
 
 def test_searches_for_parts_are_bounded(monkeypatch):
     parts = []
-    select = surface_designer.bent_part
+    select = further_starts.bent_part
 
     def counted(curve, tried):
         parts.append(len(tried))
         return select(curve, tried)
 
-    monkeypatch.setattr(surface_designer, "bent_part", counted)
-    monkeypatch.setattr(surface_designer, "FURTHER_SEEDS", ())
+    monkeypatch.setattr(further_starts, "bent_part", counted)
+    monkeypatch.setattr(further_starts, "FURTHER_SEEDS", ())
     monkeypatch.setattr(attempts, "PARTLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "EXTREMELY_BENT", 0.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
