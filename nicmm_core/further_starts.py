@@ -170,6 +170,6 @@ class FurtherStarts:
             courses = self.search.with_other_part(self.request, self.starts[best], curve, part)
             for start in itertools.islice(courses, COURSES_OF_A_PART):
                 yield start, attempts.limited(WARM)
-            attempts.end_search()
+            attempts.end_search(of_part=True)
             if attempts.fruitless == 0:
                 tried = []  # the best curve is another one now

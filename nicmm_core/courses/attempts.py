@@ -14,7 +14,7 @@ from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.noded_energies import energies_of, scaled_bending
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
-from .comparison import distinct_by_energy
+from .comparison import distinct_by_energy, is_apart
 
 STRONGLY_BENT = 20.0
 """L ∮ κ_g² ds above which the search is repeated, half the value of a circle.
@@ -88,6 +88,9 @@ class Attempts:
         The result of each attempt.
     fruitless : int
         Number of consecutive searches, up to the last one completed, that have gained little.
+    agreed : bool
+        Whether the last search for the whole curve has found the best curve of before once more,
+        and no other search has found a better one since.
     """
 
     surface: CurveSurface
@@ -97,6 +100,7 @@ class Attempts:
     parts: int = 0
     relaxed: list[Relaxed] = field(default_factory=list)
     fruitless: int = 0
+    agreed: bool = False
     _relaxed_before: int = 0  # number of results when the last search ended
 
     @property
@@ -114,28 +118,34 @@ class Attempts:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self.surface, self.curves, self.smoothness)
 
-    def end_search(self) -> None:
-        """Record that the courses found by a search have been relaxed."""
+    def end_search(self, of_part: bool = False) -> None:
+        """Record that the courses found by a search, of the whole curve or a part, are relaxed."""
         before = self._relaxed_before
-        if before:
-            energies = energies_of(self.surface, self.curves, self.smoothness)
-            earlier = min(energies[:before])
-            # With lanes energies may be negative, so decreases are relative to the elastic energy.
-            best = self.curves[energies.index(earlier)]
-            unpainted = replace(self.surface, feature_map=None)
-            (elastic,) = energies_of(unpainted, [best], self.smoothness)
-            gained = earlier - min(energies) > LEAST_GAIN * elastic
-            self.fruitless = 0 if gained else self.fruitless + 1
         self._relaxed_before = len(self.relaxed)
+        if not before or before == len(self.relaxed):
+            self.fruitless += bool(before)
+            return
+        energies = energies_of(self.surface, self.curves, self.smoothness)
+        least, found = min(energies[:before]), min(energies[before:])
+        earlier = self.curves[energies.index(least)]
+        # With lanes energies may be negative, so decreases are relative to the elastic energy.
+        unpainted = replace(self.surface, feature_map=None)
+        (elastic,) = energies_of(unpainted, [earlier], self.smoothness)
+        gained = least - found > LEAST_GAIN * elastic
+        self.fruitless = 0 if gained else self.fruitless + 1
+        if gained or not of_part:
+            latest = self.curves[before + energies[before:].index(found)]
+            self.agreed = not gained and not is_apart(self.surface, latest, [earlier])
 
     def another_search_pays(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
         The first repeated search is worthwhile if the best curve bends; those after it, only if it
-        is still extremely bent.
+        is still extremely bent and two searches have not found the same curve.
         """
         least = STRONGLY_BENT if self.searches == 1 else EXTREMELY_BENT
-        return self._bending > least and self._is_affordable(self._work / self.searches + RESERVED)
+        promising = self._bending > least and not self.agreed
+        return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
     def another_course_pays(self, first: int) -> bool:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""

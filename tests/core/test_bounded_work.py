@@ -131,8 +131,14 @@ def test_repeated_searches_are_bounded(monkeypatch):
     assert searched == [0, 1]
     searched.clear()
     monkeypatch.setattr(attempts, "EXTREMELY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
+    monkeypatch.setattr(attempts, "is_apart", lambda *curves: True)
     nicmm.design_curve(body, chosen)
     assert searched == list(range(6))
+    searched.clear()
+    monkeypatch.setattr(attempts, "is_apart", lambda *curves: False)  # searches agree
+    nicmm.design_curve(body, chosen)
+    assert searched == [0, 1]
     searched.clear()
     monkeypatch.setattr(attempts, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
