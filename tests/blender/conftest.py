@@ -58,6 +58,8 @@ def extension(archive):
     addon_utils.extensions_refresh()
     module = addon_utils.enable(MODULE, default_set=True)
     assert module is not None, "the extension was not installed or did not register"
+    # The first attempt at a curve is enough to test what becomes of it.
+    import_module(f"{MODULE}.nicmm_core.courses.attempts").MOST_WORK = 0
     yield SimpleNamespace(
         name=MODULE,
         module=module,

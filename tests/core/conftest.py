@@ -66,3 +66,11 @@ def without_courses(monkeypatch):
 def one_attempt(monkeypatch):
     """Make only the first attempt at each curve, which must be valid too but may bend more."""
     monkeypatch.setattr(attempts, "MOST_WORK", 0)
+
+
+@pytest.fixture(scope="module")
+def one_attempt_each():
+    """`one_attempt` for all tests of a module, which test anything but the course of a curve."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(attempts, "MOST_WORK", 0)
+        yield

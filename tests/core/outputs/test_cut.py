@@ -19,6 +19,8 @@ from tests.core.outputs.checks import assert_valid_cut, edges_with_counts, longe
 from tests.core.outputs.curves import KINDS, designed
 from tests.oracles.mesh_files import COLLECTIONS, mesh_files, spread
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 NO_CONTROLS = np.zeros(0, dtype=np.int64)
 
 

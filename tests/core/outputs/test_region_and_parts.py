@@ -16,6 +16,8 @@ from tests.core.outputs.curves import designed
 from tests.core.outputs.test_cut import curve_at
 from tests.oracles.named_curves import named_curves
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 @pytest.fixture(scope="module")
 def cap():

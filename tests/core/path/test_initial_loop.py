@@ -17,6 +17,8 @@ from nicmm_core.path.visiting_order import shortest_order
 from tests.core.checks import assert_valid_curve, circle, flipped, random_surface_points
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 BALL = shapes.sphere(1)
 
 

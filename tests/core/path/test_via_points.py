@@ -13,6 +13,8 @@ from nicmm_core.path.initial_loop import build_initial_loop
 from tests.core.checks import assert_valid_design, circle, joined
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 def design(mesh, points, **settings):
     return nicmm.design_curve(mesh, points, **{"method": "variational", **settings})

@@ -10,6 +10,8 @@ from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import assert_valid_design
 from tests.oracles.named_curves import nearest_vertices
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 
 def length_inside(mesh, curve, weights):
     """Length of a curve in faces whose three corners have weight 1."""
@@ -48,7 +50,6 @@ def test_every_method_goes_round(method):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("one_attempt")
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", range(2))
 def test_no_length_inside_on_any_surface(surface, closed, seed):

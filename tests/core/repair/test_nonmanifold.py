@@ -16,6 +16,8 @@ from tests.oracles import corpus
 from tests.oracles.checker import judge
 from tests.oracles.defects import defective_meshes
 
+pytestmark = pytest.mark.usefixtures("one_attempt_each")
+
 MESHES = dict(defective_meshes())
 
 
@@ -34,7 +36,6 @@ def first_repair(mesh):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("one_attempt")
 @pytest.mark.parametrize("request_number", [0, 3])
 @pytest.mark.parametrize("name", MESHES)
 def test_a_good_curve_unless_an_error_is_due(name, request_number):
