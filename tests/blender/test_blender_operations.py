@@ -45,6 +45,7 @@ def edit(mesh_object, operator, **arguments):
 class TestNumbering:
     """Control points stay in place when vertices get other indices."""
 
+    @pytest.mark.slow
     def test_separate_parts_beside_another_curve(self, empty_scene, capfd):
         mesh_object = grid()
         kept = design(mesh_object, "200, 212, 110")
@@ -60,6 +61,7 @@ class TestNumbering:
         assert "3 control points moved to the nearest positions" in capfd.readouterr().out
         assert curve_deviation(kept, kept.parent) < SINGLE
 
+    @pytest.mark.slow
     def test_sorted_vertices(self, empty_scene):
         bpy.ops.mesh.primitive_uv_sphere_add()
         mesh_object = bpy.context.active_object
@@ -152,6 +154,7 @@ class TestPlace:
         assert bpy.ops.nicmm.add_point(position=position) == {"FINISHED"}
         assert radius_in_scene(curve) == pytest.approx(radius, rel=1e-4)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["DECIMATE", "WELD"])
     def test_control_points_under_modifiers_that_move_corners(self, empty_scene, kind):
         """A face that such a modifier keeps may be elsewhere."""
@@ -222,6 +225,7 @@ class TestRefusals:
         with pytest.raises(RuntimeError, match="has shape keys"):
             bpy.ops.nicmm.update_curves()
 
+    @pytest.mark.slow
     def test_a_setting_does_not_drop_a_renamed_map(self, empty_scene):
         ball = scenes.sphere()
         group = ball.vertex_groups.new(name="Wall")

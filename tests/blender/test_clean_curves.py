@@ -200,6 +200,7 @@ def test_offset_is_outwards_also_on_mirrored_objects(empty_scene, scale):
     assert lengths.min() > 1.01
 
 
+@pytest.mark.slow
 def test_radii_tilts_and_materials_survive_an_update(monkey):
     curve = draw(monkey, closed=False)
     curve.data.materials.append(bpy.data.materials.new("Red"))

@@ -148,6 +148,7 @@ def test_one_of_several_fails(sphere, capfd):
     assert "1 of 2 curves updated" in printed and 'no vertex group "Wall"' in printed
 
 
+@pytest.mark.slow
 def test_unreachable_ones_leave_the_others(sphere, capfd):
     good = draw(sphere)
     everywhere = sphere.vertex_groups.new(name="Wall")
@@ -233,6 +234,7 @@ def test_inverting_the_filter_of_the_list_shows_other_curves_only(empty_scene, s
     assert shown(use_filter_invert=True) == [curves[1]]
 
 
+@pytest.mark.slow
 def test_list_shows_the_curves_of_the_mesh(empty_scene, sphere):
     mine = [draw(sphere), draw(sphere, output="STICKY")]
     other = scenes.sphere()

@@ -156,6 +156,7 @@ def test_disabling_removes_everything(extension):
         addon_utils.enable(extension.name, default_set=True)
 
 
+@pytest.mark.slow
 def test_works_after_enabling_again(empty_scene):
     addon_utils.disable(empty_scene.name, default_set=True)
     addon_utils.enable(empty_scene.name, default_set=True)

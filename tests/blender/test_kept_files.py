@@ -97,6 +97,7 @@ def test_a_curve_is_edited_in_place(kept, name):
     assert len(drawn(curve)) != len(before) or not np.allclose(drawn(curve), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVES)
 def test_points_of_a_curve_are_changed(kept, name):
     curve = bpy.data.objects[name]

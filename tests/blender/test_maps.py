@@ -127,6 +127,7 @@ def test_painting_is_switched_on_and_off(cube, role, field):
         bpy.ops.nicmm.paint_map(role=role)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("show", [True, False])
 def test_a_map_is_for_the_active_curve(empty_scene, show):
     sphere = scenes.sphere()

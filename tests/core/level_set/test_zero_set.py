@@ -31,6 +31,7 @@ def lane(flat_disc):
     return (np.abs(flat_disc.vertices[:, 1]) < 0.05).astype(float)
 
 
+@pytest.mark.slow
 def test_a_shorter_curve_is_kept_and_a_longer_one_replaced(flat_disc, lane):
     problem = problem_on(flat_disc, alignment=lane)
     straight, detour = bow(flat_disc, 0.0), bow(flat_disc, 0.5)
@@ -52,6 +53,7 @@ def test_lengths_count_by_the_map(flat_disc):
     assert np.abs(kept.curves[0].points[:, 1]).max() > 0.2
 
 
+@pytest.mark.slow
 def test_what_is_no_simple_curve_is_replaced(flat_disc, lane):
     problem = problem_on(flat_disc, alignment=lane)
     none = ZeroSet(np.zeros(0), 0, [])

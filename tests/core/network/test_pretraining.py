@@ -60,6 +60,7 @@ def test_loss_falls(meshes, tmp_path):
     assert losses[-1] < 0.97 * losses[0], losses
 
 
+@pytest.mark.slow
 def test_writes_weights_that_load_and_nothing_else(finished):
     path, losses = finished
     assert len(losses) == SETTINGS.epochs

@@ -108,6 +108,7 @@ def test_curves_round_a_tube_bound_nothing_and_open_the_surface(name):
     assert rims == (2 if two_sided else 1)
 
 
+@pytest.mark.slow
 def test_round_the_hole_of_an_annulus_is_a_region():
     found = next(entry for entry in named_curves() if "annulus" in entry.name)
     curve = nicmm.design_curve(found.mesh, found.points, order=found.order).curves[0]
@@ -175,6 +176,7 @@ def test_region_inside_one_face_has_no_vertices():
     assert not region.vertices(mesh).any() and not region.faces.any()
 
 
+@pytest.mark.slow
 def test_other_components_stay_outside(small_ball):
     mesh = joined(small_ball, nicmm.Mesh(0.01 * small_ball.vertices, small_ball.faces))
     curve = nicmm.design_curve(mesh, [1, 50, 90]).curves[0]

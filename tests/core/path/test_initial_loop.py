@@ -243,6 +243,7 @@ class TestBoundary:
 
 
 class TestNoManifold:
+    @pytest.mark.slow
     def test_spheres_that_touch_have_open_curves_only(self):
         """A curve may pass the common vertex only once."""
         ball = shapes.sphere(1)

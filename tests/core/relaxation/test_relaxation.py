@@ -441,6 +441,7 @@ def with_nodes(mesh, curve, count):
     return noded_curve(CurveSurface(mesh, unsigned_normals(mesh)), curve, count)
 
 
+@pytest.mark.slow
 def test_a_start_that_bends_little_needs_no_coarse_level(flat_disc):
     curve = star(flat_disc, wave=0.05)
     fine, result = node_counts(flat_disc, with_nodes(flat_disc, curve, 192))

@@ -158,6 +158,7 @@ def triangle_heights(corners):
     return np.linalg.norm(np.cross(side[:, 0], side[:, 1]), axis=1)
 
 
+@pytest.mark.slow
 def test_curve_field_and_warm_start_belong_to_the_users_mesh(monkeypatch):
     mesh = MESHES["caps"]
     from_nothing = []
@@ -255,6 +256,7 @@ class TestOpenEdgesAtOnePlace:
             ball.vertices[ball.faces].reshape(-1, 3), np.arange(ball.faces.size).reshape(-1, 3)
         )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "method", ["nicmm", pytest.param("variational", marks=pytest.mark.slow)]
     )
@@ -314,6 +316,7 @@ class TestOpenEdgesAtOnePlace:
         with pytest.raises(nicmm.UnreachableError, match="merge vertices by distance"):
             nicmm.design_curve(nicmm.Mesh(vertices, soup.faces), [3, 100, 400])
 
+    @pytest.mark.slow
     def test_cutting_a_soup_says_what_mends_it(self, soup):
         curve = nicmm.design_curve(soup, [3, 100, 400]).curves[0]
         with pytest.raises(nicmm.CurveError, match="merge vertices by distance"):

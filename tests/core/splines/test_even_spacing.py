@@ -146,6 +146,7 @@ def test_designed_curve(name, share):
     assert even.closed == curve.closed
 
 
+@pytest.mark.slow
 def test_a_curve_on_a_soup_of_triangles():
     """Faces without common vertices make no difference to a curve on the same faces."""
     ball = shapes.sphere(2)
@@ -216,6 +217,7 @@ def test_a_wild_polyline_gets_a_limited_number_of_regular_points():
         assert chords.min() >= 0.5 * chords.mean() / ROUNDED
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
