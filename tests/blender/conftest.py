@@ -51,20 +51,25 @@ def archive(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def extension(archive):
-    """The installed extension: its `name`, `module`, `core` and `folder`."""
+    """The installed extension: its `name`, `module`, `core` and `folder`.
+
+    It makes only the first attempt at each curve, which is enough to test what becomes of it.
+    """
     bpy.ops.extensions.package_install_files(
         filepath=str(archive), repo="user_default", enable_on_install=False
     )
     addon_utils.extensions_refresh()
     module = addon_utils.enable(MODULE, default_set=True)
     assert module is not None, "the extension was not installed or did not register"
-    # The first attempt at a curve is enough to test what becomes of it.
-    import_module(f"{MODULE}.nicmm_core.courses.attempts").MOST_WORK = 0
+    attempts = import_module(f"{MODULE}.nicmm_core.courses.attempts")
+    most_work, attempts.MOST_WORK = attempts.MOST_WORK, 0  # `all_attempts` undoes this
     yield SimpleNamespace(
         name=MODULE,
         module=module,
         core=import_module(f"{MODULE}.nicmm_core"),
         folder=os.path.dirname(module.__file__),
+        attempts=attempts,
+        most_work=most_work,
     )
     # Blender hangs at exit if classes of a script are still registered.
     addon_utils.disable(MODULE, default_set=True)
@@ -76,6 +81,12 @@ def empty_scene(extension):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.ed.undo_push(message="Start")
     return extension
+
+
+@pytest.fixture
+def all_attempts(extension, monkeypatch):
+    """Make all attempts at a curve, as for users."""
+    monkeypatch.setattr(extension.attempts, "MOST_WORK", extension.most_work)
 
 
 _designs: dict = {}

@@ -8,6 +8,11 @@ import numpy as np
 import bmesh
 
 
+def installed_core():
+    """The core of the installed extension."""
+    return import_module("bl_ext.user_default.nicmm_curves.nicmm_core")
+
+
 def module(extension, name):
     """A module of the installed extension, by its name inside `nicmm_blender`."""
     return import_module(f"{extension.name}.nicmm_blender.{name}")

@@ -227,7 +227,7 @@ def test_region_is_selected(monkey, mode):
 
 def inside_faces(monkey):
     """Polygons with more than half of their area inside, computed by the core."""
-    import nicmm_core as nicmm
+    nicmm = scenes.installed_core()
 
     mesh = nicmm.Mesh(scenes.positions(monkey), triangles(monkey))
     curve = nicmm.design_curve(mesh, [73, 365, 74, 366]).curves[0]
@@ -238,7 +238,7 @@ def inside_faces(monkey):
 
 
 def same_component(monkey):
-    import nicmm_core as nicmm
+    nicmm = scenes.installed_core()
 
     mesh = nicmm.Mesh(scenes.positions(monkey), triangles(monkey))
     wanted = mesh.face_component[mesh.faces_at(np.array([73]))[0]]
@@ -257,7 +257,7 @@ def test_region_that_is_cut_ends_at_the_curve(monkey, mode):
     assert area(monkey) == pytest.approx(whole, rel=1e-5)
     selected = get(monkey.data.polygons, "select", dtype=bool)
     inside = get(monkey.data.polygons, "area")[selected].sum()
-    import nicmm_core as nicmm
+    nicmm = scenes.installed_core()
 
     bpy.ops.mesh.primitive_monkey_add()
     other = bpy.context.active_object
@@ -338,7 +338,7 @@ def test_parts_become_objects(monkey, mode):
 
 
 def components(mesh_object):
-    import nicmm_core as nicmm
+    nicmm = scenes.installed_core()
 
     mesh = nicmm.Mesh(scenes.positions(mesh_object), triangles(mesh_object))
     return int(mesh.face_component.max()) + 1

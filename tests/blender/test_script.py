@@ -31,7 +31,7 @@ finally:
 
 
 @pytest.mark.usefixtures("bpy_module")
-def test_documented_script(empty_scene, tmp_path):
+def test_documented_script(empty_scene, all_attempts, tmp_path):
     documentation = (build.ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
     mesh_name, indices = re.search(r"-- \\\n +(\w+) ([\d,]+) out\.blend", documentation).groups()
     bpy.ops.mesh.primitive_monkey_add()
