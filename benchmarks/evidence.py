@@ -160,8 +160,8 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
         room = relative.split("/")[1] if relative.startswith("nicmm_core/") else ""
         if relative in digests or relative in PRESENTATION or room in excluded:
             continue
-        digests[relative], imported = _whole(read(path))
-        waiting += _files(imported, path)
+        digests[relative], imported = _whole(read(path), path)
+        waiting += imported
     if "network" not in excluded:
         for path in sorted((ROOT / WEIGHTS).iterdir()):
             if path.is_file() and path.suffix != ".py":
@@ -181,10 +181,11 @@ IMPORTS = (ast.Import, ast.ImportFrom)
 
 
 @cache
-def _whole(content: bytes) -> tuple[str, list[ast.stmt]]:
-    """Digest of all statements of a file, and its import statements."""
+def _whole(content: bytes, path: Path) -> tuple[str, list[Path]]:
+    """Digest of all statements of a file, and the files of the project that it imports."""
     tree = _parsed(content)
-    return _digest([tree]), [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
+    imports = [node for node in ast.walk(tree) if isinstance(node, IMPORTS)]
+    return _digest([tree]), _files(imports, path)
 
 
 def _parsed(content: bytes) -> ast.Module:
