@@ -39,7 +39,7 @@ TITLE = "Hostile input"
 
 def measure(scale: Scale) -> Results:
     """Run all cases, and list the findings."""
-    cases = scale.choose(10_500, 1_050, 42)
+    cases = scale.choose(10_500, 1_050, 14)
     outcomes: Counter[tuple[str, str]] = Counter()
     findings: list[str] = []
     slowest = 0.0

@@ -35,7 +35,7 @@ TITLE = "Random non-manifold meshes"
 
 def measure(scale: Scale) -> Results:
     """Request curves on many messes, and list the findings."""
-    count = scale.choose(600, 300, 6)
+    count = scale.choose(600, 300, 2)
     outcomes: Counter[str] = Counter()
     findings: list[str] = []
     seconds = []

@@ -14,7 +14,7 @@ HUGE = 10**400
 BALL = shapes.sphere(1)
 POINTS = [0, 9, 30]
 
-PARTS = 20
+PARTS = 10
 """Number of parts of the seeded cases, so that several processes can share them."""
 
 EACH = 35

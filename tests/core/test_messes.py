@@ -8,7 +8,7 @@ from tests.oracles import messes
 
 pytestmark = pytest.mark.slow
 
-COUNT = 100
+COUNT = 40
 
 
 @pytest.mark.parametrize("number", range(COUNT))

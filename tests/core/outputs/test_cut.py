@@ -32,7 +32,7 @@ def curve_at(mesh, points, closed):
 
 
 @pytest.mark.slow
-@settings(max_examples=16)
+@settings(max_examples=10)
 @given(
     kind=st.sampled_from(KINDS),
     seed=st.integers(0, 4),
@@ -60,7 +60,7 @@ def test_curve_of_the_papers_method(closed):
 @pytest.mark.slow
 @pytest.mark.skipif(not COLLECTIONS.exists(), reason="the meshes are not beside this folder")
 def test_scans():
-    for number, path in enumerate(spread(mesh_files("shrec16"), 6)):
+    for number, path in enumerate(spread(mesh_files("shrec16"), 3)):
         coarse = read_mesh(path)
         mesh = nicmm.Mesh(*igl.loop(coarse.vertices, coarse.faces))
         chosen = np.random.default_rng(number).choice(len(mesh.vertices), 4, replace=False)

@@ -139,7 +139,7 @@ SURFACES = {
 class TestEveryOrder:
     """Disjoint arcs do not separate a surface without boundary, so every order has a path."""
 
-    @settings(max_examples=40)
+    @settings(max_examples=20)
     @given(
         name=st.sampled_from(sorted(SURFACES)),
         count=st.integers(2, 12),
@@ -182,7 +182,7 @@ class TestEveryOrder:
 
 class TestBoundary:
     @pytest.mark.slow
-    @settings(max_examples=15)
+    @settings(max_examples=8)
     @given(count=st.integers(4, 8), seed=st.integers(0, 10**6), closed=st.booleans())
     def test_an_order_along_the_rim_works_and_any_other_names_one(
         self, flat_disc, count, seed, closed
