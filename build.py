@@ -325,9 +325,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     demo.set_defaults(command=command_demo)
 
     test = commands.add_parser("test", help="run every check")
-    test.add_argument(
-        "--quick", action="store_true", help="leave out the slow tests: about a minute"
-    )
+    test.add_argument("--quick", action="store_true", help="leave out the slow tests")
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
     )

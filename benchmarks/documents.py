@@ -110,13 +110,13 @@ def _methods(curvature: Results, degraded: Results, runtime: Results) -> str:
         (
             "one finite curve on a mesh with every face degraded",
             *(f"{count} of {len(worst)}" for count in found),
-            "yes and no",
+            "NICMM yes, variational no",
         ),
         (
             f"iterations, median of {len(runtime['sets'])}",
             f"{iterations[0]}, after the search",
             *iterations[1:],
-            "about 32 and –",
+            "NICMM about 32",
         ),
     ]
     return report.table(("", *(f"`{method}`" for method in METHODS), "in the paper"), rows)
@@ -133,7 +133,7 @@ def _courses(results: Results) -> str:
             moved[change] += [courses.is_moved(each) for each in several]
             every += [each["away"] for each in several]
     closed, open_ = (np.exp(np.log(ratios[kind]).mean()) for kind in (True, False))
-    far = report.listed(f"{name} {sum(each)} of {len(each)}" for name, each in moved.items())
+    far = report.listed(f"{sum(each)} of {len(each)} {name}" for name, each in moved.items())
     return (
         _item(
             "Relative to the lowest energy of all starts of `python -m benchmarks courses`, the "
@@ -144,10 +144,11 @@ def _courses(results: Results) -> str:
         )
         + "\n"
         + _item(
-            "The curve depends only on the surface, because it is designed on a copy that is "
-            "numbered by position in the principal frame. When the mesh is changed, a curve "
-            f"counts as another one if it moves by more than {100 * courses.MOVED:g} % of the "
-            f"diagonal and its energy changes by more than {100 * courses.TIE:g} %: {far}. "
+            "The curve does not depend on the numbering, position, orientation or size of the "
+            "mesh, because it is designed on a copy that is numbered by position in the principal "
+            "frame. When the mesh is changed, a curve counts as another one if it moves by more "
+            f"than {100 * courses.MOVED:g} % of the diagonal and its energy changes by more than "
+            f"{100 * courses.TIE:g} %. This happens to {far} curves. "
             f"{(np.array(every) < 1e-6).sum()} of all {len(every)} curves stay the same within "
             "1e-6."
         )
@@ -163,10 +164,11 @@ def _runtime(results: Results) -> str:
     }
     ratio = float(np.median(mean["nicmm"] / mean["variational"]))
     seconds = report.listed(f"`{method}` {mean[method].mean():.2f} s" for method in methods)
+    medians = report.listed(f"{np.median(mean[method]):.2f} s" for method in methods)
     return _paragraph(
         f"A first curve takes {seconds} on average over {len(sets)} meshes of some 4,000 vertices "
-        f"(`python -m benchmarks runtime`); `nicmm` takes {ratio:.2f} of the time of "
-        "`variational`, median of the sets."
+        f"(`python -m benchmarks runtime`; medians {medians}). The median ratio of `nicmm` to "
+        f"`variational` is {ratio:.2f}."
     )
 
 
@@ -198,7 +200,7 @@ def _sharp_edges(results: Results) -> str:
     every = [line for lines in results["lines"].values() for line in lines]
     others = [line["mesh"] for line in every if line["aligned"] > sharp_edges.WANTED]
     kinds = sorted({name.split(", ")[-1].rstrip(" 0123456789") for name in others})
-    where = f"; the others are on: {report.listed(kinds)}" if kinds else ""
+    where = f"; the other {len(others)} are on: {report.listed(kinds)}" if kinds else ""
     return _item(
         "A curve whose ends are 2 % of the diagonal away from a sharp edge is attracted to the "
         f"edge and runs along it: of {len(every)} "
@@ -302,13 +304,14 @@ def _ninth_channel(results: Results) -> str:
     seen, neutral = means[ninth_channel.SEEN], means[ninth_channel.NEUTRAL]
     other = means[ninth_channel.WITHOUT_MAPS]
     text = (
-        f"So training on sets with maps changes the mean energy to {seen[0] / other[0]:.2f} of "
-        f"that of a network trained without maps at the start, and to {seen[2] / other[2]:.2f} "
-        f"after {iterations} iterations. The channel itself contributes little: with the neutral "
-        f"value everywhere the energies are {neutral[0] / seen[0]:.2f} and "
-        f"{neutral[2] / seen[2]:.2f} times as high. A network that processes one vertex at a time "
-        "learns the average effect of maps on the energy, and the local information of φ_fea is "
-        "already in φ₀, whose path runs around obstacles and along lanes."
+        "Compared with a network trained without maps, the mean energy is "
+        f"{seen[0] / other[0]:.2f} times as high after the forward pass, and "
+        f"{seen[2] / other[2]:.2f} times after {iterations} iterations. The channel itself "
+        "contributes little: with the neutral value everywhere the energies are "
+        f"{neutral[0] / seen[0]:.2f} and {neutral[2] / seen[2]:.2f} times as high. A network that "
+        "processes one vertex at a time learns the average effect of maps on the energy, and the "
+        "local information of φ_fea is already in φ₀, whose path runs around obstacles and along "
+        "lanes."
     )
     header = ("network", "forward pass", "after 10 iterations", f"after {iterations}")
     return f"{report.table(header, rows)}\n\n{_paragraph(text)}"
@@ -364,16 +367,17 @@ def _corpus(results: Results) -> str:
         "`python -m benchmarks corpus`, every kind of broken mesh (self-crossing, non-manifold, "
         "with reversed faces, degenerate, in pieces, huge): "
         f"of {len(answers):,} requests on {meshes} meshes {counts[GOOD]:,} curves are good, "
-        f"{counts[DUE]} are impossible and refused with an error that says why, "
-        f"{_no(counts[DECLINED])} declined although possible, {_no(counts[WRONG])} wrong. Below "
+        f"{counts[DUE]} are impossible and refused with an error that says why. "
+        f"{_no(counts[DECLINED]).capitalize()} refused although possible, and "
+        f"{_no(counts[WRONG])} wrong. Below "
         f"{SMALL:,} faces the slowest takes {slowest:.1f} seconds."
     )
 
 
 OUTCOMES = {
     "good curve": "good curves",
-    "error where due": "errors that are due",
-    "another order named": "errors that name an order that works",
+    "error where due": "correct refusals, since no curve exists",
+    "another order named": "refusals that name an order that works",
 }
 """Outcomes of `messes` that are right, in words."""
 
@@ -394,12 +398,12 @@ def _fuzz(results: Results) -> str:
     slow = sum(re.search(r": took \d+ s$", finding) is not None for finding in results["findings"])
     text = (
         f"`python -m benchmarks fuzz`, hostile input: of {results['cases']:,} cases "
-        f"{_no(len(results['findings']) - slow, be='')} caused a crash, a hang, several curves or "
-        "an error that is not the package's own."
+        f"{_no(len(results['findings']) - slow, be='')} ended with a crash, a hang, several curves "
+        "or an error of another package."
     )
     if slow:
         text += (
-            f" {slow} answers took more than {fuzz.SLOW:g} seconds of CPU time, at most "
+            f" {slow} took more than {fuzz.SLOW:g} seconds of CPU time, at most "
             f"{results['slowest']:.1f}."
         )
     return _item(text)
