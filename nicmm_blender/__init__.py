@@ -30,6 +30,7 @@ from .tool import (
     overlay,
     picking,
     point_operators,
+    read_ahead,
     toolbar,
 )
 
@@ -37,6 +38,7 @@ MODULES = (
     preferences,
     settings,
     surface_cache,
+    designers,
     time_slices,
     design_curve,
     convert_curve,
@@ -49,6 +51,7 @@ MODULES = (
     point_operators,
     draw_operator,
     picking,
+    read_ahead,
     overlay,
     hover,
     toolbar,
@@ -69,4 +72,3 @@ def unregister() -> None:
     long_solves.stop_all()
     for module in reversed(MODULES):
         module.unregister()
-    designers.forget()

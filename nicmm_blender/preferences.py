@@ -16,6 +16,16 @@ KEPT_MESHES = 2
 LIVE_DELAY = 0.3
 
 
+class _Limits:
+    """Preferences that threads read, which must not access Blender's data."""
+
+    kept_meshes = KEPT_MESHES
+
+
+def _note_limits(_preferences=None, _context=None) -> None:
+    _Limits.kept_meshes = _get("kept_meshes", KEPT_MESHES)
+
+
 class NICMM_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
@@ -35,6 +45,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
         default=KEPT_MESHES,
         min=1,
         max=64,
+        update=_note_limits,
     )
     live_delay: FloatProperty(
         name="Live Update Delay",
@@ -98,8 +109,8 @@ def patience() -> float:
 
 
 def kept_meshes() -> int:
-    """Number of meshes whose designers are kept in memory."""
-    return _get("kept_meshes", KEPT_MESHES)
+    """Number of meshes whose designers are kept in memory; threads may call this."""
+    return _Limits.kept_meshes
 
 
 def live_delay() -> float:
@@ -109,6 +120,7 @@ def live_delay() -> float:
 
 def register() -> None:
     bpy.utils.register_class(NICMM_AP_preferences)
+    _note_limits()
 
 
 def unregister() -> None:

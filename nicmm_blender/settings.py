@@ -251,13 +251,28 @@ class OutputProperties:
     )
 
 
+APPEARANCE = ("spline", "radius", "offset", "thickness")
+"""Output settings of curve objects; a conversion takes them from the converted curve."""
+
 PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotations__)
 
 
-class NICMM_PG_settings(DesignProperties, OutputProperties, bpy.types.PropertyGroup):
+def with_options(given, options: set):
+    """A copy of a property of Blender with other options."""
+    return given.function(**{**given.keywords, "options": options})
+
+
+class NICMM_PG_settings(bpy.types.PropertyGroup):
     """Settings of the sidebar panel, saved with the scene."""
 
-    tube: _tube_property(not sticky_curves.are_drawn_with_all_points())
+    __annotations__ = {  # noqa: RUF012 - as Blender reads it
+        name: with_options(given, set())  # not animatable
+        for name, given in {
+            **DesignProperties.__annotations__,
+            **OutputProperties.__annotations__,
+            "tube": _tube_property(not sticky_curves.are_drawn_with_all_points()),
+        }.items()
+    }
 
 
 def take_from_sidebar(operator, properties) -> None:
@@ -307,18 +322,18 @@ def draw_clearance(layout, properties) -> None:
     row.prop(properties, "clearance")
 
 
-def draw_output(layout, properties) -> None:
-    """Draw the output and its settings."""
+def draw_output(layout, properties, appearance: bool = True) -> None:
+    """Draw the output and its settings, those of the appearance of a curve object on request."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "output")
     output = properties.output
     cuts = output in {"EDGES", "PARTS"} or (output == "REGION" and properties.region_cut)
     shown = {
-        "spline": output in writing.SEPARATE,
-        "radius": output in writing.SEPARATE,
-        "thickness": output in writing.SEPARATE and not properties.radius,
-        "offset": output in writing.SEPARATE,
+        "spline": appearance and output in writing.SEPARATE,
+        "radius": appearance and output in writing.SEPARATE,
+        "thickness": appearance and output in writing.SEPARATE and not properties.radius,
+        "offset": appearance and output in writing.SEPARATE,
         "tube": output == "STICKY",
         "region_as": output == "REGION",
         "region_cut": output == "REGION",

@@ -5,8 +5,9 @@ import bpy
 from bpy.props import IntProperty
 
 from ..operators.update_curves import NICMM_OT_update_curves
-from ..outputs import curve_object
+from ..outputs import edited_curve
 from ..scene import curve_record
+from ..tool import modes
 from ..tool.edit_operator import NICMM_OT_edit_curve
 
 ICONS = {"CURVE": "OUTLINER_OB_CURVE", "CURVES": "OUTLINER_OB_CURVES"}
@@ -17,12 +18,19 @@ UPDATE_ICON = "FILE_REFRESH"
 class NICMM_UL_curves(bpy.types.UIList):
     """List of the curves designed on the mesh, filtered from all objects of the file"""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_name):
+    def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_name):
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False, icon=ICONS.get(item.type, "OBJECT_DATA"))
-        edit = row.operator(NICMM_OT_edit_curve.bl_idname, text="", icon=EDIT_ICON, emboss=False)
+        buttons = row.row(align=True)
+        # The operators take names, and a local object may have the name of a linked one.
+        buttons.enabled = item.library is None
+        editing = buttons.row(align=True)
+        editing.enabled = context.mode in modes.TOOLS
+        edit = editing.operator(
+            NICMM_OT_edit_curve.bl_idname, text="", icon=EDIT_ICON, emboss=False
+        )
         edit.curve = item.name
-        update = row.operator(
+        update = buttons.operator(
             NICMM_OT_update_curves.bl_idname, text="", icon=UPDATE_ICON, emboss=False
         )
         update.curve = item.name
@@ -43,18 +51,20 @@ class NICMM_UL_curves(bpy.types.UIList):
 
 
 def _active_index(_window_manager) -> int:
-    """The index of the active object among all objects, so that the list follows the viewport."""
-    active = bpy.context.active_object
-    return -1 if active is None else bpy.data.objects.find(active.name)
+    """The index of the active curve among all objects, so that the list follows the viewport."""
+    active = edited_curve.active(bpy.context)
+    if active is None:
+        return -1
+    return next(index for index, each in enumerate(bpy.data.objects) if each == active)
 
 
 def _activate(_window_manager, index: int) -> None:
-    """Make an object active, but only in Object Mode: in other modes the mesh must stay active."""
+    """Make a curve active in a mode of the tool; in Edit Mode control points are vertices."""
     context = bpy.context
-    if context.mode == "OBJECT" and index < len(bpy.data.objects):
+    if context.mode in modes.TOOLS and index < len(bpy.data.objects):
         chosen = bpy.data.objects[index]
-        if chosen.visible_get():
-            curve_object.select_only(context, chosen)
+        if curve_record.has_record(chosen) and chosen.visible_get():
+            modes.make_active(context, chosen)
             bpy.ops.ed.undo_push(message="Select Curve")  # as a click in the viewport does
 
 

@@ -7,6 +7,7 @@ from .. import settings
 from ..operators import curve_settings, live_update, maps
 from ..operators.convert_curve import NICMM_OT_convert_curve
 from ..operators.design_curve import NICMM_OT_design_curve
+from ..operators.message_labels import draw_message
 from ..outputs import edited_curve
 from ..scene import curve_record
 from . import curve_list, icons, map_rows, menus
@@ -48,10 +49,11 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
 
     def _draw_conversion(self, layout, properties) -> None:
         layout.separator()
-        settings.draw_output(layout, properties)
+        settings.draw_output(layout, properties, appearance=False)
         convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=icons.CONVERT)
         for name in settings.OutputProperties.__annotations__:
-            setattr(convert, name, getattr(properties, name))
+            if name not in settings.APPEARANCE:
+                setattr(convert, name, getattr(properties, name))
 
 
 class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
@@ -88,7 +90,7 @@ class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         curve_list.draw(self.layout, context)
         for message in live_update.messages(curve_record.mesh_of_context(context)):
-            self.layout.label(text=message, icon="ERROR")
+            draw_message(self.layout, message)
 
 
 PANELS = (NICMM_PT_design_curve, NICMM_PT_maps, NICMM_PT_curves)

@@ -5,20 +5,34 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import settings
-from ..outputs import curve_object, writing
+from ..outputs import curve_object, tube_radius, writing
 from ..scene import curve_record, mesh_data
 from ..scene.messages import InputError
 from . import polls
 from .long_solves import with_error_reports
 
+_OUTPUT = settings.OutputProperties.__annotations__
+
 
 class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
-    """Convert a designed curve to another object, or to edges, a region or parts of its mesh"""
+    """Convert a designed curve to another object, or to edges, a region or parts of its mesh.
+
+    Another object looks like the curve: settings of its appearance that are not given are those of
+    the curve, and its name and materials are kept.
+    """
 
     bl_idname = "nicmm.convert_curve"
     bl_label = "Convert Designed Curve"
+    bl_description = (
+        "Convert a designed curve to another object, or to edges, a region or parts of its mesh"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
+    # Not remembered for the next curve, which has an appearance of its own.
+    spline: settings.with_options(_OUTPUT["spline"], {"SKIP_SAVE"})
+    radius: settings.with_options(_OUTPUT["radius"], {"SKIP_SAVE"})
+    offset: settings.with_options(_OUTPUT["offset"], {"SKIP_SAVE"})
+    thickness: settings.with_options(_OUTPUT["thickness"], {"SKIP_SAVE"})
     keep_original: BoolProperty(
         name="Keep Original",
         description="Keep the original curve object",
@@ -54,13 +68,37 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         surface = curve_record.surface_of(original, mesh_object)
         curves = curve_record.read_curves(original, surface)
         curve_settings = curve_record.settings_of(original)
+        is_separate = self.output in writing.SEPARATE
+        if is_separate:
+            self._take_appearance(original, mesh_object)
         summary = writing.apply(context, mesh_object, surface, curves, self, curve_settings)
+        if is_separate:
+            converted = context.active_object
+            for material in original.data.materials:
+                converted.data.materials.append(material)
         if not self.keep_original:
             curve_object.remove(original)
-        if self.output not in writing.SEPARATE:
+            if is_separate:
+                converted.name = name
+        if not is_separate:
             curve_object.select_only(context, mesh_object)
         self.report({"INFO"}, f'"{name}": {summary}')
         return {"FINISHED"}
+
+    def _take_appearance(self, original, mesh_object) -> None:
+        """Take the settings of the appearance that are not given from the curve."""
+        drawn = curve_record.drawn_as(original)
+        radius = tube_radius.radius_of(original)
+        radius *= curve_object.scale_in_scene(original, mesh_object)
+        found = {**({} if drawn is None else drawn), "radius": radius}
+        if not radius:
+            found["thickness"] = 0.0  # it would be used instead of a radius of zero
+        is_set = self.properties.is_property_set
+        if is_set("thickness") and not is_set("radius"):
+            found["radius"] = 0.0
+        for name, value in found.items():
+            if not is_set(name):
+                setattr(self, name, value)
 
 
 def register() -> None:

@@ -16,13 +16,20 @@ from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
-from .long_solves import answer_all
+from .long_solves import answer_all, pointer_progress
+from .message_labels import draw_message
 
 COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
 DRAWING = ("spline", "offset")
 
 UNDO_DELAY = 0.3
-"""Seconds without another change after which an undo step is added in Sculpt Mode."""
+"""Seconds without another change after which an undo step is added in modes of painting."""
+
+PAINTING = {"SCULPT"} if bpy.app.version >= (5, 0, 0) else {"SCULPT", "PAINT_WEIGHT"}
+"""Modes in which Blender adds no undo step for a change of a property.
+
+Blender 4.3 adds none in Weight Paint, 5.2 does. Where both add one, the second changes nothing.
+"""
 
 _problems: dict = {}
 """Messages about changes that were impossible, by the session_uid of the curve.
@@ -61,24 +68,30 @@ def _write(group, name: str, value) -> None:
     try:
         _change(curve, name, value)
     except (InputError, nicmm.NicmmError, ImportError) as error:
-        digest = curve.data.get(curve_record.DIGEST_KEY, "")
-        _problems[curve.session_uid] = digest, str(error)
+        _problems[curve.session_uid] = curve_record.digest_of(curve), str(error)
     else:
         _problems.pop(curve.session_uid, None)
         _push_undo_later()
 
 
 def _push_undo_later() -> None:
-    """Add an undo step soon: Blender adds none for a change of a property in Sculpt Mode."""
-    if bpy.app.background or bpy.context.mode != "SCULPT":
+    """Add an undo step soon in modes in which Blender adds none."""
+    if bpy.app.background or bpy.context.mode not in PAINTING:
         return
     _cancel_undo()
     bpy.app.timers.register(_push_undo, first_interval=UNDO_DELAY)
 
 
-def _push_undo() -> None:
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+def _push_undo() -> float | None:
+    """Push the undo step; later while an operator runs, such as a stroke, which pushes its own."""
+    if bpy.context.mode not in PAINTING:
+        return None
+    windows = bpy.context.window_manager.windows
+    if any(len(window.modal_operators) for window in windows):
+        return UNDO_DELAY
+    with bpy.context.temp_override(window=windows[0]):
         bpy.ops.ed.undo_push(message="Curve Settings")
+    return None
 
 
 def _cancel_undo() -> None:
@@ -96,13 +109,21 @@ def _change(curve, name: str, value) -> None:
     curve_settings = curve_record.settings_of(curve)
     if name in DRAWING:
         opened = edited_curve.open_curve(context, curve)
-        drawn = curve_record.drawn_as(curve) or {"spline": "EXACT", "offset": 0.0}
+        before = curve_record.drawn_as(curve)
+        drawn = before or {"spline": "EXACT", "offset": 0.0}
         curves = (
             curve_record.read_curves(curve, opened.surface) if curve_record.has_curve(curve) else []
         )
         record = curve[curve_record.RECORD_KEY]
         record["drawn"] = {**drawn, name: value}
-        writing.redraw(curve, opened.surface, curves)
+        try:
+            writing.redraw(curve, opened.surface, curves)
+        except BaseException:
+            if before is None:
+                del record["drawn"]
+            else:
+                record["drawn"] = before
+            raise
         surface_cache.note_change()
         return
     wanted = replace(curve_settings, **{name: value})
@@ -110,7 +131,8 @@ def _change(curve, name: str, value) -> None:
         _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
     opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)
-    curves = edited_curve.curves_of(answer_all(requests, lambda _fraction, _points: True))
+    with pointer_progress(context) as progress:
+        curves = edited_curve.curves_of(answer_all(requests, progress))
     edited_curve.write(context, opened, opened.points, curves, None)
 
 
@@ -184,7 +206,8 @@ def draw_in_header(layout, curve) -> None:
     if mesh_object is not None:
         for name in edited_curve.MAPS:
             layout.prop_search(values, name, mesh_object, "vertex_groups")
-    _draw_problem(layout, curve)
+    if problem_of(curve):
+        layout.label(text="See Sidebar", icon="ERROR")  # the header is too narrow for the reason
 
 
 def draw(layout, curve) -> None:
@@ -196,12 +219,8 @@ def draw(layout, curve) -> None:
         layout.prop(values, name)
     for name in ("spline", "radius", "offset"):
         layout.prop(values, name)
-    _draw_problem(layout, curve)
-
-
-def _draw_problem(layout, curve) -> None:
     if problem := problem_of(curve):
-        layout.label(text=problem, icon="ERROR")
+        draw_message(layout, problem)
 
 
 def register() -> None:

@@ -10,6 +10,7 @@ together with its digest, so an update never triggers another one.
 
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import bpy
 from bpy.app.handlers import persistent
@@ -22,12 +23,31 @@ from ..scene.messages import InputError
 from ..scene.surface import read
 from . import time_slices
 from .long_solves import TIME_SLICE, answer_all
+from .viewports import redraw
 
 PAUSE = 0.01
 """Seconds between two time slices, in which Blender handles events."""
 
 WAIT = 0.1
 """Seconds until the next check whether work may begin or continue."""
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """Why a curve could not be updated.
+
+    Attributes
+    ----------
+    digest : str
+        Digest of the surface and weights that the curve could not be updated to.
+    designed_with : str
+        Digest that the curve had been designed with; the failure is out of date once it differs.
+    message : str
+    """
+
+    digest: str
+    designed_with: str
+    message: str
 
 
 class _Updates:
@@ -43,8 +63,8 @@ class _Updates:
         self.last_change = 0.0
         self.work = None
         self.requests: list = []
-        self.curves: list = []  # session_uids of curves, one for each request
-        self.failed: dict = {}  # session_uid of a curve to its digest and message
+        self.curves: list = []  # session_uid and digest of a curve, for each request
+        self.failed: dict = {}  # _Failure by the session_uid of the curve
         self.is_reading = False
 
     def note(self, objects: set, everything: bool = False) -> None:
@@ -88,10 +108,14 @@ def tick() -> float | None:
 
 def messages(mesh_object) -> list:
     """Messages about the curves on a mesh that could not be updated."""
-    found = [
-        _updates.failed.get(each.session_uid) for each in curve_record.designed_on(mesh_object)
+    if not _live_scenes():
+        return []
+    return [
+        failure.message
+        for each in curve_record.designed_on(mesh_object)
+        if (failure := _updates.failed.get(each.session_uid)) is not None
+        and failure.designed_with == curve_record.digest_of(each)
     ]
-    return [failure[1] for failure in found if failure is not None]
 
 
 def _begin() -> None:
@@ -139,16 +163,16 @@ def _add_request(designed, mesh_object, surfaces: dict) -> None:
         if curve_record.is_current(designed, now):
             _updates.failed.pop(uid, None)
             return
-        if _updates.failed.get(uid, ("",))[0] == now:
+        if uid in _updates.failed and _updates.failed[uid].digest == now:
             return
         writing.check_replaceable(designed)
         traced = read(mesh_object, settings.use_modifiers)
         request = design_request.for_curve(designed, mesh_object, traced, settings)
     except (InputError, nicmm.NicmmError) as error:
-        _updates.failed[uid] = now, f"{designed.name}: {error}"
+        _note_failure(designed, now, error)
         return
     _updates.requests.append(request)
-    _updates.curves.append(uid)
+    _updates.curves.append((uid, curve_record.digest_of(designed)))
 
 
 def _write() -> None:
@@ -158,19 +182,30 @@ def _write() -> None:
     work, requests, curves = _updates.work, _updates.requests, _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
-    for request, uid, answer in zip(requests, curves, work.result(), strict=True):
-        designed = objects.get(uid)
-        if designed is None or request.mesh_object() is None:
+    for request, (uid, before), answer in zip(requests, curves, work.result(), strict=True):
+        designed, mesh_object = objects.get(uid), request.mesh_object()
+        if designed is None or mesh_object is None:
+            continue
+        if curve_record.digest_of(designed) != before:  # the user has changed the curve meanwhile
+            _updates.note({mesh_object.session_uid})
             continue
         _updates.failed.pop(uid, None)
         now = ""
         try:
-            now = curve_record.digest(request.mesh_object(), request.surface, request.settings)
+            now = curve_record.digest(mesh_object, request.surface, request.settings)
             writing.check_replaceable(designed)
             request.check_unchanged()
             writing.replace(designed, request, answer)
         except (InputError, nicmm.NicmmError) as error:
-            _updates.failed[uid] = now, f"{designed.name}: {error}"
+            _note_failure(designed, now, error)
+
+
+def _note_failure(designed, digest: str, error) -> None:
+    """Record why a curve could not be updated, and show it in the sidebar."""
+    _updates.failed[designed.session_uid] = _Failure(
+        digest, curve_record.digest_of(designed), f"{designed.name}: {error}"
+    )
+    redraw()
 
 
 def _has_to_wait() -> bool:
@@ -266,6 +301,7 @@ def register() -> None:
         description="Update the curves of this scene automatically when their surface or the "
         "weights that they use change, in any mode and after frame changes",
         default=False,
+        options=set(),
         update=_switched,
     )
     bpy.types.Scene.nicmm_live_playback = BoolProperty(
@@ -273,6 +309,7 @@ def register() -> None:
         description="Also update curves during animation playback. If disabled, curves are updated "
         "when it stops",
         default=False,
+        options=set(),
         update=_switched,
     )
     for name, function in HANDLERS:

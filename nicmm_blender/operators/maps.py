@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..outputs import edited_curve
+from ..outputs import curve_object, edited_curve
 from ..scene import curve_record, mesh_data
 from ..scene.messages import InputError, counted
 from ..scene.selection import selected_vertices
@@ -102,6 +102,7 @@ class NICMM_OT_new_map(bpy.types.Operator):
         setattr(_settings(context, curve), FIELDS[self.role], group.name)
         mesh_object.vertex_groups.active_index = group.index
         _enter(context, mesh_object, "WEIGHT_PAINT" if self.show else mode)
+        _keep_active(context, curve)
         created = f'Vertex group "{group.name}" with {counted(np.count_nonzero(weights), "weight")}'
         if curve is not None and (problem := curve_settings.problem_of(curve)):
             self.report({"WARNING"}, f'{created}; "{curve.name}" does not use it: {problem}')
@@ -130,7 +131,9 @@ class NICMM_OT_paint_map(bpy.types.Operator):
         mesh_object = curve_record.mesh_of_context(context)
         name = getattr(settings_of(context), FIELDS[self.role])
         if is_painting(context, mesh_object, name):
+            curve = edited_curve.active(context)
             _enter(context, mesh_object, "OBJECT")
+            _keep_active(context, curve)
             return {"FINISHED"}
         if not name:
             raise InputError(
@@ -208,6 +211,12 @@ def _enter(context, mesh_object, mode: str) -> None:
         context.view_layer.objects.active = mesh_object
     if mesh_object.mode != mode:
         bpy.ops.object.mode_set(mode=mode)
+
+
+def _keep_active(context, curve) -> None:
+    """Make the curve that a map is for active again, if the mode is Object Mode."""
+    if curve is not None and context.mode == "OBJECT":
+        curve_object.select_only(context, curve)
 
 
 CLASSES = (NICMM_OT_new_map, NICMM_OT_paint_map)

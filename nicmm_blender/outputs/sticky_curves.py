@@ -32,7 +32,13 @@ def add(mesh_object, surface, curves, drawing, tube: bool):
     name = f"{mesh_object.name} Curve"
     curve_object = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
     parent_to_mesh(curve_object, mesh_object, surface)
-    write(curve_object, surface, curves, drawing)
+    try:
+        write(curve_object, surface, curves, drawing)
+    except BaseException:
+        data = curve_object.data
+        bpy.data.objects.remove(curve_object)
+        bpy.data.hair_curves.remove(data)
+        raise
     radius = np.full(
         len(curve_object.data.points), drawing.radius / scale_of(curve_object, surface)
     )

@@ -211,9 +211,14 @@ def digest(mesh_object, surface, settings: CurveSettings) -> str:
     return found.hexdigest()
 
 
+def digest_of(curve_object) -> str:
+    """The digest that a curve was designed with; empty if it has none."""
+    return curve_object.data.get(DIGEST_KEY, "")
+
+
 def is_current(curve_object, now: str) -> bool:
     """Whether a curve was designed with the digest `now`."""
-    return curve_object.data.get(DIGEST_KEY) == now
+    return digest_of(curve_object) == now
 
 
 def _checked_record(curve_object):

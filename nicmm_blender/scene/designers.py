@@ -11,7 +11,9 @@ import hashlib
 import weakref
 from contextlib import contextmanager
 
+import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from .. import preferences
 
@@ -110,8 +112,9 @@ def prepare(vertices: np.ndarray, faces: np.ndarray, progress) -> bool:
     return True
 
 
-def forget() -> None:
-    """Drop all designers and free their memory."""
+@persistent
+def forget(*_arguments) -> None:
+    """Drop all designers and free their memory, also before another file is opened."""
     _designers.clear()
     _fingerprints.clear()
 
@@ -143,3 +146,12 @@ def _keep(fingerprint: bytes, designer) -> None:
     _designers[fingerprint] = designer
     while len(_designers) > preferences.kept_meshes():
         del _designers[next(iter(_designers))]
+
+
+def register() -> None:
+    bpy.app.handlers.load_pre.append(forget)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_pre.remove(forget)
+    forget()

@@ -8,4 +8,5 @@ def is_in(view_layer, candidate) -> bool:
     The name alone does not tell: an object linked from a library may have the same name.
     """
     objects = view_layer.objects
-    return candidate.name in objects and any(each == candidate for each in objects)
+    named = objects.get(candidate.name)
+    return named == candidate or (named is not None and any(each == candidate for each in objects))

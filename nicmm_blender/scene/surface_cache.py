@@ -24,6 +24,7 @@ class _Cache:
 
     def __init__(self) -> None:
         self.surfaces: dict = {}
+        self.read: set = set()  # session_uids of all objects read since the file was opened
         self.changes = 0
 
 
@@ -45,6 +46,11 @@ def cached(mesh_object, use_modifiers: bool) -> Surface | None:
     return _cache.surfaces.get(_key(mesh_object, use_modifiers))
 
 
+def was_read(mesh_object) -> bool:
+    """Whether the surface of an object has been read since the file was opened."""
+    return mesh_object.session_uid in _cache.read
+
+
 def get(mesh_object, use_modifiers: bool) -> Surface:
     """The surface of an object, read again only if the object has changed."""
     found = cached(mesh_object, use_modifiers)
@@ -54,6 +60,7 @@ def get(mesh_object, use_modifiers: bool) -> Surface:
         while len(_cache.surfaces) >= MOST:
             del _cache.surfaces[next(iter(_cache.surfaces))]
         _cache.surfaces[_key(mesh_object, use_modifiers)] = found
+        _cache.read.add(mesh_object.session_uid)
     return found
 
 
@@ -101,12 +108,19 @@ def forget(*_arguments) -> None:
     _cache.changes += 1
 
 
+@persistent
+def forget_file(*_arguments) -> None:
+    """Drop everything before another file is opened."""
+    forget()
+    _cache.read.clear()
+
+
 HANDLERS = (
     ("depsgraph_update_post", note_updates),
     ("frame_change_post", forget),
     ("undo_post", forget),
     ("redo_post", forget),
-    ("load_pre", forget),
+    ("load_pre", forget_file),
     ("load_post", forget),
 )
 
@@ -119,4 +133,4 @@ def register() -> None:
 def unregister() -> None:
     for name, function in HANDLERS:
         getattr(bpy.app.handlers, name).remove(function)
-    forget()
+    forget_file()

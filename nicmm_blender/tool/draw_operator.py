@@ -20,7 +20,7 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
     """
 
     bl_idname = "nicmm.draw_on_surface"
-    bl_label = "Draw Curve on Surface"
+    bl_label = "Surface Curve"
     bl_description = (
         "Add a point to the designed curve, move or insert one, or activate the curve under the "
         "mouse"
@@ -61,9 +61,13 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
         if event.type == "TIMER":
-            result = with_error_reports(self, lambda: self._prepare(context))
+            try:
+                result = with_error_reports(self, lambda: self._prepare(context))
+            except Exception:
+                self.cancel(context)
+                raise
             if result & {"FINISHED", "CANCELLED"}:
-                self._tidy(context)
+                self.cancel(context)
             return result
         return PASS if event.type in PASSED_ON else {"RUNNING_MODAL"}
 
@@ -89,10 +93,12 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         elif self._work.run_slice(LONGEST_TIME_SLICE):
             self._work.result()
             self._tidy(context)
-            if context.region_data.perspective_matrix != self._view:
+            view = context.region_data
+            if view is None or view.perspective_matrix != self._view:
                 self.report({"INFO"}, "The view has changed since the click. Click again")
                 return {"CANCELLED"}
-            return self._act(context)
+            result = self._act(context)
+            return {"CANCELLED"} if result == PASS else result  # the event has not been passed on
         self._show(context)
         return PASS
 

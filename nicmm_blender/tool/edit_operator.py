@@ -29,7 +29,7 @@ class NICMM_PG_control_point(bpy.types.PropertyGroup):
     position: bpy.props.FloatVectorProperty(
         name="Position",
         description="Position on the surface in the object's local space",
-        subtype="XYZ",
+        subtype="TRANSLATION",
     )
 
 
@@ -37,7 +37,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     """Choose the tool that draws curves on the surface and edits designed curves"""
 
     bl_idname = "nicmm.edit_curve"
-    bl_label = "Draw Curve on Surface"
+    bl_label = "Edit Curve on Surface"
     bl_options = {"REGISTER", "UNDO"}
 
     output: bpy.props.EnumProperty(

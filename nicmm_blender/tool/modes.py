@@ -5,8 +5,6 @@ The tool does not work in mesh Edit Mode, where Blender's undo does not restore 
 click could not be undone. There, control points are selected vertices.
 """
 
-import bpy
-
 from ..outputs import curve_object
 from ..scene import curve_record
 from ..scene.membership import is_in
@@ -49,9 +47,3 @@ def make_active(context, curve) -> None:
     for other in curve_record.designed_on(mesh_object):
         if is_in(context.view_layer, other):
             other.select_set(other == curve)
-
-
-def named(name: str):
-    """The designed curve with a name, or None."""
-    found = bpy.data.objects.get(name)
-    return found if curve_record.has_record(found) else None

@@ -16,7 +16,7 @@ from mathutils import Matrix
 from ..operators.viewports import redraw
 from ..outputs import edited_curve
 from ..scene.messages import InputError
-from . import modes, picking
+from . import modes, picking, read_ahead
 from .picking import Kind
 from .view import OFFSET
 
@@ -98,13 +98,20 @@ def _drawn_now(context) -> _Drawn | None:
         return None
     try:
         mesh_object, curve = picking.mesh_and_curve(context)
-        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
+        if mesh_object is None or not read_ahead.is_read(context, mesh_object, curve):
             return None
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
         return None  # a click reports the error
     points, line = opened.positions(), opened.polyline()
     return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
+
+
+def _hover_on(drawn: _Drawn):
+    """What is marked under the mouse on the drawn mesh, or None; nothing is marked in a drag."""
+    hit = _state.hover
+    marks = hit is not None and hit.mesh_uid == drawn.mesh_uid and _state.dragged is None
+    return hit if marks else None
 
 
 def _radius_of(opened) -> float:
@@ -123,8 +130,8 @@ def _draw_lines() -> None:
     if len(drawn.line):
         colour = colours.problem if drawn.problem else colours.line
         _draw_line(context, nearer, _line_batch(drawn.line), colour)
-    hit = _state.hover
-    if hit is not None and hit.kind is Kind.CURVE and _state.dragged is None:
+    hit = _hover_on(drawn)
+    if hit is not None and hit.kind is Kind.CURVE:
         for line in picking.other_lines(context):
             if line.name == hit.name and len(line.positions) > 1:
                 nearer = _towards_the_eye(
@@ -175,8 +182,8 @@ def _draw_points() -> None:
     colours = _Colours(context)
     positions, marked = drawn.points, -1
     fills = [colours.point] * len(positions)
-    hit = _state.hover
-    if hit is not None and _state.dragged is None:
+    hit = _hover_on(drawn)
+    if hit is not None:
         if hit.kind is Kind.POINT and hit.index < len(positions):
             fills[hit.index] = colours.hover
         elif hit.kind in {Kind.LINE, Kind.SURFACE}:

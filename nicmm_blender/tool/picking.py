@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds what is under the mouse: part of the active curve, another curve, or the surface."""
 
+import contextlib
 from dataclasses import dataclass
 from enum import Enum, auto
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from mathutils import Vector
 
@@ -47,12 +49,15 @@ class Hit:
         is inserted; on the surface, number of control points; 0 for another curve.
     position : tuple
         Position in the local space of the mesh object.
+    mesh_uid : int
+        The session_uid of the mesh object.
     """
 
     kind: Kind
     name: str
     index: int
     position: tuple
+    mesh_uid: int
 
 
 @dataclass(frozen=True)
@@ -68,9 +73,15 @@ class _VisibleCurves:
     """The curves that the viewport shows, read again only after changes."""
 
     def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Drop everything that was read."""
         self.key: tuple = ()
         self.opened: Opened | None = None
         self.lines: list[Line] = []
+        self.uses_key: tuple = ()
+        self.uses: set[bool] = set()
 
 
 _visible_curves = _VisibleCurves()
@@ -97,7 +108,7 @@ def is_ready(context, mesh_object, curve) -> bool:
     """
     if bpy.app.is_job_running("RENDER"):
         return False
-    surface = surface_cache.cached(mesh_object, _uses_modifiers(context, curve))
+    surface = surface_cache.cached(mesh_object, uses_modifiers(context, curve))
     if surface is None:
         return surface_cache.has_few_faces(mesh_object)
     few = len(surface.faces) <= 2 * surface_cache.FEW_FACES
@@ -106,7 +117,7 @@ def is_ready(context, mesh_object, curve) -> bool:
 
 def surface_for(context, mesh_object, curve):
     """The surface that a click draws on."""
-    return surface_cache.get(mesh_object, _uses_modifiers(context, curve))
+    return surface_cache.get(mesh_object, uses_modifiers(context, curve))
 
 
 def opened_now(context) -> Opened:
@@ -160,7 +171,7 @@ def _hit(context, view: View, pixel, opened: Opened, name: str, curve) -> Hit | 
     positions = opened.positions()
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
     if number is not None:
-        return Hit(Kind.POINT, name, number, tuple(positions[number]))
+        return Hit(Kind.POINT, name, number, tuple(positions[number]), opened.mesh_uid)
     reach = CURVE_REACH * scale
     radius = 0.0 if curve is None else radius_of(curve, opened.surface)
     on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
@@ -169,12 +180,13 @@ def _hit(context, view: View, pixel, opened: Opened, name: str, curve) -> Hit | 
     for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
-            return Hit(Kind.CURVE, line.name, 0, tuple(line.positions[on_line[0]]))
+            place = tuple(line.positions[on_line[0]])
+            return Hit(Kind.CURVE, line.name, 0, place, opened.mesh_uid)
     place = view.surface_point_at(pixel)
     if place is None:
         return None
     position = opened.surface.points(place.faces, place.barycentric)[0]
-    return Hit(Kind.SURFACE, name, len(positions), tuple(position))
+    return Hit(Kind.SURFACE, name, len(positions), tuple(position), opened.mesh_uid)
 
 
 def _on_line(opened: Opened, mesh, name: str, segment: int, share: float) -> Hit:
@@ -183,7 +195,7 @@ def _on_line(opened: Opened, mesh, name: str, segment: int, share: float) -> Hit
     place = point_on_segment(mesh, opened.curve, segment, share)
     number = leg_of_segment(opened.curve, segment) + 1
     position = opened.surface.points(place.faces, place.barycentric)[0]
-    return Hit(Kind.LINE, name, number, tuple(position))
+    return Hit(Kind.LINE, name, number, tuple(position), opened.mesh_uid)
 
 
 def _read(context) -> _VisibleCurves:
@@ -213,7 +225,9 @@ def _other_lines(context, mesh_object, active, surface) -> list:
             on = surface
             settings = curve_record.settings_of(curve)
             if settings.use_modifiers != surface.with_modifiers:
-                on = surface_cache.get(mesh_object, settings.use_modifiers)
+                on = surface_cache.cached(mesh_object, settings.use_modifiers)
+                if on is None:  # read later, see `read_ahead`
+                    continue
             _, line = curve_record.positions_of(curve, on)
         except (InputError, NicmmError):
             continue  # the error is reported where the curve is used
@@ -221,10 +235,23 @@ def _other_lines(context, mesh_object, active, surface) -> list:
     return lines
 
 
-def _uses_modifiers(context, curve) -> bool:
+def uses_modifiers(context, curve) -> bool:
+    """Whether a curve, or a new one, lies on the surface with modifiers."""
     if curve is None:
         return context.scene.nicmm_curves.use_modifiers
     return curve_record.settings_of(curve).use_modifiers
+
+
+def modifier_uses(context, mesh_object, curve) -> frozenset:
+    """On which surfaces of a mesh, with modifiers or without, the tool shows curves."""
+    key = surface_cache.changes(), mesh_object.session_uid
+    if key != _visible_curves.uses_key:
+        uses = set()
+        for other in curve_record.curves_on(context, mesh_object):
+            with contextlib.suppress(InputError):  # such a curve is not drawn
+                uses.add(curve_record.settings_of(other).use_modifiers)
+        _visible_curves.uses_key, _visible_curves.uses = key, uses
+    return frozenset(_visible_curves.uses | {uses_modifiers(context, curve)})
 
 
 def radius_of(curve, surface) -> float:
@@ -264,11 +291,9 @@ def _is_behind_another(context, mesh_object, view: View, pixel, position) -> boo
     for other in context.visible_objects:
         if other == mesh_object or other.type != "MESH" or other.display_type not in SOLID:
             continue
-        if not _is_shown(context, other):
-            continue
         back = other.matrix_world.inverted_safe()
         start, along = back @ origin, back.to_3x3() @ step
-        if not _meets_box(other, start, along):
+        if not _meets_box(other, start, along) or not _is_shown(context, other):
             continue
         met, where, _normal, _face = other.ray_cast(start, along.normalized(), depsgraph=graph)
         if met and (where - start).dot(along) < limit * along.length_squared:
@@ -288,17 +313,10 @@ def _meets_box(candidate, start, along) -> bool:
     return bool(leave >= max(entry, 0.0))
 
 
-def forget() -> None:
-    """Drop all curves that were read."""
-    _visible_curves.key, _visible_curves.opened, _visible_curves.lines = (), None, []
-
-
-def register() -> None:
-    forget()
-
-
-def unregister() -> None:
-    forget()
+@persistent
+def forget(*_arguments) -> None:
+    """Drop all curves that were read, also before another file is opened."""
+    _visible_curves.reset()
 
 
 def is_view(context) -> bool:
@@ -311,3 +329,12 @@ def is_view(context) -> bool:
         and region.type == "WINDOW"
         and isinstance(region.data, bpy.types.RegionView3D)
     )
+
+
+def register() -> None:
+    bpy.app.handlers.load_pre.append(forget)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_pre.remove(forget)
+    forget()

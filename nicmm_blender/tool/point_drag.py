@@ -65,22 +65,25 @@ class PointDrag:
         self._scratch, self._last_move = None, 0.0
         if self._live is not None and self._is_new:
             self._live.move(self.changed(self._opened))
+        self._show_drag()  # may fail, so it comes before everything that has to be undone then
         self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
         self.has_handler = True
         context.workspace.status_text_set(f"{self.bl_label}   |   {HINT}")
         self._is_dragging = True
-        self._show_drag()
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
         if not getattr(self, "_is_dragging", False):
             return super().modal(context, event)
         try:
-            return self._modal(context, event)
+            result = with_error_reports(self, lambda: self._modal(context, event))
         except Exception:
-            self._end_drag(context)
+            self._stop(context)
             raise
+        if result == {"CANCELLED"}:
+            self._stop(context)
+        return result
 
     def cancel(self, context):
         """Stop the drag; called by Blender when it ends the operator, for example when it quits."""
@@ -88,6 +91,11 @@ class PointDrag:
             self._end_drag(context)
         else:
             super().cancel(context)
+
+    def _stop(self, context) -> None:
+        """End the drag unless it has ended already."""
+        if getattr(self, "_is_dragging", False):
+            self._end_drag(context)
 
     def _modal(self, context, event):
         if event.type == "MOUSEMOVE":

@@ -20,7 +20,7 @@ from .point_drag import PointDrag
 POSITION = bpy.props.FloatVectorProperty(
     name="Position",
     description="Position of the point on the surface in the local space of the mesh object",
-    subtype="XYZ",
+    subtype="TRANSLATION",
     precision=4,
     options={"SKIP_SAVE"},
 )

@@ -99,7 +99,11 @@ def draw_hints(header, context) -> None:
 def register() -> None:
     for tool in TOOLS:
         bpy.utils.register_tool(tool, separator=True)
-    bpy.types.STATUSBAR_HT_header.prepend(draw_hints)
+    header = bpy.types.STATUSBAR_HT_header
+    header.prepend(draw_hints)
+    # Blender restores what it has kept here after a status text, so the hints have to be in it.
+    if hasattr(header, "_draw_orig"):
+        header._draw_orig = header.draw
 
 
 def unregister() -> None:

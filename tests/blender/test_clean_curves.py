@@ -236,5 +236,5 @@ def test_a_converted_curve_is_cut_exactly(empty_scene):
     monkey = scenes.monkey()
     exact = in_world(draw(monkey, spline="EXACT"))
     draw(monkey, spline="BEZIER", offset=0.1)
-    bpy.ops.nicmm.convert_curve(output="CURVE", spline="EXACT")
+    bpy.ops.nicmm.convert_curve(output="CURVE", spline="EXACT", offset=0.0)
     np.testing.assert_allclose(in_world(bpy.context.active_object), exact, atol=1e-6)

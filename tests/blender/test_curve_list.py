@@ -292,6 +292,39 @@ def test_live_update_follows_the_mesh(live, sphere, output):
 
 
 @pytest.mark.slow
+def test_live_update_keeps_what_the_user_changes_meanwhile(live, sphere, monkeypatch):
+    """An answer to a request from before the change is not written."""
+    curve = draw(sphere)
+    run_timer(live)
+    monkeypatch.setattr(live, "TIME_SLICE", 0.0)  # the work takes several calls
+    pull(sphere)
+    bpy.context.view_layer.update()
+    bpy.app.timers.unregister(live.tick)
+    while live._updates.work is None:
+        time.sleep(live.tick())
+    scenes.activate(curve)
+    bpy.ops.nicmm.remove_point(index=0)
+    left = len(curve["nicmm_curve"]["control_corners"]) // 3
+    while (pause := live.tick()) is not None:
+        time.sleep(pause)
+    assert len(curve["nicmm_curve"]["control_corners"]) // 3 == left == 3
+
+
+@pytest.mark.slow
+def test_list_follows_the_active_curve_in_sculpt_mode(empty_scene, sphere):
+    curves = [draw(sphere), draw(sphere)]
+    manager, objects = bpy.context.window_manager, bpy.data.objects
+    scenes.activate(sphere)
+    assert manager.nicmm_active_curve == -1
+    bpy.ops.object.mode_set(mode="SCULPT")
+    for curve in curves:
+        manager.nicmm_active_curve = objects.find(curve.name)
+        assert bpy.context.active_object == sphere
+        assert objects[manager.nicmm_active_curve] == curve
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.slow
 def test_live_update_follows_the_scale_of_the_object(live, sphere):
     curve = draw(sphere)
     run_timer(live)

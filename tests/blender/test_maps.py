@@ -135,10 +135,14 @@ def test_a_map_is_for_the_active_curve(empty_scene, show):
     bpy.ops.nicmm.design_curve()
     curve = bpy.context.active_object
     bpy.ops.nicmm.new_map(role="OBSTACLES", source="PAINT", show=show)
-    assert bpy.context.active_object == sphere
     assert bpy.context.mode == ("PAINT_WEIGHT" if show else "OBJECT")
+    assert bpy.context.active_object == (sphere if show else curve)
     assert curve.nicmm_settings.obstacle_group == "Obstacles"
     assert bpy.context.scene.nicmm_curves.obstacle_group == ""
+    if show:
+        bpy.ops.nicmm.paint_map(role="OBSTACLES")
+    assert bpy.context.mode == "OBJECT"
+    assert bpy.context.active_object == curve
 
 
 def test_a_map_that_the_curve_cannot_use_is_reported(empty_scene, capfd):

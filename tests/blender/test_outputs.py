@@ -397,7 +397,7 @@ def test_converting_is_designing_with_that_output(monkey, settings):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_monkey_add()
     scenes.select(bpy.context.active_object, vertices)
-    bpy.ops.nicmm.design_curve(**settings)
+    bpy.ops.nicmm.design_curve(**{"spline": "EXACT", **settings})
     designed = summary()
     assert converted.keys() == designed.keys()
     for kind, values in designed.items():
@@ -587,3 +587,29 @@ def test_convert_stands_in_menus(extension):
     for menu in ("VIEW3D_MT_object_convert", "VIEW3D_MT_object_context_menu"):
         draws = getattr(bpy.types, menu).draw._draw_funcs
         assert f"{extension.name}.nicmm_blender.interface.menus" in [d.__module__ for d in draws]
+
+
+@pytest.mark.slow
+def test_a_converted_curve_looks_like_the_original(empty_scene):
+    sphere = scenes.sphere()
+    scenes.select(sphere, scenes.ring(sphere, 4))
+    bpy.ops.nicmm.design_curve(spline="EXACT", radius=0.05, offset=0.1)
+    original = bpy.context.active_object
+    original.name = "Collar"
+    original.data.materials.append(bpy.data.materials.new("Leather"))
+    for output in ("STICKY", "CURVE"):
+        bpy.ops.nicmm.convert_curve(output=output)
+        converted = bpy.context.active_object
+        assert converted.name == "Collar"
+        assert [each.name for each in converted.data.materials] == ["Leather"]
+        values = converted.nicmm_settings
+        assert (values.spline, values.radius, values.offset) == (
+            "EXACT",
+            pytest.approx(0.05),
+            pytest.approx(0.1),
+        )
+    bpy.ops.nicmm.convert_curve(output="CURVE", radius=0.02)
+    assert bpy.context.active_object.nicmm_settings.radius == pytest.approx(0.02)
+    bpy.context.active_object.nicmm_settings.radius = 0.0
+    bpy.ops.nicmm.convert_curve(output="CURVE")
+    assert bpy.context.active_object.nicmm_settings.radius == 0.0

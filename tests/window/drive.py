@@ -651,6 +651,15 @@ def large(blender: Blender) -> None:
         left = blender.do("value = helper.count()")
         check(left == count, f"Esc leaves {count} points ({left})")
 
+    step("2M quads: the first click beside the mesh prepares it and ends")
+    blender.do("helper.suzanne(6)\nhelper.forget()")
+    beside = blender.do("value = helper.pixels([-1.3, 0, 0.9])")[0]
+    time.sleep(10.0)
+    blender.click(beside)
+    time.sleep(3.0)
+    check(blender.do("value = helper.is_modal()"), "the mesh is being prepared")
+    blender.wait("not helper.is_modal()", "the end of the preparation")
+
 
 def convert(blender: Blender) -> None:
     """Save, open again, edit again; every output."""
