@@ -17,7 +17,10 @@ def test_manifest_follows_blenders_rules():
     assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
     assert len(manifest["tagline"]) <= 64
     assert not manifest["tagline"].endswith(".")
-    assert "permissions" not in manifest
+    assert set(manifest["permissions"]) == {"files"}  # no network
+    for reason in manifest["permissions"].values():
+        assert len(reason) <= 64
+        assert not reason.endswith(".")
 
 
 def test_version_stands_in_the_manifest_only():
