@@ -24,7 +24,7 @@ from pathlib import Path
 INSIDE = Path(__file__).resolve().with_name("inside.py")
 
 # Sideways and upwards on the front of Suzanne's head, in this order: a loop around the face.
-PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.43, -0.08))
+PLACES = ((-0.42, 0.62), (0.42, 0.62), (0.45, -0.08), (0.0, -0.75), (-0.4, -0.08))
 DRAGGED, JUMPING = 3, 1
 
 SMOOTHNESS = (150, 68)
