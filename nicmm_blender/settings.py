@@ -323,7 +323,7 @@ def draw_clearance(layout, properties) -> None:
 
 
 def draw_output(layout, properties, appearance: bool = True) -> None:
-    """Draw the output and its settings, those of the appearance of a curve object on request."""
+    """Draw the output and its settings; `appearance` tells whether to draw APPEARANCE too."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "output")

@@ -41,6 +41,7 @@ class PointDrag:
 
     dragged = None
     _live = None
+    _is_dragging = False
 
     def invoke(self, context, event):
         if not self.from_mouse:
@@ -74,7 +75,7 @@ class PointDrag:
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if not getattr(self, "_is_dragging", False):
+        if not self._is_dragging:
             return super().modal(context, event)
         try:
             result = with_error_reports(self, lambda: self._modal(context, event))
@@ -87,14 +88,14 @@ class PointDrag:
 
     def cancel(self, context):
         """Stop the drag; called by Blender when it ends the operator, for example when it quits."""
-        if getattr(self, "_is_dragging", False):
+        if self._is_dragging:
             self._end_drag(context)
         else:
             super().cancel(context)
 
     def _stop(self, context) -> None:
         """End the drag unless it has ended already."""
-        if getattr(self, "_is_dragging", False):
+        if self._is_dragging:
             self._end_drag(context)
 
     def _modal(self, context, event):
