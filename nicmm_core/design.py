@@ -38,7 +38,7 @@ from .geometry.surface_points import SurfacePoints, check_connected, locate_cont
 from .path.via_points import ViaPoints, located_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
 from .repair.free_surface import check_reachable, free_faces
-from .repaired_surface import Manifold, RepairedSurface, design_on_original, is_on, start_on
+from .repaired_surface import CleanSurfaces, Manifold, RepairedSurface, is_on, start_on
 from .request import Request, same_request
 from .status import Status
 
@@ -76,7 +76,8 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._whole = RepairedSurface(mesh, np.arange(len(mesh.faces)))
+        self._clean = CleanSurfaces(mesh)
+        self._whole = RepairedSurface(self._clean, np.arange(len(mesh.faces)))
         self._free: _Free | None = None  # of the last request with obstacles
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
@@ -154,7 +155,7 @@ class Designer:
                 begin = None if start is None else start_on(manifold, start)
                 with placed(manifold.in_original):
                     found = manifold.designer.design(there, started, begin, max_iterations)
-                    return design_on_original(manifold, found)
+                    return manifold.design_on_original(found, points)
         except CancelledError:
             return cancelled_design(time.perf_counter() - started)
 
@@ -189,7 +190,7 @@ class Designer:
         if last is None or not (same and np.array_equal(last.obstacles, obstacles)):
             free = free_faces(self._whole.first, obstacles, clearance)
             every = len(free) == len(self.mesh.faces)
-            surface = self._whole if every else RepairedSurface(self.mesh, free)
+            surface = self._whole if every else RepairedSurface(self._clean, free)
             last = self._free = _Free(obstacles, clearance, surface)
         return last.surface
 

@@ -1,9 +1,10 @@
 """Finds a manifold for each request, and maps requests, starts and designs between it and the mesh.
 
-For a mesh with defects, `repair.nonmanifold` has several methods to make a manifold, which are
-tried in turn until the points of the request are connected. The curve is designed on a canonical
-copy of their component (`geometry.numbering`), which depends only on the surface, so neither the
-numbering nor the position or size of the mesh affects the curve.
+The surface is cleaned (`repair.clean_surface`) and made a manifold (`repair.nonmanifold`). If that
+separates the points of the request, ways that connect more or clean less are tried in turn. Edges
+that only cleaning has divided become whole again (`repair.straight_edges`). The curve is designed
+on a canonical copy of the component of the points (`geometry.numbering`), which depends only on the
+surface, so neither the numbering nor the position or size of the mesh affects the curve.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
 from .geometry.surface_points import SurfacePoints, in_faces
 from .path.via_points import with_via_points
+from .repair.clean_surface import Cleaning, CleanSurface, clean_surface
 from .repair.mapped_mesh import MappedMesh
-from .repair.nonmanifold import REPAIRS, repaired
+from .repair.nonmanifold import manifold
+from .repair.straight_edges import StraightenedMesh, straightened
 from .request import Request, renumbered_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
@@ -35,22 +38,29 @@ LARGEST_COPY = 200_000
 A canonical copy of it would take a large part of the time of a curve.
 """
 
+WAYS = tuple((cleaning, connected) for cleaning in Cleaning for connected in (False, True))
+"""Ways to make a manifold, in the order in which they are tried: how much is cleaned, and whether
+all faces at an edge of more than two faces are connected."""
+
 
 @dataclass(frozen=True)
 class Manifold:
-    """The surface on which the curve of a request is designed.
+    """The surface on which the curve of a request is designed, and the copies that lead to it.
 
     Attributes
     ----------
     repaired : MappedMesh
         A manifold made from the faces of the given mesh.
+    straight : StraightenedMesh or None
+        The manifold without vertices that divide straight edges; None if there are none.
     copy : Renumbered or None
         Canonical copy of the component of the request; None if the component is large.
     designer : SurfaceDesigner
-        Designer on the copy, or on the repaired mesh if there is no copy.
+        Designer on the last of these meshes.
     """
 
     repaired: MappedMesh
+    straight: StraightenedMesh | None
     copy: Renumbered | None
     designer: SurfaceDesigner
 
@@ -65,38 +75,104 @@ class Manifold:
             positions = self.copy.in_original(positions)
         return positions + self.repaired.origin
 
+    def request(self, request: Request) -> Request:
+        """Map a request from the repaired mesh to the mesh of the designer."""
+        if self.straight is not None:
+            to_mesh = self.straight.points_to_mesh
+            via_points = {leg: to_mesh(points) for leg, points in request.via_points.items()}
+            request = replace(request, points=to_mesh(request.points), via_points=via_points)
+        return request if self.copy is None else renumbered_request(self.copy, request)
+
+    def curve(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+        """Map a curve from the given mesh to that of the designer.
+
+        None if the curve enters faces that curves may not enter, or cannot be mapped at a
+        non-manifold edge.
+
+        Raises
+        ------
+        CurveError
+            If the curve lies on another component.
+        """
+        mapped = self.repaired.curve_from_original(curve)
+        if mapped is not None and self.straight is not None:
+            mapped = self.straight.curve_to_mesh(mapped)
+        if mapped is None or self.copy is None:
+            return mapped
+        on_copy = self.copy.curve_to_copy(mapped)
+        if on_copy is None:
+            raise CurveError(
+                f"start and control_points lie on different components of the mesh{WITHOUT_START}"
+            )
+        return on_copy
+
+    def design_on_original(self, design: Design, points: SurfacePoints) -> Design:
+        """Map a design to the given mesh, on which its control points are given."""
+        if self.copy is not None:
+            design = _mapped(design, self.copy.curve_to_original, self.copy.field_to_original)
+        straight, repaired = self.straight, self.repaired
+        if straight is not None:
+            design = _mapped(design, straight.curve_to_original, straight.field_to_original)
+        if repaired.differs:
+            to_original = partial(repaired.curve_to_original, points=points)
+            design = _mapped(design, to_original, repaired.field_to_original)
+        return _given_on(repaired, design)
+
+
+class CleanSurfaces:
+    """The surface of a mesh, cleaned as much as each `Cleaning` says; each is made once."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._made: dict[Cleaning, CleanSurface | None] = {}
+
+    def __getitem__(self, cleaning: Cleaning) -> CleanSurface | None:
+        """A clean surface; None if no face would remain."""
+        if cleaning not in self._made:
+            self._made[cleaning] = clean_surface(self.mesh, cleaning)
+        return self._made[cleaning]
+
+    def repeats(self, cleaning: Cleaning) -> bool:
+        """Whether a clean surface has the same faces as the one that is cleaned more."""
+        if cleaning is Cleaning.FULL:
+            return False
+        one, other = self[cleaning], self[Cleaning(cleaning - 1)]
+        return (
+            one is not None
+            and other is not None
+            and np.array_equal(one.parts.faces, other.parts.faces)
+        )
+
 
 class RepairedSurface:
-    """Manifolds made from the same faces of a mesh by different methods, with their designers.
+    """Manifolds made from the same faces of a mesh in different ways, with their designers.
 
     Each manifold is made when it is first needed, and then kept.
 
     Parameters
     ----------
-    mesh : Mesh
-        The given mesh.
+    clean : CleanSurfaces
     usable : (u,) int array
         Faces that curves may enter, ascending.
     """
 
-    def __init__(self, mesh: Mesh, usable: IntArray) -> None:
-        self._mesh, self._usable = mesh, usable
-        self._made: list[MappedMesh | None] = []
-        self._manifolds: dict[tuple[int, int], Manifold] = {}  # by method and component
-        self._whole: dict[int, SurfaceDesigner] = {}  # for components without a copy
+    def __init__(self, clean: CleanSurfaces, usable: IntArray) -> None:
+        self._clean, self._usable = clean, usable
+        self._made: dict[tuple[Cleaning, bool], MappedMesh | None] = {}
+        self._manifolds: dict[tuple[Cleaning, bool, int], Manifold] = {}  # the last is a component
+        self._whole: dict[tuple[Cleaning, bool], SurfaceDesigner] = {}  # without a copy
 
     @property
     def first(self) -> MappedMesh:
-        """The manifold in which the straightest pairs of faces are joined at non-manifold edges."""
-        first = self._repair(0)
-        assert first is not None  # only later methods may return None
-        return first
+        """The manifold that is tried first."""
+        return next(made for way in WAYS if (made := self._manifold_of(*way)) is not None)
 
     @property
     def most_connected(self) -> MappedMesh:
         """The manifold on which most of the surface is connected."""
-        made = [self._repair(number) for number in range(REPAIRS)]
-        return [one for one in made if one is not None][-1]
+        ways = [(c, connected) for c in (Cleaning.VERTICES, Cleaning.FULL) for connected in (1, 0)]
+        made = (self._manifold_of(cleaning, bool(connected)) for cleaning, connected in ways)
+        return next((one for one in made if one is not None), self.first)
 
     def find(self, request: Request) -> tuple[Manifold, Request] | None:
         """Find a manifold on which the points of a request are connected.
@@ -109,37 +185,46 @@ class RepairedSurface:
         ControlPointError, UnreachableError
             If via points coincide with control points or lie on another component.
         """
-        for number in range(REPAIRS):
-            found = self._repair(number)
+        for way in WAYS:
+            found = self._manifold_of(*way)
             there = None if found is None else request_on(found, request)
             if found is not None and there is not None:
                 if there.via_points:
                     with_via_points(
                         found.mesh, there.points, there.via_points, there.order, there.closed
                     )
-                manifold = self._manifold(found, number, there)
-                copy = manifold.copy
-                return manifold, there if copy is None else renumbered_request(copy, there)
+                made = self._component(found, way, there)
+                return made, made.request(there)
         return None
 
-    def _repair(self, number: int) -> MappedMesh | None:
-        """The manifold made by one method; None if `repaired` returns None."""
-        while len(self._made) <= number:
-            self._made.append(repaired(self._mesh, len(self._made), self._usable))
-        return self._made[number]
+    def _manifold_of(self, cleaning: Cleaning, connected: bool) -> MappedMesh | None:
+        """The manifold made in one way; None if another way makes the same one."""
+        way = cleaning, connected
+        if way not in self._made:
+            clean = None if self._clean.repeats(cleaning) else self._clean[cleaning]
+            self._made[way] = None if clean is None else manifold(clean, self._usable, connected)
+        return self._made[way]
 
-    def _manifold(self, mapped: MappedMesh, number: int, request: Request) -> Manifold:
-        """The component of a request on the manifold made by one method."""
+    def _component(
+        self, mapped: MappedMesh, way: tuple[Cleaning, bool], request: Request
+    ) -> Manifold:
+        """The component of a request on the manifold made in one way."""
         component = int(mapped.mesh.face_component[request.points.faces[0]])
-        if (number, component) not in self._manifolds:
+        key = (*way, component)
+        if key not in self._manifolds:
             if np.count_nonzero(mapped.mesh.face_component == component) > LARGEST_COPY:
-                whole = self._whole.setdefault(number, SurfaceDesigner(mapped.mesh))
-                made = Manifold(mapped, None, whole)
+                whole = self._whole.setdefault(way, SurfaceDesigner(mapped.mesh))
+                made = Manifold(mapped, None, None, whole)
             else:
-                copy = renumbered(mapped.mesh, component, exact=mapped.differs)
-                made = Manifold(mapped, copy, SurfaceDesigner(copy.mesh))
-            self._manifolds[number, component] = made
-        return self._manifolds[number, component]
+                straight = straightened(mapped.mesh, mapped.divisions)
+                mesh = mapped.mesh
+                if straight is not None:
+                    mesh = straight.mesh
+                    component = int(mesh.face_component[straight.parent[request.points.faces[0]]])
+                copy = renumbered(mesh, component, exact=mapped.moved)
+                made = Manifold(mapped, straight, copy, SurfaceDesigner(copy.mesh))
+            self._manifolds[key] = made
+        return self._manifolds[key]
 
 
 def request_on(mapped: MappedMesh, request: Request) -> Request | None:
@@ -219,20 +304,13 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
     curve = replace(curve, faces=points.faces, barycentric=points.barycentric)
     if not curve.closed:
         curve = _between_ends(original, curve)
-    mapped_curve = manifold.repaired.curve_from_original(curve)
-    if mapped_curve is None:
+    mapped = manifold.curve(curve)
+    if mapped is None:
         raise CurveError(
             "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
             f"non-manifold edge{WITHOUT_START}"
         )
-    if manifold.copy is None:
-        return mapped_curve
-    on_copy = manifold.copy.curve_to_copy(mapped_curve)
-    if on_copy is None:
-        raise CurveError(
-            f"start and control_points lie on different components of the mesh{WITHOUT_START}"
-        )
-    return on_copy
+    return mapped
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
@@ -242,23 +320,14 @@ def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
     return curve_on_mesh(mesh, False, curve.faces[kept], curve.barycentric[kept], index - index[0])
 
 
-def design_on_original(manifold: Manifold, design: Design) -> Design:
-    """Map a design from a manifold to the given mesh."""
-    mapped, copy = manifold.repaired, manifold.copy
-    if copy is not None:
-        design = _mapped(design, copy.curve_to_original, copy.field_to_original)
-    if mapped.differs:
-        design = _mapped(design, mapped.curve_to_original, mapped.field_to_original)
-    return _given_on(mapped.original, design)
-
-
-def _given_on(mesh: Mesh, design: Design) -> Design:
-    """The design, which continues only on a mesh that equals the mesh of the caller."""
+def _given_on(repaired: MappedMesh, design: Design) -> Design:
+    """The design with its repairs; it continues only on a mesh that equals the original."""
     resumable = design.resumable
     return replace(
         design,
-        resumable=None if resumable is None else replace(resumable, given=mesh),
-        alternatives=[_given_on(mesh, other) for other in design.alternatives],
+        resumable=None if resumable is None else replace(resumable, given=repaired.original),
+        alternatives=[_given_on(repaired, other) for other in design.alternatives],
+        repairs=dict(repaired.repairs),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, blocks
+from .mesh import Mesh, blocks, joined_corners, side_corners
 from .vectors import unit
 
 
@@ -25,8 +25,7 @@ def unsigned_normals(mesh: Mesh) -> FloatArray:
     Face normals are weighted by corner angle. At corners of folded faces, for example beside a
     vertex pushed across an edge, they are weighted by area instead, since their sum then does not
     change when a vertex moves within the plane of its neighbours. Where faces of opposite
-    orientation meet, as on a Möbius strip, normals would cancel; there the normal is the principal
-    direction of the face normals.
+    orientation meet, as on a Möbius strip, the faces around a vertex are first turned to one side.
     """
     return normals_and_folds(mesh)[0]
 
@@ -48,11 +47,8 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
     np.add.at(area_vector, owner, areas[:, None] * face_normals)
     there = area_vector.any(axis=1)
     normals[folded[there]] = unit(area_vector[there].T).T
-    owner, face_normals, areas = _faces_around(mesh, mixed)
-    weighted = areas[:, None] * face_normals
-    spread = np.zeros((len(mixed), 3, 3))
-    np.add.at(spread, owner, weighted[:, :, None] * face_normals[:, None, :])
-    normals[mixed] = np.linalg.eigh(spread)[1][:, :, -1]
+    if len(mixed):
+        normals[mixed] = _normals_on_double_cover(mesh)[mixed]
     is_mixed = np.zeros(len(mesh.vertices), dtype=bool)
     is_mixed[mixed] = True
     faces = (_facing(mesh, normals).sum(axis=1) < 0.0) & ~is_mixed[mesh.faces].any(axis=1)
@@ -67,6 +63,35 @@ def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
             of_corner = np.take(normals, mesh.faces[block, corner], axis=0)
             facing[block, corner] = np.einsum("fd,fd->f", of_corner, mesh.face_normals[block])
     return facing
+
+
+def _normals_on_double_cover(mesh: Mesh) -> FloatArray:
+    """Normals at the vertices of any mesh up to sign, (V, 3), weighted by corner angle.
+
+    The orientable double cover has every face twice, once in either orientation. Of the vertices of
+    the cover over one vertex, the one with its first corner counts.
+    """
+    n_corners = mesh.faces.size
+    corner = np.arange(n_corners)
+    reverse = n_corners + corner.reshape(-1, 3)[:, [0, 2, 1]].ravel()  # the same corner there
+    side = np.flatnonzero(mesh.opposite_sides > corner)
+    across = mesh.opposite_sides[side]
+    ends = side_corners(mesh.faces)
+    rises = (mesh.faces[:, [1, 2, 0]] < mesh.faces[:, [2, 0, 1]]).ravel()
+    alike = (rises[side] == rises[across])[:, None]
+    one, other = ends[side], ends[across]
+    checkpoint()
+    joined_to = np.where(alike, reverse[other], other), np.where(alike, other, reverse[other])
+    group, vertex = joined_corners(
+        np.concatenate([mesh.faces, mesh.faces[:, [0, 2, 1]]]),
+        np.concatenate([one, reverse[one]]).ravel(),
+        np.concatenate(joined_to).ravel(),
+    )
+    of_groups = vertex_normals(mesh.vertices[vertex], group)
+    normals = np.zeros(mesh.vertices.shape)
+    first = np.arange(n_corners)[::-1]  # the first assignment of each vertex comes last
+    normals[mesh.faces.ravel()[first]] = of_groups[group.ravel()[first]]
+    return normals
 
 
 def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -4,10 +4,11 @@ Which of several paths of about the same length is found depends on the order in
 faces are visited, and on the last bit of their coordinates. In the copy, vertices and faces are
 sorted by position in the principal frame of the component, its area is 1, and coordinates are
 rounded. Each axis of this frame points to where the surface reaches farther, even if the frame is
-then left-handed. So a mesh that is renumbered, rotated, translated, scaled or mirrored has exactly
-the same copy, unless a coordinate is within a rounding error of the middle between two multiples of
-the resolution. Surfaces without a unique principal frame, such as a sphere, are an exception. Other
-components of the mesh make no difference.
+then left-handed. Faces are oriented so that the surface encloses a positive volume with its
+centroid. So a mesh that is renumbered, rotated, translated, scaled, mirrored or turned over has
+exactly the same copy, unless a coordinate is within a rounding error of the middle between two
+multiples of the resolution. Surfaces without a unique principal frame, such as a sphere, are an
+exception. Other components of the mesh make no difference.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import igl
 import numpy as np
 
 from ..progress import checkpoint
-from .array_types import FloatArray, IntArray
+from .array_types import BoolArray, FloatArray, IntArray
 from .curve import SurfaceCurve, curve_on_mesh
 from .mesh import LARGEST, Mesh, area_vectors, blocks
 from .surface_points import SurfacePoints, in_first_faces
@@ -44,6 +46,11 @@ DISTINCT = 1e-3
 
 If they are closer, both axes depend on rounding errors and not only on the surface.
 """
+
+VOLUME = 1e-6
+"""Volume up to which it does not determine the orientation, as of a plane; the area is 1.
+
+The volume is that between the surface and its centroid."""
 
 SYMMETRIC = 1e-6
 """Skewness along an axis up to which the surface counts as symmetric in that direction."""
@@ -162,17 +169,42 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     checkpoint()
     number = np.full(len(mesh.vertices), -1)
     number[vertex[order]] = np.arange(len(order))
-    corner = np.tile(np.arange(3), (len(given), 1))
-    if np.linalg.det(axes) < 0.0:
-        corner = corner[:, ::-1]  # mirrored coordinates reverse the orientation of faces
-    first = np.take_along_axis(number[given], corner, axis=1).argmin(axis=1)
-    corner = np.take_along_axis(corner, (np.arange(3) + first[:, None]) % 3, axis=1)
-    faces = np.take_along_axis(number[given], corner, axis=1)
+    faces = number[given]
+    first = faces.argmin(axis=1)
+    corner = (np.arange(3) + first[:, None]) % 3
     low, middle, high = np.sort(faces, axis=1).T
     face = np.lexsort((high, low * len(order) + middle))
+    corner = corner[face]
     checkpoint()
-    copy = Mesh(places[vertex[order]], faces[face])
-    return Renumbered(mesh, copy, number, inside[face], corner[face], centre, axes, unit)
+    vertices = places[vertex[order]]
+    which = _turned(mesh, vertices, np.take_along_axis(faces[face], corner, axis=1))
+    corner[which] = corner[which][:, [0, 2, 1]]
+    copy = Mesh(vertices, np.take_along_axis(faces[face], corner, axis=1))
+    return Renumbered(mesh, copy, number, inside[face], corner, centre, axes, unit)
+
+
+def _turned(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Faces of a copy to turn over, so that its orientation depends only on the surface, (F',).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The given mesh, whose orientable components are consistently oriented.
+    vertices, faces : (V', 3) float array, (F', 3) int array
+        The copy in the orientation of the given mesh. The area is 1, and each face begins at its
+        vertex of lowest index.
+    """
+    rising = faces[:, 1] < faces[:, 2]
+    wanted = rising
+    if not mesh.is_oriented:
+        # The component may not be orientable. The result has to be the same for any given faces.
+        found = igl.bfs_orient(np.sort(faces, axis=1))[0]
+        after_lowest = (found.argmin(axis=1) + 1) % 3
+        wanted = found[np.arange(len(found)), after_lowest] == np.sort(faces, axis=1)[:, 1]
+    heights = np.einsum("fd,fd->f", area_vectors(vertices, faces), vertices[faces[:, 0]])
+    volume = float(np.where(wanted == rising, heights, -heights).sum()) / 6.0
+    inward = volume < 0.0 if abs(volume) > VOLUME else not wanted[0]
+    return rising == wanted if inward else rising != wanted
 
 
 def _rounded_soundly(

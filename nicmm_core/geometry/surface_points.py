@@ -141,7 +141,7 @@ def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> Su
         If a point is out of range or off the surface.
     """
     if isinstance(given, SurfacePoints):
-        return _snapped(_checked_surface_points(mesh, given, name))
+        return snapped(_checked_surface_points(mesh, given, name))
     try:
         values = np.asarray(given)
     except ValueError as error:
@@ -149,9 +149,9 @@ def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> Su
     if values.size == 0:
         return SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
     if values.ndim == 1 and np.issubdtype(values.dtype, np.integer):
-        return _snapped(_points_at_vertices(mesh, values.astype(np.int64), name))
+        return snapped(_points_at_vertices(mesh, values.astype(np.int64), name))
     if values.ndim == 2 and values.shape[1] == 3 and _is_real(values):
-        return _snapped(_points_in_space(mesh, values.astype(np.float64), name))
+        return snapped(_points_in_space(mesh, values.astype(np.float64), name))
     raise ControlPointError(f"{name} has shape {values.shape} and type {values.dtype}; {_FORMS}")
 
 
@@ -352,7 +352,8 @@ def _check_count(count: int, closed: bool) -> None:
         )
 
 
-def _snapped(points: SurfacePoints) -> SurfacePoints:
+def snapped(points: SurfacePoints) -> SurfacePoints:
+    """The points, with coordinates below `tolerances.SNAP` set to exactly zero."""
     barycentric = np.where(points.barycentric < tolerances.SNAP, 0.0, points.barycentric)
     return SurfacePoints(points.faces, barycentric / barycentric.sum(axis=1, keepdims=True))
 

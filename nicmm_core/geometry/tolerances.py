@@ -38,6 +38,14 @@ SAME_POSITION = 1e-12
 """Distance, in bounding-box diagonals, up to which two points coincide, such as the two ends of an
 edge."""
 
+GAP = 1e-6
+"""Width, in bounding-box diagonals, up to which a gap between open edges is closed.
+
+Positions in single precision differ by up to a ten-millionth of the largest coordinate."""
+
+GAP_SHARE = 0.1
+"""The same bound relative to the shortest open edge at the gap."""
+
 PERTURBATION = 1e-3
 """Greatest move of a vertex of a degenerate face along each axis, relative to its shortest edge."""
 

@@ -16,7 +16,6 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.distances import build_distance_surface, propagate
 from ..geometry.surface_points import SurfacePoints
 from .mapped_mesh import MappedMesh
-from .nonmanifold import welded_vertices
 
 HARD = 1.0
 """Weight of an obstacle that curves must not enter. Lower weights add a cost in proportion."""
@@ -46,8 +45,8 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
     """
     faces = mapped.original.faces
     # Of several coincident vertices, for example on a seam, the caller may have marked only one.
-    place = welded_vertices(mapped.original)
-    hard_places = np.zeros(len(place), dtype=bool)
+    place = mapped.original_place
+    hard_places = np.zeros(place.max() + 1, dtype=bool)
     hard_places[place[obstacles >= HARD]] = True
     hard = hard_places[place]
     blocked = hard[faces].all(axis=1)

@@ -7,18 +7,18 @@ are points and curves on the original, which is not changed. `nonmanifold` creat
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import field as dataclass_field
 from functools import cached_property
 
 import numpy as np
 
 from ..geometry import tolerances
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.grouping import stable_order
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, joined
+from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points, snapped
 from ..progress import checkpoint
+from .removed_faces import RemovedFaces
 from .strand_separation import separated
 
 Representations = list[SurfacePoints]
@@ -44,8 +44,18 @@ class MappedMesh:
         Index of the place of each vertex, equal for vertices that are one point of the original.
     original_place : (V,) int array
         Index of the place of each vertex of the original.
+    joined : (V,) int array
+        The first of the original vertices that were joined with each, since they coincide.
+    removed : (F,) bool array
+        Faces of the original that were removed since they have no area.
+    divisions : (d, 3) int array
+        Vertices at which edges were divided, and the two ends of the edge of each.
     origin : (3,) float array
         Origin of the mesh's coordinates, in the space of the original.
+    moved : bool
+        Whether vertices were moved to give faces an area, or to keep copies of a vertex apart.
+    repairs : dict of str to int
+        How often each repair was made, without those that were not.
     """
 
     original: Mesh
@@ -54,7 +64,12 @@ class MappedMesh:
     corners: FloatArray | None
     place: IntArray
     original_place: IntArray
-    origin: FloatArray = dataclass_field(default_factory=lambda: np.zeros(3))
+    joined: IntArray
+    removed: BoolArray
+    divisions: IntArray
+    origin: FloatArray
+    moved: bool
+    repairs: dict[str, int]
 
     @property
     def differs(self) -> bool:
@@ -71,7 +86,25 @@ class MappedMesh:
         for face, barycentric, faces in zip(points.faces, points.barycentric, around, strict=True):
             weights = dict(zip(self.original.faces[face].tolist(), barycentric, strict=True))
             found.append(self._parts_with(faces, weights))
+        if self._crossings is not None:
+            positions = points.positions(self.original)
+            for number in np.flatnonzero([self.removed[faces].any() for faces in around]).tolist():
+                there = self._at_position(positions[[number]])
+                found[number] = joined([found[number], there])
         return found
+
+    def _at_position(self, point: FloatArray) -> SurfacePoints:
+        """The point of the mesh nearest to a position, (1, 3), in every face that contains it.
+
+        There is none if it is farther away than a face without area is wide.
+        """
+        nearest, distance = nearest_points(self.mesh, point - self.origin)
+        if not distance[0] <= tolerances.ON_SURFACE * self.original.diagonal:
+            return nearest[:0]
+        nearest = snapped(nearest)
+        corners = self.mesh.faces[nearest.faces[0]][nearest.barycentric[0] > 0.0]
+        faces = self.mesh.faces_with(corners)
+        return in_faces(self.mesh, nearest[np.zeros(len(faces), dtype=np.int64)], faces)
 
     def _parts_with(self, faces: IntArray, weights: dict[int, float]) -> SurfacePoints:
         """Map a point, given by weights at vertices, to the parts of ``faces`` that contain it."""
@@ -121,11 +154,17 @@ class MappedMesh:
         np.maximum.at(result, self.mesh.faces, at_corners)
         return result
 
-    def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
+    def curve_to_original(self, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
         """Map a simple curve on the mesh to a simple curve on the original.
 
         Strands that pass different copies of a vertex, or of a point on an edge, are separated
-        there.
+        there. Where faces were removed, the curve gets further points on their edges.
+
+        Parameters
+        ----------
+        curve : SurfaceCurve
+        points : SurfacePoints
+            The control points on the original, in any order.
         """
         if not self.differs:
             return curve
@@ -139,9 +178,27 @@ class MappedMesh:
         if self.corners is not None:
             barycentric = np.einsum("nc,ncd->nd", barycentric, self.corners[polyline.faces])
             barycentric /= barycentric.sum(axis=1, keepdims=True)
+        polyline = SurfacePoints(self.face[polyline.faces], barycentric)
+        if self._crossings is not None:
+            exact = self._exact_points(polyline, index, points)
+            polyline, number = self._crossings.led_across(polyline, curve.closed, exact)
+            index = np.where(index >= 0, number[index], -1)
         return curve_on_mesh(
-            self.original, curve.closed, self.face[polyline.faces], barycentric, index
+            self.original, curve.closed, polyline.faces, polyline.barycentric, index
         )
+
+    def _exact_points(
+        self, polyline: SurfacePoints, index: IntArray, points: SurfacePoints
+    ) -> dict[int, SurfacePoints]:
+        """Control points that lie on or beside removed faces, by their indices in a polyline."""
+        passed = index[index >= 0]
+        given, found = points.positions(self.original), polyline[passed].positions(self.original)
+        away = np.linalg.norm(found[:, None] - given, axis=2)
+        nearest = away.argmin(axis=1)
+        exact = {}
+        for rank in np.flatnonzero(away.min(axis=1) > tolerances.ROUNDED * self.original.diagonal):
+            exact[int(passed[rank])] = points[nearest[[rank]]]
+        return exact
 
     def curve_from_original(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve on the original to the mesh; None if the mesh lacks a part of the curve."""
@@ -185,6 +242,13 @@ class MappedMesh:
         result = at_place[self.original_place]
         result[np.isinf(result)] = values.max()
         return result
+
+    @cached_property
+    def _crossings(self) -> RemovedFaces | None:
+        """The removed faces, which curves on the original have to cross; None if there are none."""
+        if not self.removed.any():
+            return None
+        return RemovedFaces(self.original, self.joined[self.original.faces], self.removed)
 
     @cached_property
     def _has_copies(self) -> bool:

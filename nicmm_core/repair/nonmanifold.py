@@ -1,17 +1,14 @@
-"""Makes manifolds, on which curves are computed, from meshes with defects.
+"""Makes manifolds, on which curves are computed, from clean surfaces.
 
-The given mesh is not changed.
-
-- Of several faces with the same three corners, only the first is used.
 - At an edge of more than two faces, the faces are joined in pairs, and a face that is left over is
   detached. Parts of the surface that have only a vertex in common are separated. The vertices
   there are duplicated.
 - If that separates control points, such an edge is divided into pieces, on which different pairs of
   its faces are joined, so that all of its faces are connected.
-- If control points are still separated, open edges with the same end positions become one edge, as
-  between the triangles of a soup or the two sides of a seam. Their vertices are welded.
-- Vertices of faces with no area, or almost none, are moved in random directions by about a
-  thousandth of their shortest edge of non-zero length, so that every face has an area.
+- Faces are turned over so that every orientable part is consistently oriented.
+- Vertices of faces without area that remain are moved in random directions by about a thousandth of
+  their shortest edge of non-zero length, so that every face has an area. Copies of a vertex are
+  moved apart in the same way.
 """
 
 from __future__ import annotations
@@ -22,15 +19,18 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import distinct_rows, grouped
-from ..geometry.mesh import Mesh, corners_differ, joined_corners
+from ..geometry.grouping import grouped
+from ..geometry.mesh import Mesh, edge_keys, joined_corners
+from ..geometry.orientation import turned_faces
 from ..progress import checkpoint
+from .clean_surface import CleanSurface
 from .degenerate_faces import degenerate_faces, perturbed
 from .edge_subdivision import SubdividedFaces, subdivided
+from .face_parts import FaceParts
 from .mapped_mesh import MappedMesh
 
-REPAIRS = 4
-"""Number of repair methods, which are tried in turn."""
+TURNED_FACES = "faces turned"
+NONMANIFOLD_EDGES = "non-manifold edges separated"
 
 SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
@@ -43,65 +43,57 @@ MOST_COMPARED = 32
 """Number of faces at an edge up to which all pairs are compared to find the straightest one."""
 
 
-def repaired(mesh: Mesh, number: int, usable: IntArray) -> MappedMesh | None:
-    """Make a manifold from faces of a mesh.
+def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMesh | None:
+    """Make a manifold from a clean surface.
 
     Parameters
     ----------
-    mesh : Mesh
-    number : int
-        Index of the method, below `REPAIRS`. Later methods connect more of the surface. Method 0
-        joins the straightest pairs of faces at an edge of more than two faces. Method 1 connects
-        all faces at such an edge. Methods 2 and 3 do the same as 0 and 1, and also join open edges
-        with the same end positions.
+    clean : CleanSurface
     usable : (u,) int array
-        Faces that may be used, ascending.
+        Faces of the given mesh that may be used, ascending.
+    connected : bool
+        Whether all faces at an edge of more than two faces are connected. Otherwise the straightest
+        pairs are joined there.
 
     Returns
     -------
     MappedMesh or None
-        The manifold with its map; None if the method joins no more than the previous ones.
+        The manifold with its map; None if all faces are connected even without `connected`, or if
+        no face remains.
     """
-    connected = number % 2 == 1
-    welded = np.arange(len(mesh.vertices))
-    if number < 2 and len(usable) == len(mesh.faces) and is_manifold(mesh):
-        return (
-            None
-            if connected
-            else _with_areas(mesh, welded, mesh.faces, mesh.vertices, usable, None, welded)
-        )
-    if number >= 2:
-        welded = welded_vertices(mesh)
-        if (welded == np.arange(len(welded))).all():
-            return None
-    kept = usable
-    if mesh.has_nonmanifold_edges or number >= 2 or _has_lone_twins(mesh):
-        kept = usable[_without_twins(welded[mesh.faces[usable]])]
-    sides = _Sides(mesh.faces[kept], welded)
-    if not sides.nonmanifold_edges:
+    mesh, parts = clean.mesh, clean.parts
+    if len(usable) < len(clean.original.faces):
+        parts = parts.taken(np.isin(parts.parent, usable))
+    if not len(parts.faces):
+        return None
+    place = np.arange(len(mesh.vertices))
+    if len(parts.faces) == len(mesh.faces) and is_manifold(mesh):
+        return None if connected else _with_areas(clean, parts, mesh.vertices, place, 0)
+    sides = _Sides(parts.faces)
+    several = sides.nonmanifold_edges
+    if not several:
         if connected:
             return None
         corners, vertex = sides.cut(sides.plain_pairs, len(mesh.vertices))
-        vertices, place = mesh.vertices[vertex], welded[vertex]
-        return _with_areas(mesh, welded, corners, vertices, kept, None, place)
-    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in sides.nonmanifold_edges]
-    parts = sides.subdivided([SEGMENTS * len(pieces) for pieces in joins], len(mesh.vertices))
-    vertices = np.empty((int(parts.faces.max()) + 1, 3))
+        parts = FaceParts(corners, parts.parent, parts.corners)
+        return _with_areas(clean, parts, mesh.vertices[vertex], vertex, 0)
+    joins = [sides.joins(at_edge, mesh.vertices, connected) for at_edge in several]
+    pieces = sides.subdivided([SEGMENTS * len(each) for each in joins], len(mesh.vertices))
+    vertices = np.empty((int(pieces.faces.max()) + 1, 3))
     vertices[: len(mesh.vertices)] = mesh.vertices
-    face = kept[parts.parent]
-    new = parts.faces >= len(mesh.vertices)
-    corners = mesh.vertices[mesh.faces[face]]
-    vertices[parts.faces[new]] = np.einsum("fcd,fdk->fck", parts.corners, corners)[new]
+    new = pieces.faces >= len(mesh.vertices)
+    at_corners = mesh.vertices[parts.faces[pieces.parent]]
+    vertices[pieces.faces[new]] = np.einsum("fcd,fdk->fck", pieces.corners, at_corners)[new]
     centroid = new[:, 2]  # a new vertex is the last corner of a face only if it is a centroid
-    vertices[parts.faces[centroid, 2]] = corners[centroid].mean(axis=1)
-    place = np.concatenate([welded, np.arange(len(welded), len(vertices))])
-    pieces = _Sides(parts.faces, place)
-    pairs = np.concatenate(
-        [pieces.plain_pairs, _piece_pairs(sides.nonmanifold_edges, joins, parts)]
-    )
-    corners, vertex = pieces.cut(pairs, len(vertices))
-    vertices, place = vertices[vertex], place[vertex]
-    return _with_areas(mesh, welded, corners, vertices, face, parts.corners, place)
+    vertices[pieces.faces[centroid, 2]] = at_corners[centroid].mean(axis=1)
+    cut_sides = _Sides(pieces.faces)
+    pairs = np.concatenate([cut_sides.plain_pairs, _piece_pairs(several, joins, pieces)])
+    corners, vertex = cut_sides.cut(pairs, len(vertices))
+    of_parents = pieces.corners
+    if parts.corners is not None:
+        of_parents = of_parents @ parts.corners[pieces.parent]
+    parts = FaceParts(corners, parts.parent[pieces.parent], of_parents)
+    return _with_areas(clean, parts, vertices[vertex], vertex, len(several))
 
 
 def is_manifold(mesh: Mesh) -> bool:
@@ -111,7 +103,7 @@ def is_manifold(mesh: Mesh) -> bool:
     corner, and the faces at each vertex form one fan. The result is False, too, if a vertex has
     more than `MOST_FACES` faces.
     """
-    if not mesh.is_oriented or mesh.has_nonmanifold_edges or _has_lone_twins(mesh):
+    if not mesh.is_oriented or mesh.has_nonmanifold_edges:
         return False
     faces, across = mesh.faces, mesh.face_neighbours
     degree = np.bincount(faces.ravel(), minlength=len(mesh.vertices))
@@ -138,34 +130,6 @@ def is_manifold(mesh: Mesh) -> bool:
         going = (face >= 0) & (face != first)
         vertex, face, first = vertex[going], face[going], first[going]
     return bool((visited == degree).all())
-
-
-def welded_vertices(mesh: Mesh) -> IntArray:
-    """For each vertex of an open edge, the first such vertex at the same position, shape (V,).
-
-    Other vertices keep their indices. Only exactly equal positions are welded. Edges with two faces
-    are not open, so closed surfaces that touch each other stay separate.
-    """
-    edges, count = mesh.unpaired_edges
-    on_rim = np.zeros(len(mesh.vertices), dtype=bool)
-    on_rim[edges[count == 1]] = True
-    rim = np.flatnonzero(on_rim)
-    welded = np.arange(len(mesh.vertices))
-    first, place = distinct_rows(mesh.vertices[rim])
-    welded[rim] = rim[first[place]]
-    return welded
-
-
-def _has_lone_twins(mesh: Mesh) -> bool:
-    """Whether two faces have the same corners, and at least two of their edges no other faces."""
-    one, other, third = mesh.face_neighbours.T
-    alike = ((one == other) & (one >= 0)) | ((other == third) & (other >= 0))
-    return bool((alike | ((third == one) & (third >= 0))).any())
-
-
-def _without_twins(faces: IntArray) -> IntArray:
-    """Indices of the faces that do not have the same corners as an earlier face, ascending."""
-    return np.sort(distinct_rows(np.sort(faces, axis=1))[0])
 
 
 Joins = list[IntArray]
@@ -195,32 +159,23 @@ class _Sides:
     ----------
     faces : (f, 3) int array
         Corner indices of each triangle.
-    welded : (V,) int array
-        Vertex that represents each vertex when faces are joined.
     """
 
-    def __init__(self, faces: IntArray, welded: IntArray) -> None:
+    def __init__(self, faces: IntArray) -> None:
         self._faces = faces
         checkpoint()
-        # Corners at the ends of each side, the one with the smaller welded vertex first. If both
-        # ends are welded to one vertex, the original vertices are compared.
+        # Corners at the ends of each side, the one with the smaller vertex first.
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
         checkpoint()
-        one = welded[vertices[first]]
-        other = welded[vertices[second]]
-        checkpoint()
-        swapped = (one > other) | ((one == other) & (vertices[first] > vertices[second]))
+        one, other = vertices[first], vertices[second]
+        swapped = one > other
         self._low = np.where(swapped, second, first)
         self._high = np.where(swapped, first, second)
         checkpoint()
         size = int(vertices.max()) + 1
-        keys = np.minimum(one, other) * size + np.maximum(one, other)
-        collapsed = np.flatnonzero(one == other)  # such a side joins nothing
-        keys[collapsed] = size * size + collapsed
-        del one, other, swapped, first, second
-        self._order, self._first, self._count = grouped(keys)
+        self._order, self._first, self._count = grouped(edge_keys(one, other, size))
 
     @cached_property
     def plain_pairs(self) -> IntArray:
@@ -327,37 +282,58 @@ def _opposite(outward: FloatArray) -> IntArray:
 
 
 def _with_areas(
-    mesh: Mesh,
-    original_place: IntArray,
-    faces: IntArray,
-    vertices: FloatArray,
-    face: IntArray,
-    corners: FloatArray | None,
-    place: IntArray,
+    clean: CleanSurface, parts: FaceParts, vertices: FloatArray, place: IntArray, separated: int
 ) -> MappedMesh:
-    """Build a mapped mesh, with vertices moved so that every face has an area if possible.
+    """Build a mapped mesh that is consistently oriented, if possible with areas of all faces.
 
-    Copies of a vertex of the original are moved apart.
+    Copies of a vertex are moved apart; otherwise a straight trace from one of them would pass
+    exactly through another.
+
+    Parameters
+    ----------
+    clean : CleanSurface
+    parts : FaceParts
+        Faces of the manifold.
+    vertices : (v, 3) float array
+        Positions of its vertices.
+    place : (v,) int array
+        Index of the place of each vertex, equal for copies of one vertex.
+    separated : int
+        Number of edges of more than two faces.
     """
-    # If both ends of a side are welded into one vertex, its face is left out.
-    whole = corners_differ(faces)
-    if not whole.all():
-        faces, face = faces[whole], face[whole]
-        corners = None if corners is None else corners[whole]
+    original, mesh = clean.original, clean.mesh
     checkpoint()
-    short = tolerances.SAME_POSITION * mesh.diagonal
-    flat = degenerate_faces(vertices, faces, short)
-    if not flat.any() and np.array_equal(faces, mesh.faces):
-        return MappedMesh(mesh, mesh, face, None, place, original_place)
-    origin = np.zeros(3)
-    # Copies of a vertex are moved, since a straight trace from one would pass exactly through
-    # another.
-    doubled = np.ones(len(vertices), dtype=bool)
-    order, first, _ = grouped(place)
-    doubled[order[first]] = False
+    short = tolerances.SAME_POSITION * original.diagonal
+    flat = degenerate_faces(vertices, parts.faces, short)
+    same = np.array_equal(parts.faces, mesh.faces)
+    doubled = np.zeros(len(vertices), dtype=bool)
+    if not same:
+        doubled[:] = True
+        order, first, _ = grouped(place)
+        doubled[order[first]] = False
     checkpoint()
-    if flat.any() or doubled.any():
+    origin, moved = np.zeros(3), bool(flat.any() or doubled.any())
+    if moved:
         # Far from the origin, rounding would remove small moves.
-        origin = vertices[faces[0, 0]]
-        vertices = perturbed(vertices - origin, faces, short, flat, doubled)
-    return MappedMesh(mesh, Mesh(vertices, faces), face, corners, place, original_place, origin)
+        origin = vertices[parts.faces[0, 0]]
+        vertices = perturbed(vertices - origin, parts.faces, short, flat, doubled)
+    result = mesh if same and not moved else Mesh(vertices, parts.faces)
+    which = turned_faces(result)
+    if which.any():
+        parts = parts.turned(which)
+        result = Mesh(vertices, parts.faces)
+    repairs = {**clean.repairs, TURNED_FACES: int(which.sum()), NONMANIFOLD_EDGES: separated}
+    return MappedMesh(
+        original=original,
+        mesh=result,
+        face=parts.parent,
+        corners=parts.corners,
+        place=place,
+        original_place=clean.place,
+        joined=clean.joined,
+        removed=clean.removed,
+        divisions=clean.divisions,
+        origin=origin,
+        moved=moved,
+        repairs={name: count for name, count in repairs.items() if count},
+    )
