@@ -109,7 +109,7 @@ class StraightenedMesh:
         with np.errstate(divide="ignore", invalid="ignore"):
             zero = -first / change
         entry = np.where(change > 0.0, zero, np.where(first < -tolerances.ROUNDED, np.inf, 0.0))
-        leave = np.where(change < 0.0, zero, np.where(first < -tolerances.ROUNDED, -np.inf, np.inf))
+        leave = np.where(change < 0.0, zero, np.inf)
         enters, leaves = entry.max(axis=1).clip(0.0), leave.min(axis=1).clip(max=1.0)
         result: list[tuple[int, FloatArray]] = []
         here, margin = 0.0, tolerances.SNAP

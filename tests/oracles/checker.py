@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+import igl
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -25,6 +26,9 @@ POSITION_ROUNDING = 4.0 * float(np.finfo(float).eps)
 
 BOX_ROOM = 1e-6
 """Distance of bounding boxes in weight space beyond which chords cannot meet despite rounding."""
+
+GAP = 1e-6
+"""Width, in bounding-box diagonals, of a gap between open edges that a curve may cross."""
 
 FEWEST_POINTS = {True: 3, False: 2}
 """Least number of points of a curve, by whether it is closed."""
@@ -206,11 +210,11 @@ def judge_curve(
     vertices, weights = _places(faces, curve)
     simplices, on_face = _common_simplices(faces, vertices, chords)
     if not on_face.all():
-        # Where the mesh does not connect the points otherwise, a design treats open edges at the
-        # same place as one edge.
+        # A design treats open edges at the same place as one edge.
         faces = _with_open_edges_joined(mesh)
         vertices, weights = _places(faces, curve)
         simplices, on_face = _common_simplices(faces, vertices, chords)
+    across_gaps = _on_faces_across_gaps(mesh, curve, chords[~on_face])
     crossings, touchings = _contacts(vertices, weights, chords[on_face], simplices[on_face])
     missed, in_order = 0.0, True
     if positions is not None:
@@ -228,7 +232,7 @@ def judge_curve(
         weight_error=float(
             max(-curve.barycentric.min(), np.abs(curve.barycentric.sum(axis=1) - 1.0).max(), 0.0)
         ),
-        chords_off_face=int((~on_face).sum()),
+        chords_off_face=int((~across_gaps).sum()),
         points_twice=n - len(np.unique(np.concatenate([vertices, weights], axis=1), axis=0)),
         crossings=crossings,
         touchings=touchings,
@@ -265,6 +269,31 @@ def _with_open_edges_joined(mesh: nicmm.Mesh) -> IntArray:
     for vertex in np.unique(edges[count == 1]).tolist():
         number[vertex] = first.setdefault(tuple(mesh.vertices[vertex].tolist()), vertex)
     return number[mesh.faces]
+
+
+def _on_faces_across_gaps(
+    mesh: nicmm.Mesh, curve: nicmm.SurfaceCurve, chords: IntArray
+) -> BoolArray:
+    """Whether each chord lies on the face of one of its ends by its position, up to `GAP`.
+
+    Open edges that face each other across a gap, or meet at a T-junction, share no vertices.
+    """
+    found = np.zeros(len(chords), dtype=bool)
+    diagonal = np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0))
+    for end in (0, 1):
+        corners = mesh.vertices[mesh.faces[curve.faces[chords[:, end]]]]
+        place = curve.points[chords[:, 1 - end]]
+        away = [_distance_to_triangle(*each) for each in zip(place, corners, strict=True)]
+        found |= np.array(away, dtype=float) <= GAP * diagonal
+    return found
+
+
+def _distance_to_triangle(point: FloatArray, corners: FloatArray) -> float:
+    """Distance of a point, (3,), from a triangle, (3, 3)."""
+    squared, _, _ = igl.point_mesh_squared_distance(
+        point[None], np.ascontiguousarray(corners), np.array([[0, 1, 2]])
+    )
+    return float(np.sqrt(np.atleast_1d(squared)[0]))
 
 
 def _places(faces: IntArray, curve: nicmm.SurfaceCurve) -> tuple[IntArray, FloatArray]:
