@@ -49,6 +49,7 @@ MEASUREMENTS = (
     "symmetry",
     "dabs",
     "resolution",
+    "defects",
     "gallery",
     "obstacles",
     "lanes",

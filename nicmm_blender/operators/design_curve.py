@@ -105,6 +105,8 @@ class NICMM_OT_design_curve(
         summary = f"{_summary(mesh_object, design, order, request.settings)}: {result}"
         if ignored := _other_selections():
             self.report({"WARNING"}, ignored)
+        if design.repairs:
+            summary += f"; repaired for the curve: {_repairs_text(design.repairs)}"
         if _alternatives(self):
             summary += f"; {counted(len(design.alternatives), 'alternative')}"
         if design.status == nicmm.Status.CONVERGED:
@@ -125,6 +127,11 @@ def _summary(mesh_object, design, order: str, curve_settings) -> str:
     summary = f"Curve through {points} {order}, {design.seconds:.1f} s"
     shown = "" if curve_settings.use_modifiers else active_modifiers_text(mesh_object)
     return f"{summary}, on the mesh without its {shown}" if shown else summary
+
+
+def _repairs_text(repairs: dict) -> str:
+    """What was repaired, such as "vertices joined (40), faces turned (12)"."""
+    return ", ".join(f"{repair} ({number:,})" for repair, number in repairs.items())
 
 
 def _other_selections() -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .array_types import BoolArray
+from .array_types import BoolArray, IntArray
 from .mesh import Mesh
 from .sides import two_sides
 
@@ -28,6 +28,6 @@ def turned_faces(mesh: Mesh) -> BoolArray:
     return side * np.where(more < 0.0, -1, 1) < 0
 
 
-def turned(faces: np.ndarray, which: BoolArray) -> np.ndarray:
+def turned(faces: IntArray, which: BoolArray) -> IntArray:
     """Faces, (F, 3), some of them with the opposite orientation."""
     return np.where(which[:, None], faces[:, [0, 2, 1]], faces)

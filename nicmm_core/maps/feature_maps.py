@@ -18,6 +18,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, adjacent_sides, check_indices, edge_keys, side_keys, unique_edges
 from ..geometry.normals import unsigned_normals
+from ..repair.clean_surface import joined_surface
 
 SHARP_ANGLE = math.radians(30.0)
 """Least angle between the normals of two faces, in radians, at which their edge is sharp."""
@@ -45,9 +46,15 @@ def principal_curvatures(mesh: Mesh) -> FloatArray:
     Parameters
     ----------
     mesh : Mesh
-        Any mesh; it may be open, unoriented or non-manifold.
+        Any mesh; it may be open, unoriented, non-manifold or a soup of triangles.
     """
     # Not `igl.principal_curvature`, which fails on small meshes and needs an orientation.
+    surface = joined_surface(mesh)
+    return _principal_curvatures(surface.mesh)[surface.place]
+
+
+def _principal_curvatures(mesh: Mesh) -> FloatArray:
+    """Principal curvatures of a mesh in which coincident vertices are joined."""
     centre, neighbour = _two_rings(mesh)
     normals = unsigned_normals(mesh)
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
@@ -126,7 +133,8 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
     Returns
     -------
     (n, 2) int array
-        Vertices of the sharp edges. Boundary edges are not sharp. Faces without area are ignored.
+        Vertices of the sharp edges. Boundary edges are not sharp, unless they coincide with others.
+        Faces without area are ignored.
 
     Raises
     ------
@@ -134,18 +142,22 @@ def sharp_edges(mesh: Mesh, angle: float = SHARP_ANGLE) -> IntArray:
         If the angle is not in 0 … π.
     """
     limit = number_between("angle", angle, 0.0, math.pi, "an angle in radians")
-    solid = np.flatnonzero(mesh.face_areas > 0.0)
-    faces, normals = mesh.faces[solid], mesh.face_normals[solid]
-    start, end = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
+    surface = joined_surface(mesh)
+    solid = np.flatnonzero(surface.mesh.face_areas > 0.0)
+    faces, normals = surface.mesh.faces[solid], surface.mesh.face_normals[solid]
+    start = faces[:, [1, 2, 0]].ravel()
     # At an edge with more than two faces, consecutive faces are compared.
     one, other = adjacent_sides(faces)
     turned = np.where(start[one] == start[other], -1.0, 1.0)
     normal, beyond = normals[one // 3], normals[other // 3]
     cosine = turned * (normal * beyond).sum(axis=1)
     sine = np.linalg.norm(np.cross(normal, beyond), axis=1)
-    sharp = one[np.arctan2(sine, cosine) >= limit]
-    pairs = np.sort(np.stack([start[sharp], end[sharp]], axis=1), axis=1)
-    return np.unique(pairs, axis=0)
+    is_sharp = np.arctan2(sine, cosine) >= limit
+    sharp = np.concatenate([one[is_sharp], other[is_sharp]])
+    given = mesh.faces[surface.parts.parent[solid[sharp // 3]]]
+    rows = np.arange(len(sharp))
+    ends = np.stack([given[rows, sharp % 3 - 2], given[rows, sharp % 3 - 1]], axis=1)
+    return np.unique(np.sort(ends, axis=1), axis=0)
 
 
 def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
@@ -154,7 +166,11 @@ def sharp_edge_map(mesh: Mesh, angle: float = SHARP_ANGLE) -> FloatArray:
     A map has weights at vertices only. If all corners of a face lie on sharp edges, as on a box of
     twelve triangles, the whole face has weight 1; subdivide such a mesh.
     """
-    return edge_map(mesh, sharp_edges(mesh, angle))
+    weights = edge_map(mesh, sharp_edges(mesh, angle))
+    place = joined_surface(mesh).place
+    at_place = np.zeros(len(weights))
+    np.maximum.at(at_place, place, weights)  # all vertices at one position have the same weight
+    return at_place[place]
 
 
 def edge_map(mesh: Mesh, edges: ArrayLike) -> FloatArray:

@@ -76,6 +76,13 @@ class CleanSurface:
     repairs: dict[str, int]
 
 
+def joined_surface(mesh: Mesh) -> CleanSurface:
+    """The surface of a mesh with coincident vertices joined, without doubled faces."""
+    surface = clean_surface(mesh, Cleaning.VERTICES) or clean_surface(mesh, Cleaning.FACES)
+    assert surface is not None  # a mesh has faces
+    return surface
+
+
 def clean_surface(mesh: Mesh, cleaning: Cleaning) -> CleanSurface | None:
     """Clean the surface of a mesh; None if no face would remain."""
     parts = distinct_faces(mesh)

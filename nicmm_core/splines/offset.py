@@ -7,7 +7,9 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import vertex_normals
+from ..geometry.orientation import turned, turned_faces
 from ..geometry.surface_points import SurfacePoints
+from ..repair.clean_surface import joined_surface
 
 VANISHING = 1e-6
 """Length of an interpolated normal up to which the normals at the corners count as cancelling."""
@@ -20,7 +22,8 @@ def offset_points(
 
     The angle-weighted vertex normals are interpolated in the face and scaled to unit length. Where
     they cancel, the face normal is used instead; if the face has no area either, the point stays
-    where it is.
+    where it is. Before, coincident vertices are joined, and faces are turned to the side to which
+    most faces of their component point.
 
     Parameters
     ----------
@@ -36,9 +39,15 @@ def offset_points(
     -------
     (n, 3) float array
     """
-    at_corners = vertex_normals(mesh.vertices, mesh.faces)[mesh.faces[faces]]
+    surface = joined_surface(mesh)
+    which = turned_faces(surface.mesh)
+    vertex_normal = vertex_normals(surface.mesh.vertices, turned(surface.mesh.faces, which))
+    at_corners = vertex_normal[surface.place[mesh.faces[faces]]]
+    against = np.zeros(len(mesh.faces), dtype=bool)
+    against[surface.parts.parent] = which
+    face_normals = np.where(against[faces, None], -1.0, 1.0) * mesh.face_normals[faces]
     normals = np.einsum("nc,ncd->nd", barycentric, at_corners)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     sound = length > VANISHING
-    normals = np.where(sound, normals / np.where(sound, length, 1.0), mesh.face_normals[faces])
+    normals = np.where(sound, normals / np.where(sound, length, 1.0), face_normals)
     return SurfacePoints(faces, barycentric).positions(mesh) + height * normals

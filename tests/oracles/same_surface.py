@@ -210,7 +210,11 @@ CHAINS: dict[str, tuple[str, ...]] = {
         "half of the faces turned",
         "soup",
     ),
-    "turned soup with gaps": ("gaps", "one patch turned", "a millionth as large"),
+    "gaps, patch turned, a millionth as large": (
+        "gaps",
+        "one patch turned",
+        "a millionth as large",
+    ),
 }
 """Several changes, one after another."""
 

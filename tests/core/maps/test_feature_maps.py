@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.maps.feature_maps import SHARP_ANGLE
+from tests.oracles import same_surface
 
 
 def tube(radius=0.5, around=40, along=21):
@@ -231,3 +232,12 @@ class TestValueMap:
 
 def test_default_angle_is_that_of_the_documentation():
     assert np.degrees(SHARP_ANGLE) == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("name", ["half of the faces turned", "soup", "turned, doubled soup"])
+def test_maps_of_a_changed_mesh_are_the_same(name):
+    box = shapes.cube(3)
+    one = same_surface.changed(box, name, 4)
+    for feature_map in (nicmm.sharp_edge_map, nicmm.curvature_map):
+        expected, found = feature_map(box), feature_map(one.mesh)
+        np.testing.assert_allclose(found[one.number], expected, atol=1e-6)

@@ -7,6 +7,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.splines.offset import offset_points
 from tests.core.checks import random_surface_points
+from tests.oracles import same_surface
 
 
 @pytest.mark.parametrize("height", [0.0, 0.05, -0.05])
@@ -45,13 +46,23 @@ def test_direction_is_continuous_over_an_edge():
 
 
 def test_face_normal_counts_where_normals_cancel():
-    """Two faces back to back, and a vertex without faces."""
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
-    mesh = nicmm.Mesh(vertices, np.array([[0, 1, 2], [0, 2, 1]]))
-    third = np.full((2, 3), 1.0 / 3.0)
-    moved = offset_points(mesh, np.array([0, 1]), third, 0.1)
-    np.testing.assert_allclose(moved[:, 2], [0.1, -0.1])
-    np.testing.assert_allclose(moved[:, :2], 1.0 / 3.0)
+    """At a vertex where a sheet is folded flat onto itself."""
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 1, 0]])
+    mesh = nicmm.Mesh(vertices, np.array([[0, 1, 2], [1, 0, 4]]))
+    middle = np.full((2, 3), 1.0 / 3.0)
+    moved = offset_points(mesh, np.array([0, 1]), middle, 0.1)
+    np.testing.assert_allclose(np.abs(moved[:, 2]), 0.1)
+
+
+@pytest.mark.parametrize("name", ["half of the faces turned", "soup", "turned, doubled soup"])
+def test_points_of_a_changed_mesh_move_to_the_same_side(ball, name):
+    mesh = same_surface.changed(ball, name, 3).mesh
+    points = random_surface_points(mesh, 100, seed=2)
+    place = points.positions(mesh)
+    moved = offset_points(mesh, points.faces, points.barycentric, 0.1)
+    radial = place / np.linalg.norm(place, axis=1, keepdims=True)
+    side = np.sign(((moved - place) * radial).sum(axis=1)[0])
+    np.testing.assert_allclose(moved, place + 0.1 * side * radial, atol=0.002)
 
 
 def test_faces_without_area_give_finite_positions():
