@@ -59,7 +59,7 @@ class CleanSurface:
         The vertex of the mesh at which each given vertex lies. It differs from `joined` where an
         edge without length was removed.
     removed : (F,) bool array
-        Given faces that were removed since they have no area.
+        Given faces of which no part remains, since they are doubled or have no area.
     divisions : (d, 3) int array
         Vertices at which edges were divided, and the two ends of the edge of each.
     repairs : dict of str to int
@@ -94,14 +94,14 @@ def clean_surface(mesh: Mesh, cleaning: Cleaning) -> CleanSurface | None:
         distinct = parts if vertices_stay(joined) else parts.renumbered(joined).distinct()
         doubled += len(parts.faces) - len(distinct.faces)
         parts = distinct
-    place, removed = joined, np.zeros(len(mesh.faces), dtype=bool)
+    place, flat = joined, 0
     joints = divisions = np.zeros((0, 3), dtype=np.int64)
     if cleaning is Cleaning.FULL:
         parts, joints = without_t_junctions(mesh, vertices, parts)
-        removed[parts.parent] = True
+        before = len(np.unique(parts.parent))
         short = tolerances.SAME_POSITION * mesh.diagonal
         parts, merged, divisions = without_flat_faces(vertices, parts, short)
-        removed[parts.parent] = False
+        flat = before - len(np.unique(parts.parent))
         place, divisions = merged[joined], np.concatenate([merged[joints], divisions])
     if not len(parts.faces):
         return None
@@ -109,9 +109,11 @@ def clean_surface(mesh: Mesh, cleaning: Cleaning) -> CleanSurface | None:
     repairs = {
         VERTICES_JOINED: int((joined != np.arange(len(joined))).sum()),
         DOUBLED_FACES: doubled,
-        FLAT_FACES: int(removed.sum()),
+        FLAT_FACES: flat,
         T_JUNCTIONS: len(joints),
     }
+    removed = np.ones(len(mesh.faces), dtype=bool)
+    removed[parts.parent] = False
     same = parts.faces is mesh.faces and vertices is mesh.vertices
     return CleanSurface(
         mesh,

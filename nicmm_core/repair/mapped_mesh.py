@@ -47,7 +47,7 @@ class MappedMesh:
     joined : (V,) int array
         The first of the original vertices that were joined with each, since they coincide.
     removed : (F,) bool array
-        Faces of the original that were removed since they have no area.
+        Faces of the original of which no part remains, since they are doubled or have no area.
     divisions : (d, 3) int array
         Vertices at which edges were divided, and the two ends of the edge of each.
     origin : (3,) float array
@@ -86,7 +86,7 @@ class MappedMesh:
         for face, barycentric, faces in zip(points.faces, points.barycentric, around, strict=True):
             weights = dict(zip(self.original.faces[face].tolist(), barycentric, strict=True))
             found.append(self._parts_with(faces, weights))
-        if self._crossings is not None:
+        if self._removed is not None:
             positions = points.positions(self.original)
             for number in np.flatnonzero([self.removed[faces].any() for faces in around]).tolist():
                 there = self._at_position(positions[[number]])
@@ -179,10 +179,13 @@ class MappedMesh:
             barycentric = np.einsum("nc,ncd->nd", barycentric, self.corners[polyline.faces])
             barycentric /= barycentric.sum(axis=1, keepdims=True)
         polyline = SurfacePoints(self.face[polyline.faces], barycentric)
-        if self._crossings is not None:
-            exact = self._exact_points(polyline, index, points)
-            polyline, number = self._crossings.led_across(polyline, curve.closed, exact)
+        exact = self._exact_points(polyline, index, points)
+        if self._removed is not None:
+            polyline, number = self._removed.led_across(polyline, curve.closed, exact)
             index = np.where(index >= 0, number[index], -1)
+        else:
+            for place, point in exact.items():
+                polyline = joined([polyline[:place], point, polyline[place + 1 :]])
         return curve_on_mesh(
             self.original, curve.closed, polyline.faces, polyline.barycentric, index
         )
@@ -190,7 +193,7 @@ class MappedMesh:
     def _exact_points(
         self, polyline: SurfacePoints, index: IntArray, points: SurfacePoints
     ) -> dict[int, SurfacePoints]:
-        """Control points that lie on or beside removed faces, by their indices in a polyline."""
+        """Control points at which vertices or faces were moved together, by index in a polyline."""
         passed = index[index >= 0]
         given, found = points.positions(self.original), polyline[passed].positions(self.original)
         away = np.linalg.norm(found[:, None] - given, axis=2)
@@ -204,7 +207,7 @@ class MappedMesh:
         """Map a curve on the original to the mesh; None if the mesh lacks a part of the curve."""
         if not self.differs:
             return curve
-        if self.corners is None:
+        if self.corners is None and not self.removed[curve.faces].any():
             whole = np.full(len(self.original.faces), -1)
             whole[self.face] = np.arange(len(self.face))
             faces, barycentric = whole[curve.faces], curve.barycentric
@@ -244,7 +247,7 @@ class MappedMesh:
         return result
 
     @cached_property
-    def _crossings(self) -> RemovedFaces | None:
+    def _removed(self) -> RemovedFaces | None:
         """The removed faces, which curves on the original have to cross; None if there are none."""
         if not self.removed.any():
             return None

@@ -36,10 +36,13 @@ class RemovedFaces:
 
     def __init__(self, mesh: Mesh, faces: IntArray, removed: BoolArray) -> None:
         self._mesh, self._faces = mesh, faces
-        self._at_edge: dict[frozenset[int], list[int]] = {}
+        self._at: dict[frozenset[int], list[int]] = {}  # removed faces by vertex and by edge
         for face in np.flatnonzero(removed).tolist():
+            corners = faces[face].tolist()
             for side in range(3):
-                self._at_edge.setdefault(self._ends(face, side), []).append(face)
+                edge = frozenset((corners[side - 2], corners[side - 1]))
+                for simplex in {edge, frozenset((corners[side],))}:
+                    self._at.setdefault(simplex, []).append(face)
 
     def led_across(
         self, polyline: SurfacePoints, closed: bool, exact: Mapping[int, SurfacePoints]
@@ -73,74 +76,72 @@ class RemovedFaces:
         size = 0
         for number in range(n):
             here = polyline[number : number + 1]
-            way, across = [], []
+            way: list[SurfacePoints] = []
+            across: list[SurfacePoints] = []
             if number in exact:
-                after = int(here.faces[0])
-                here = exact[number]
-                own = int(here.faces[0])
+                after, here = int(here.faces[0]), exact[number]
                 if closed or number > 0:
-                    way = self._way(int(before[number]), own, here)
+                    way = [entered for _, entered in self._way(int(before[number]), here)]
                 if closed or number < n - 1:
-                    across = self._way(own, after, here)
+                    back = self._way(after, here)
+                    across = [left for left, _ in back[::-1]]
+                    face = int(back[-1][1].faces[0]) if back else after
+                    if self._hold(np.array([face]), here)[0]:
+                        here = self._in_face(here, face)
             elif leaves[number]:
-                way = self._way(int(before[number]), int(here.faces[0]), here)[:-1]
+                way = [entered for _, entered in self._way(int(before[number]), here)]
             index[number] = size + len(way)
             parts += [*way, here, *across]
             size = index[number] + 1 + len(across)
         return self._without_repeats(joined(parts), index, closed)
 
-    def _way(self, first: int, last: int, point: SurfacePoints) -> list[SurfacePoints]:
-        """Places of a point on the edges between two faces, each in the face entered there.
+    def _way(self, first: int, point: SurfacePoints) -> list[tuple[SurfacePoints, SurfacePoints]]:
+        """Places of a point in the removed faces between a face and one that holds the point.
 
-        Between the two faces there are only removed faces. There is no edge if the first face holds
-        the point, or if no such chain of faces joins the two.
+        Consecutive faces have a vertex or an edge at the position of the point in common. Each
+        place on it is given in both of them, first in the face that is left. There are none if the
+        first face holds the point, or if no such chain of faces leads to the point.
         """
-        if self._hold(np.array([first]), point)[0]:
-            return []
         position = point.positions(self._mesh)[0]
-        last_edges = {self._ends(last, side) for side in range(3)}
         previous = {first: first}
-        through: dict[int, SurfacePoints] = {}
+        places: dict[int, tuple[SurfacePoints, SurfacePoints]] = {}
         queue = [first]
         for face in queue:
-            if face == last:
-                break
+            if self._hold(np.array([face]), point)[0]:
+                return [places[each] for each in path_between(previous, first, face)[1:]]
             for side in range(3):
-                ends = self._ends(face, side)
-                share = self._share_along(face, side, position)
-                if share is None:
+                weights = self._weights_on_side(face, side, position)
+                if weights is None:
                     continue
-                beyond = [*([last] if ends in last_edges else []), *self._at_edge.get(ends, [])]
-                for other in beyond:
-                    if other not in previous:
-                        previous[other] = face
-                        through[other] = self._on_side(face, side, share, other)
-                        queue.append(other)
-        if last not in previous:
-            return []
-        return [through[face] for face in path_between(previous, first, last)[1:]]
+                place = SurfacePoints(np.array([face]), weights[None])
+                simplex = frozenset(self._faces[face][weights > 0.0].tolist())
+                for beyond in self._at.get(simplex, ()):
+                    if beyond not in previous:
+                        previous[beyond] = face
+                        places[beyond] = place, self._in_face(place, beyond)
+                        queue.append(beyond)
+        return []
 
-    def _ends(self, face: int, side: int) -> frozenset[int]:
-        return frozenset((int(self._faces[face, side - 2]), int(self._faces[face, side - 1])))
-
-    def _share_along(self, face: int, side: int, position: FloatArray) -> float | None:
-        """Place of a position on a side, as a fraction; None if it does not lie on the side."""
+    def _weights_on_side(self, face: int, side: int, position: FloatArray) -> FloatArray | None:
+        """Barycentric coordinates of a position on a side, (3,); None if it does not lie there."""
         start, end = self._mesh.vertices[self._mesh.faces[face, [side - 2, side - 1]]]
         way, offset = end - start, position - start
         squared = float(way @ way)
         share = min(max(float(offset @ way) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
         if min(share, 1.0 - share) <= tolerances.ROUNDED:
             share = float(round(share))
-        away = float(np.linalg.norm(offset - share * way))
         near = max(WIDEST * np.sqrt(squared), tolerances.GAP * self._mesh.diagonal)
-        return share if away <= near else None
+        if float(np.linalg.norm(offset - share * way)) > near:
+            return None
+        weights = np.zeros(3)
+        weights[side - 2], weights[side - 1] = 1.0 - share, share
+        return weights
 
-    def _on_side(self, face: int, side: int, share: float, other: int) -> SurfacePoints:
-        """A point on a side of a face, in another face with the same edge."""
-        weights = np.zeros((1, 3))
-        weights[0, side - 2], weights[0, side - 1] = 1.0 - share, share
-        corners, others = self._faces[[face]], self._faces[[other]]
-        return SurfacePoints(np.array([other]), weights_at(corners, weights, others))
+    def _in_face(self, point: SurfacePoints, face: int) -> SurfacePoints:
+        """The same point in another face that holds it."""
+        corners = self._faces[point.faces]
+        weights = weights_at(corners, point.barycentric, self._faces[[face]])
+        return SurfacePoints(np.array([face]), weights)
 
     def _hold(self, faces: IntArray, points: SurfacePoints) -> BoolArray:
         """Whether each face, (n,), has all vertices of the smallest simplex with its point."""

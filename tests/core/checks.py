@@ -79,7 +79,8 @@ def _farthest(points, polyline):
     start = polyline[None]
     step = np.roll(polyline, -1, axis=0)[None] - start
     offset = points[:, None] - start
-    along = np.clip((offset * step).sum(axis=2) / (step**2).sum(axis=2), 0.0, 1.0)
+    squared = np.maximum((step**2).sum(axis=2), np.finfo(float).tiny)
+    along = np.clip((offset * step).sum(axis=2) / squared, 0.0, 1.0)
     return np.linalg.norm(offset - along[:, :, None] * step, axis=2).min(axis=1).max()
 
 
