@@ -86,7 +86,7 @@ class RemovedFaces:
                     back = self._way(after, here)
                     across = [left for left, _ in back[::-1]]
                     face = int(back[-1][1].faces[0]) if back else after
-                    if self._hold(np.array([face]), here)[0]:
+                    if not np.setdiff1d(self._support(here), self._mesh.faces[face]).size:
                         here = self._in_face(here, face)
             elif leaves[number]:
                 way = [entered for _, entered in self._way(int(before[number]), here)]
@@ -142,6 +142,10 @@ class RemovedFaces:
         corners = self._faces[point.faces]
         weights = weights_at(corners, point.barycentric, self._faces[[face]])
         return SurfacePoints(np.array([face]), weights)
+
+    def _support(self, point: SurfacePoints) -> IntArray:
+        """Vertices of the smallest simplex of the given mesh with a point."""
+        return self._mesh.faces[point.faces[0]][point.barycentric[0] > 0.0]
 
     def _hold(self, faces: IntArray, points: SurfacePoints) -> BoolArray:
         """Whether each face, (n,), has all vertices of the smallest simplex with its point."""

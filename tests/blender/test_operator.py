@@ -313,6 +313,24 @@ def test_missing_group_is_named(empty_scene, field):
     assert 'Choose one of "Walls"' in reported_error(**{field: "Wall"})
 
 
+def test_repairs_are_reported_and_keep_the_curve(empty_scene, capfd):
+    """Half of the faces are turned over."""
+    sphere = scenes.sphere()
+    vertices = scenes.ring(sphere, 4, height=0.3)
+    expected = design(empty_scene.core, sphere, vertices)
+    mesh = sphere.data
+    for polygon in list(mesh.polygons)[::2]:
+        polygon.flip()
+    scenes.select(sphere, vertices)
+    assert bpy.ops.nicmm.design_curve(spline="EXACT") == {"FINISHED"}
+    assert re.search(r"repaired for the curve: faces turned \([\d,]+\)", capfd.readouterr().out)
+    (curve,) = scenes.curves()
+    found = scenes.points(curve)
+    points = expected.curves[0].points
+    nearest = np.linalg.norm(found[:, None] - points, axis=2).min(axis=1)
+    assert nearest.max() < 1e-2
+
+
 def test_errors_of_the_core_are_reports(empty_scene):
     core = empty_scene.core
     sphere = scenes.sphere()
