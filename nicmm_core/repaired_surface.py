@@ -22,7 +22,7 @@ from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
-from .geometry.surface_points import SurfacePoints, in_faces
+from .geometry.surface_points import SurfacePoints, coincide, in_faces
 from .path.via_points import with_via_points
 from .repair.clean_surface import Cleaning, CleanSurface, clean_surface
 from .repair.mapped_mesh import MappedMesh
@@ -228,7 +228,7 @@ class RepairedSurface:
 
 
 def request_on(mapped: MappedMesh, request: Request) -> Request | None:
-    """Map a request to a mapped mesh; None if its points are not connected there."""
+    """Map a request to a mapped mesh; None if its points are not connected there, or coincide."""
     if not mapped.differs:
         components = mapped.mesh.face_component[request.points.faces]
         return request if (components == components[0]).all() else None
@@ -238,6 +238,8 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
     if component is None:
         return None
     points, *via_points = (mapped.points(of_set, component) for of_set in representations)
+    if coincide(mapped.mesh, points):  # on the two sides of a gap that was closed
+        return None
     return replace(
         request,
         points=points,

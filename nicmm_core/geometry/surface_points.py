@@ -360,21 +360,33 @@ def snapped(points: SurfacePoints) -> SurfacePoints:
 
 def check_distinct(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:
     """Raise ControlPointError if two points coincide."""
-    if len(points) < 2:
-        return
-    tolerance = tolerances.COINCIDENT * mesh.diagonal
-    # The nearest point is the point itself, so two are requested.
-    distance, nearest = cKDTree(points.positions(mesh)).query(points.positions(mesh), k=2)
-    same = distance[:, 1] <= tolerance
+    same, nearest = _nearest_others(mesh, points)
     if same.any():
         first = int(same.argmax())
-        second = int(nearest[first][nearest[first] != first][0])
+        second = int(nearest[first])
         raise ControlPointError(
             f"{names[first]} and {names[second]} are the same point; "
             "remove one of them (a closed curve returns to its first point by itself)",
             names[first],
             names[second],
         )
+
+
+def coincide(mesh: Mesh, points: SurfacePoints) -> bool:
+    """Whether any two points coincide."""
+    return bool(_nearest_others(mesh, points)[0].any())
+
+
+def _nearest_others(mesh: Mesh, points: SurfacePoints) -> tuple[BoolArray, IntArray]:
+    """Whether each point, (k,), coincides with another one, and the index of the nearest other."""
+    count = len(points)
+    if count < 2:
+        return np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
+    # The nearest point is the point itself, so two are requested.
+    positions = points.positions(mesh)
+    distance, found = cKDTree(positions).query(positions, k=2)
+    nearest = np.where(found[:, 0] == np.arange(count), found[:, 1], found[:, 0])
+    return distance[:, 1] <= tolerances.COINCIDENT * mesh.diagonal, nearest.astype(np.int64)
 
 
 def check_one_component(mesh: Mesh, points: SurfacePoints, names: list[PointName]) -> None:

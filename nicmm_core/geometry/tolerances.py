@@ -5,6 +5,8 @@ Lengths are never absolute, so a mesh has the same curve in micrometres and in k
 
 import numpy as np
 
+from .array_types import FloatArray
+
 ON_SURFACE = 1e-4
 """Greatest distance of a control point from the surface, in bounding-box diagonals."""
 
@@ -77,3 +79,11 @@ def of_clean_curve(diagonal: float, radius: float = 0.0) -> float:
     """
     of_mesh = CLEAN_CURVE * diagonal
     return min(of_mesh, CLEAN_TUBE * radius) if radius > 0.0 else of_mesh
+
+
+def rounding(positions: FloatArray) -> float:
+    """Greatest error of a position that is interpolated between some positions, in their unit.
+
+    It exceeds the tolerances that are relative to the mesh only if the mesh is far from the origin.
+    """
+    return 16.0 * float(np.finfo(np.float64).eps) * float(np.abs(positions).max(initial=0.0))

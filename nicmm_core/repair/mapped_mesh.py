@@ -198,8 +198,9 @@ class MappedMesh:
         given, found = points.positions(self.original), polyline[passed].positions(self.original)
         away = np.linalg.norm(found[:, None] - given, axis=2)
         nearest = away.argmin(axis=1)
+        same = max(tolerances.ROUNDED * self.original.diagonal, tolerances.rounding(given))
         exact = {}
-        for rank in np.flatnonzero(away.min(axis=1) > tolerances.ROUNDED * self.original.diagonal):
+        for rank in np.flatnonzero(away.min(axis=1) > same):
             exact[int(passed[rank])] = points[nearest[[rank]]]
         return exact
 

@@ -130,7 +130,8 @@ class RemovedFaces:
         share = min(max(float(offset @ way) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
         if min(share, 1.0 - share) <= tolerances.ROUNDED:
             share = float(round(share))
-        near = max(WIDEST * np.sqrt(squared), tolerances.GAP * self._mesh.diagonal)
+        rounding = tolerances.rounding(self._mesh.vertices[self._mesh.faces[face]])
+        near = max(WIDEST * np.sqrt(squared), tolerances.GAP * self._mesh.diagonal, rounding)
         if float(np.linalg.norm(offset - share * way)) > near:
             return None
         weights = np.zeros(3)
