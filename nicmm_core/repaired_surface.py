@@ -19,10 +19,10 @@ from .design_result import Design
 from .errors import CurveError
 from .geometry import tolerances
 from .geometry.array_types import FloatArray, IntArray
-from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh
+from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
-from .geometry.surface_points import SurfacePoints, coincide, in_faces
+from .geometry.surface_points import SurfacePoints, coincide
 from .path.via_points import with_via_points
 from .repair.clean_surface import Cleaning, CleanSurface, clean_surface
 from .repair.mapped_mesh import MappedMesh
@@ -284,7 +284,7 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
             )
         start = start.curves[0]
     original = manifold.repaired.original
-    curve, segment_faces = checked_curve(original, start)
+    curve, segment_faces = checked_curve(original, start, across_gaps=True)
     index = curve.control_index
     first = int(index.argmin()) if curve.closed and len(index) else 0
     if len(index) < 2 or (index < 0).any() or (np.diff(np.roll(index, -first)) <= 0).any():
@@ -302,8 +302,8 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
         )
     if not curve.closed:
         segment_faces[-1] = curve.faces[-1]
-    points = in_faces(original, points, segment_faces)
-    curve = replace(curve, faces=points.faces, barycentric=points.barycentric)
+    weights = weights_in_faces(original, curve.faces, curve.barycentric, segment_faces)
+    curve = replace(curve, faces=segment_faces, barycentric=weights)
     if not curve.closed:
         curve = _between_ends(original, curve)
     mapped = manifold.curve(curve)

@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
-from .surface_points import SurfacePoints, in_faces
-from .tolerances import BARYCENTRIC_SUM, ROUNDED
+from .surface_points import SurfacePoints, nearest_points, on_longest_edge, weights_at
+from .tolerances import BARYCENTRIC_SUM, GAP, ROUNDED, rounding
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,10 @@ def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
     """The point at the fraction ``share`` of a segment, in a face that contains the segment."""
-    curve, segment_faces = checked_curve(mesh, curve)
+    curve, segment_faces = checked_curve(mesh, curve, across_gaps=True)
     ends = np.array([segment, (segment + 1) % len(curve.faces)])
     there = segment_faces[[segment, segment]]
-    points = SurfacePoints(curve.faces[ends], curve.barycentric[ends])
-    both = in_faces(mesh, points, there).barycentric
+    both = weights_in_faces(mesh, curve.faces[ends], curve.barycentric[ends], there)
     return SurfacePoints(there[:1], (1.0 - share) * both[:1] + share * both[1:])
 
 
@@ -96,8 +95,19 @@ def leg_of_segment(curve: SurfaceCurve, segment: int) -> int:
     return int(order[np.searchsorted(curve.control_index[order], segment, side="right") - 1])
 
 
-def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArray]:
+def checked_curve(
+    mesh: Mesh, curve: SurfaceCurve, across_gaps: bool = False
+) -> tuple[SurfaceCurve, IntArray]:
     """Check that a curve lies on a mesh, and find a face of each segment.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    curve : SurfaceCurve
+    across_gaps : bool
+        Whether the faces on both sides of an edge that the curve crosses need not share vertices,
+        as in a soup or at a T-junction. The ends of each segment then lie on its face up to
+        `tolerances.GAP`.
 
     Returns
     -------
@@ -129,7 +139,38 @@ def checked_curve(mesh: Mesh, curve: SurfaceCurve) -> tuple[SurfaceCurve, IntArr
         )
     barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDED))
     curve = replace(curve, barycentric=barycentric)
-    return curve, _segment_faces(mesh, curve.closed, faces, barycentric)
+    return curve, _segment_faces(mesh, curve, across_gaps)
+
+
+def weights_in_faces(
+    mesh: Mesh, faces: IntArray, barycentric: FloatArray, others: IntArray
+) -> FloatArray:
+    """Barycentric coordinates of points in other faces that hold them, (n, 3).
+
+    Where the other face lacks a vertex of the point, as across a gap, they are those of the nearest
+    point of that face.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    faces : (n,) int array
+        Face in which each point is given.
+    barycentric : (n, 3) float array
+        Coordinates in these faces.
+    others : (n,) int array
+        Faces in which coordinates are wanted.
+    """
+    weights = weights_at(mesh.faces[faces], barycentric, mesh.faces[others])
+    support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
+    for point in np.flatnonzero(~_contains(mesh.faces[others], support)).tolist():
+        position = barycentric[point] @ mesh.vertices[mesh.faces[faces[point]]]
+        nearest, _ = nearest_points(mesh, position[None], others[[point]])
+        if np.isfinite(nearest.barycentric).all():  # a face without area has no coordinates
+            weights[point] = nearest.barycentric[0]
+        else:
+            corners = mesh.vertices[mesh.faces[others[point]]]
+            weights[point] = on_longest_edge(corners, position)
+    return weights
 
 
 def _readable(curve: SurfaceCurve) -> SurfaceCurve:
@@ -226,28 +267,43 @@ def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[Float
     return even, segment.astype(np.int64)
 
 
-def _segment_faces(mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray) -> IntArray:
+def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArray:
     """A face that contains each point and the next one, shape (n,)."""
-    n = len(faces)
+    faces, n = curve.faces, len(curve.faces)
     following = (np.arange(n) + 1) % n
-    support = np.where(barycentric > 0.0, mesh.faces[faces], -1)
+    support = np.where(curve.barycentric > 0.0, mesh.faces[faces], -1)
     found = faces.copy()
     unknown = ~_contains(mesh.faces[found], support[following])
     found[unknown] = faces[following][unknown]
     unknown &= ~_contains(mesh.faces[found], support)
-    if not closed:
+    if not curve.closed:
         unknown[-1] = False
     for point in np.flatnonzero(unknown).tolist():
-        both = np.concatenate([support[point], support[following[point]]])
+        beyond = int(following[point])
+        both = np.concatenate([support[point], support[beyond]])
         common = mesh.faces_with(both[both >= 0])
+        if not len(common) and across_gaps:
+            common = _faces_near(mesh, curve, point, beyond)
         if not len(common):
             raise CurveError(
-                f"curve is not on this mesh: no face contains its points {point} and "
-                f"{int(following[point])}; pass the mesh that it was designed on, or, if faces "
-                "there share no vertices, merge vertices by distance and design it again"
+                f"curve is not on this mesh: no face contains its points {point} and {beyond}; "
+                "pass the mesh that it was designed on, or, if faces there share no vertices, "
+                "merge vertices by distance and design it again"
             )
         found[point] = common[0]
     return found
+
+
+def _faces_near(mesh: Mesh, curve: SurfaceCurve, one: int, other: int) -> IntArray:
+    """Those of the faces of two points that also hold the other point, up to a gap."""
+    points = SurfacePoints(curve.faces, curve.barycentric)
+    positions = points[np.array([one, other])].positions(mesh)
+    within = max(GAP * mesh.diagonal, rounding(positions))
+    sides = ((curve.faces[other], positions[:1]), (curve.faces[one], positions[1:]))
+    return np.array(
+        [face for face, place in sides if nearest_points(mesh, place, face[None])[1][0] <= within],
+        dtype=np.int64,
+    )
 
 
 def _contains(corners: IntArray, support: IntArray) -> BoolArray:

@@ -234,11 +234,11 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
     flat = ~np.isfinite(points.barycentric).all(axis=1)
     for place in np.flatnonzero(flat):
         corners = mesh.vertices[mesh.faces[points.faces[place]]]
-        points.barycentric[place] = _on_longest_edge(corners, positions[place])
+        points.barycentric[place] = on_longest_edge(corners, positions[place])
     return points
 
 
-def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
+def on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
     """Barycentric coordinates of the nearest point on the longest edge of a degenerate triangle."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     start = int(lengths.argmax())

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, curve_on_mesh
+from ..geometry.curve import SurfaceCurve, curve_on_mesh, weights_in_faces
 from ..geometry.grouping import stable_order
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points, snapped
@@ -198,9 +198,8 @@ class MappedMesh:
         given, found = points.positions(self.original), polyline[passed].positions(self.original)
         away = np.linalg.norm(found[:, None] - given, axis=2)
         nearest = away.argmin(axis=1)
-        same = max(tolerances.ROUNDED * self.original.diagonal, tolerances.rounding(given))
         exact = {}
-        for rank in np.flatnonzero(away.min(axis=1) > same):
+        for rank in np.flatnonzero(away.min(axis=1) > tolerances.ROUNDED * self.original.diagonal):
             exact[int(passed[rank])] = points[nearest[[rank]]]
         return exact
 
@@ -219,18 +218,32 @@ class MappedMesh:
         return curve_on_mesh(self.mesh, curve.closed, faces, barycentric, curve.control_index)
 
     def _parts_of_segments(self, curve: SurfaceCurve) -> tuple[IntArray, FloatArray]:
-        """Face of the mesh that contains each point and the next one, or -1; coordinates in it."""
+        """Face of the mesh that contains each segment, or -1; coordinates of its start there.
+
+        A segment in a removed face has no length, or almost; any face at its start serves.
+        """
         n = len(curve.faces)
         faces, barycentric = np.full(n, -1), np.zeros((n, 3))
-        points = SurfacePoints(curve.faces, curve.barycentric)
-        representations = self.representations(points)
-        for place, here in enumerate(representations):
-            # The last point of an open curve lies on the segment before it.
-            beside = place + 1 if place + 1 < n else (0 if curve.closed else place - 1)
-            both = np.isin(here.faces, representations[beside].faces)
-            if both.any():
-                faces[place] = here.faces[both][0]
-                barycentric[place] = here.barycentric[both][0]
+        following = np.append(np.arange(1, n), 0 if curve.closed else n - 1)
+        ends = weights_in_faces(
+            self.original, curve.faces[following], curve.barycentric[following], curve.faces
+        )
+        for place, face in enumerate(curve.faces.tolist()):
+            if self.removed[face]:
+                there = self._at_position(curve.points[[place]])
+                if len(there):
+                    faces[place], barycentric[place] = there.faces[0], there.barycentric[0]
+                continue
+            parts = self._parts_of(face)
+            both = np.stack([curve.barycentric[place], ends[place]])
+            local = np.broadcast_to(both, (len(parts), 2, 3))
+            if self.corners is not None:
+                local = local @ np.linalg.inv(self.corners[parts])
+            least = local.min(axis=(1, 2))
+            if len(parts) and least.max() >= -tolerances.SNAP:
+                best = int(least.argmax())
+                start = np.where(local[best, 0] < tolerances.ROUNDED, 0.0, local[best, 0])
+                faces[place], barycentric[place] = parts[best], start / start.sum()
         return faces, barycentric
 
     def field_to_original(self, values: FloatArray) -> FloatArray:

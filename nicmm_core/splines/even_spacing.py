@@ -12,12 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, checked_curve
+from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
 from ..geometry.distances import distance_to_segments
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import weights_at
 from .polyline import CutPolyline, cut_polyline
 
 SHORTEST = 0.5
@@ -93,40 +91,21 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     CurveError
         If the curve does not lie on this mesh.
     """
-    mesh, curve, segment_faces = _checked(mesh, curve)
+    curve, segment_faces = checked_curve(mesh, curve, across_gaps=True)
     places = even_places(curve.points, curve.closed, curve.control_index, tolerance)
     segment, share, control_index = places
     following = (segment + 1) % len(curve.faces)
     between = share > 0.0
     faces = np.where(between, segment_faces[segment], curve.faces[segment])
-    corners = mesh.faces[faces]
+    end_of = np.where(between, following, segment)
     start, end = (
-        weights_at(mesh.faces[curve.faces[point]], curve.barycentric[point], corners)
-        for point in (segment, following)
+        weights_in_faces(mesh, curve.faces[point], curve.barycentric[point], faces)
+        for point in (segment, end_of)
     )
     weights = (1.0 - share)[:, None] * start + share[:, None] * end
     barycentric = np.where(between[:, None], weights, curve.barycentric[segment])
-    positions = (barycentric[:, :, None] * mesh.vertices[corners]).sum(axis=1)
+    positions = (barycentric[:, :, None] * mesh.vertices[mesh.faces[faces]]).sum(axis=1)
     return SampledCurve(curve.closed, faces, barycentric, positions, control_index)
-
-
-def _checked(mesh: Mesh, curve: SurfaceCurve) -> tuple[Mesh, SurfaceCurve, IntArray]:
-    """`checked_curve`, and the mesh with which it succeeds.
-
-    If faces have equal positions but not the same vertices, as in a soup of triangles, this is the
-    mesh whose faces share them; its faces and their corners are numbered as before.
-    """
-    try:
-        return mesh, *checked_curve(mesh, curve)
-    except CurveError:
-        _, first, shared = np.unique(
-            mesh.vertices + 0.0, axis=0, return_index=True, return_inverse=True
-        )
-        faces = shared.reshape(-1)[mesh.faces]
-        if len(first) == len(mesh.vertices) or (faces == np.roll(faces, 1, axis=1)).any():
-            raise
-        joined = Mesh(mesh.vertices[first], faces)
-        return joined, *checked_curve(joined, curve)
 
 
 def even_places(

@@ -5,6 +5,8 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
+from nicmm_core.geometry.curve import point_on_segment
+from nicmm_core.splines.even_spacing import even_curve
 from tests.core.checks import apart
 from tests.oracles import same_surface
 from tests.oracles.checker import judge
@@ -65,6 +67,24 @@ def test_a_curve_starts_from_a_curve_across_removed_faces(name):
     assert not judge(mesh, again, points).faults
     length = first.curves[0].length
     assert abs(again.curves[0].length - length) < 0.01 * length
+
+
+@pytest.mark.parametrize(
+    "name", ["soup", "gaps", "T-junctions", "faces without area", "turned, doubled soup"]
+)
+def test_a_curve_starts_from_a_curve_on_a_changed_mesh(name):
+    """Also a curve across edges whose two faces share no vertices; and it is sampled evenly."""
+    changed = same_surface.changed(BODY, name, 8)
+    mesh, points = changed.mesh, changed.number[POINTS]
+    designer = nicmm.Designer(mesh)
+    first = designer.design(points).curves[0]
+    again = designer.design(points, start=first)
+    assert not judge(mesh, again, points).faults
+    assert abs(again.curves[0].length - first.length) < 1e-3 * first.length
+    even = even_curve(mesh, first, 1e-3 * mesh.diagonal)
+    assert apart(even.points, first.points) <= 2e-3 * mesh.diagonal
+    place = point_on_segment(mesh, first, 7, 0.5).positions(mesh)[0]
+    np.testing.assert_allclose(place, 0.5 * (first.points[7] + first.points[8]), atol=1e-6)
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-7])
