@@ -18,7 +18,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import further_starts
+from nicmm_core import improvement
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.geometry.array_types import FloatArray, IntArray
@@ -336,8 +336,8 @@ def _random_weights(generator: np.random.Generator) -> Iterator[None]:
 
     with (
         mock.patch.object(course_search, "with_control_points", with_weights),
-        mock.patch.object(further_starts, "FURTHER_SEEDS", ()),
-        mock.patch.object(further_starts, "SEARCHES_FOR_PARTS", 0),
+        mock.patch.object(improvement, "FURTHER_SEEDS", ()),
+        mock.patch.object(improvement, "SEARCHES_FOR_PARTS", 0),
     ):
         yield
 

@@ -12,7 +12,7 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import further_starts
+from nicmm_core import improvement
 from nicmm_core.courses import attempts
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
@@ -136,8 +136,8 @@ def _timed(mesh: Mesh, points: IntArray, method: str) -> tuple[nicmm.Design, flo
 def _effort(repeated: int, parts: int, work: int) -> Iterator[None]:
     """Design with other numbers of searches and another bound on work."""
     with (
-        mock.patch.object(further_starts, "FURTHER_SEEDS", range(1, 1 + repeated)),
-        mock.patch.object(further_starts, "SEARCHES_FOR_PARTS", parts),
+        mock.patch.object(improvement, "FURTHER_SEEDS", range(1, 1 + repeated)),
+        mock.patch.object(improvement, "SEARCHES_FOR_PARTS", parts),
         mock.patch.object(attempts, "MOST_WORK", work * attempts.MOST_WORK),
     ):
         yield

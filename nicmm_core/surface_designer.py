@@ -11,14 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from .courses.attempts import (
-    Attempts,
-)
+from .courses.attempts import Attempts
 from .design_result import Design
-from .further_starts import FurtherStarts, relaxation_config
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
+from .improvement import Improvement, relaxation_config
 from .level_set import variational
 from .level_set.curve_field import curve_field
 from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
@@ -143,21 +141,22 @@ class SurfaceDesigner:
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return self._relaxed_design(request, start, first, started)
             n_points = len(request.points) + sum(map(len, request.via_points.values()))
-            attempts = Attempts(start.surface, request.smoothness, n_points)
-            further = FurtherStarts(self._search, request, attempts)
-            further.add(start, first)
+            attempts = Attempts(start.surface, request.smoothness, n_points, relaxed=[first])
+            improvement = Improvement(
+                self._search,
+                request,
+                partial(_relaxed_unless_cancelled, request),
+                attempts,
+                [start],
+            )
             cancelled = False
             try:
-                for other, config in further.in_turn(courses, by_course):
-                    relaxed = _relaxed(request, other, config)
-                    if relaxed.status is Status.CANCELLED:
-                        raise CancelledError
-                    further.add(other, relaxed)
+                improvement.improve(courses, by_course)
             except CancelledError:
                 cancelled = True
         best, *others = [
-            self._relaxed_design(request, further.starts[each], attempts.relaxed[each], started)
-            for each in attempts.by_energy()[: 1 + request.alternatives]
+            self._relaxed_design(request, improvement.starts[i], attempts.relaxed[i], started)
+            for i in attempts.by_energy()[: 1 + request.alternatives]
         ]
         status = Status.CANCELLED if cancelled else best.status
         return replace(best, status=status, alternatives=others)
@@ -233,6 +232,14 @@ def _relaxed(
     if start.unsettled is not None:
         movable = movable_near(start.surface.mesh, start.unsettled, start.unit)
     return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
+
+
+def _relaxed_unless_cancelled(request: Request, start: Start, config: RelaxationConfig) -> Relaxed:
+    """Relax a start; raises CancelledError if that is cancelled."""
+    relaxed = _relaxed(request, start, config)
+    if relaxed.status is Status.CANCELLED:
+        raise CancelledError
+    return relaxed
 
 
 class _FieldWatch:

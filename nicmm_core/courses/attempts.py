@@ -86,9 +86,9 @@ class Attempts:
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     relaxed : list of Relaxed
         The result of each attempt.
-    fruitless : int
+    searches_without_gain : int
         Number of consecutive searches, up to the last one completed, that have gained little.
-    agreed : bool
+    repeat_found_same_curve : bool
         Whether the last search for the whole curve has found the best curve of before once more,
         and no other search has found a better one since.
     """
@@ -99,8 +99,8 @@ class Attempts:
     searches: int = 1
     parts: int = 0
     relaxed: list[Relaxed] = field(default_factory=list)
-    fruitless: int = 0
-    agreed: bool = False
+    searches_without_gain: int = 0
+    repeat_found_same_curve: bool = False
     _relaxed_before: int = 0  # number of results when the last search ended
 
     @property
@@ -123,7 +123,7 @@ class Attempts:
         before = self._relaxed_before
         self._relaxed_before = len(self.relaxed)
         if not before or before == len(self.relaxed):
-            self.fruitless += bool(before)
+            self.searches_without_gain += bool(before)
             return
         energies = energies_of(self.surface, self.curves, self.smoothness)
         least, found = min(energies[:before]), min(energies[before:])
@@ -132,39 +132,41 @@ class Attempts:
         unpainted = replace(self.surface, feature_map=None)
         (elastic,) = energies_of(unpainted, [earlier], self.smoothness)
         gained = least - found > LEAST_GAIN * elastic
-        self.fruitless = 0 if gained else self.fruitless + 1
+        self.searches_without_gain = 0 if gained else self.searches_without_gain + 1
         if gained or not of_part:
             latest = self.curves[before + energies[before:].index(found)]
-            self.agreed = not gained and not is_apart(self.surface, latest, [earlier])
+            self.repeat_found_same_curve = not gained and not is_apart(
+                self.surface, latest, [earlier]
+            )
 
-    def another_search_pays(self) -> bool:
+    def should_search_again(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
 
         The first repeated search is worthwhile if the best curve bends; those after it, only if it
         is still extremely bent and two searches have not found the same curve.
         """
         least = STRONGLY_BENT if self.searches == 1 else EXTREMELY_BENT
-        promising = self._bending > least and not self.agreed
+        promising = self._bending > least and not self.repeat_found_same_curve
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
-    def another_course_pays(self, first: int) -> bool:
+    def should_try_another_course(self, first: int) -> bool:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
         least = min(scaled_bending(each.noded_curve) for each in self.relaxed[first:])
         mean = self._work_of_relaxations / len(self.relaxed)
         return least > EXTREMELY_BENT and self._is_affordable(mean + RESERVED)
 
-    def part_pays(self) -> bool:
+    def should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
         bending = self._bending
         allowed = FRUITLESS_PARTS if bending > EXTREMELY_BENT else 1
-        promising = bending > PARTLY_BENT and self.fruitless < allowed
+        promising = bending > PARTLY_BENT and self.searches_without_gain < allowed
         return promising and self._is_affordable(WORK_OF_PART)
 
-    def tightening_pays(self) -> bool:
+    def should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
         return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
 
-    def network_pays(self) -> bool:
+    def should_try_network(self) -> bool:
         """Whether the best curve has kinks, and an attempt by the network is affordable."""
         mean = self._work_of_relaxations / len(self.relaxed)
         return self._is_kinked and self._is_affordable(self._work_of_search + mean)

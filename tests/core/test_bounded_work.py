@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import further_starts, shapes, start_search
+from nicmm_core import improvement, shapes, start_search
 from nicmm_core.courses import attempts
 from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
 from nicmm_core.relaxation import levenberg_marquardt, noded_curve, relaxing
@@ -121,8 +121,8 @@ def test_repeated_searches_are_bounded(monkeypatch):
         yield from seek(self, request, seed, most_failures)
 
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
-    monkeypatch.setattr(further_starts, "SEARCHES_FOR_PARTS", 0)
-    monkeypatch.setattr(further_starts, "FURTHER_SEEDS", range(1, 6))
+    monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)
+    monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
     monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "EXTREMELY_BENT", 1e9)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import further_starts, shapes, start_search
+from nicmm_core import improvement, shapes, start_search
 from nicmm_core.courses import attempts
 from nicmm_core.courses.bent_part import (
     APART,
@@ -143,14 +143,14 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
 
 def test_searches_for_parts_are_bounded(monkeypatch):
     parts = []
-    select = further_starts.bent_part
+    select = improvement.bent_part
 
     def counted(curve, tried):
         parts.append(len(tried))
         return select(curve, tried)
 
-    monkeypatch.setattr(further_starts, "bent_part", counted)
-    monkeypatch.setattr(further_starts, "FURTHER_SEEDS", ())
+    monkeypatch.setattr(improvement, "bent_part", counted)
+    monkeypatch.setattr(improvement, "FURTHER_SEEDS", ())
     monkeypatch.setattr(attempts, "PARTLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "EXTREMELY_BENT", 0.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)

@@ -1,15 +1,16 @@
-"""Decides what to relax after the first start of a curve, as long as it pays.
+"""Improves the first curve of a request by further attempts, while their gain justifies the work.
 
 In turn: other courses of the first search, the courses of a repeated search, the best curve with
 other parts, the courses of more searches, and for kinks the same start with more tension and the
-curve of the network. At last come courses for alternatives. `courses.attempts` tells what pays.
+curve of the network. At last come courses for alternatives. `courses.attempts` decides whether each
+of them is made.
 """
 
 from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from .courses.attempts import (
@@ -45,32 +46,35 @@ def relaxation_config(request: Request) -> RelaxationConfig:
 
 
 @dataclass
-class FurtherStarts:
-    """The starts of one curve that have been relaxed so far, and what to relax next.
+class Improvement:
+    """The attempts at one curve, each of which relaxes one start.
 
     Attributes
     ----------
     search : StartSearch
     request : Request
+    relax : callable
+        Relaxes a start with some settings; raises `CancelledError` if the caller stops it.
     attempts : Attempts
-        The result of each start.
+        The results, and whether another attempt is worth its work.
     starts : list of Start
+        The start of each attempt.
     """
 
     search: StartSearch
     request: Request
+    relax: Callable[[Start, RelaxationConfig], Relaxed]
     attempts: Attempts
     starts: list[Start] = field(default_factory=list)
 
-    def add(self, start: Start, relaxed: Relaxed) -> None:
-        """Record a start and its relaxed curve."""
+    def attempt(self, start: Start, config: RelaxationConfig) -> None:
+        """Relax a start."""
+        relaxed = self.relax(start, config)
         self.starts.append(start)
         self.attempts.relaxed.append(relaxed)
 
-    def in_turn(
-        self, courses: Iterator[Start], by_course: bool
-    ) -> Iterator[tuple[Start, RelaxationConfig]]:
-        """What to relax next; the caller adds each start before it asks for the next one.
+    def improve(self, courses: Iterator[Start], by_course: bool) -> None:
+        """Make all attempts that follow the first one.
 
         Parameters
         ----------
@@ -83,48 +87,46 @@ class FurtherStarts:
         request, attempts = self.request, self.attempts
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         if by_course:
-            yield from self._other_courses(courses)
+            self._try_other_courses(courses)
             attempts.end_search()
-            yield from self._of_further_searches(further)
-        if attempts.tightening_pays():
-            yield self.starts[attempts.best], attempts.limited(TIGHTENED)
-        if by_course and attempts.network_pays():
+            self._search_again(further)
+        if attempts.should_tighten():
+            self.attempt(self.starts[attempts.best], attempts.limited(TIGHTENED))
+        if by_course and attempts.should_try_network():
             # On steps and creases, the network's path may be better than any course. It is only
             # another candidate, so its errors do not matter.
+            start = None
             with contextlib.suppress(NicmmError):
-                yield self.search.by_network(request), self._config
+                start = self.search.by_network(request)
+            if start is not None:
+                self.attempt(start, self._config)
         if request.alternatives:
             others = itertools.chain(courses, *further[: max(attempts.searches - 1, 1)])
             new = (start for start in others if is_new(start, attempts.curves))
-            most = MAX_COURSES_RELAXED + 2 * request.alternatives
-            config = relaxation_config(request)
-            yield from ((start, config) for start in itertools.islice(new, most))
+            for start in itertools.islice(new, MAX_COURSES_RELAXED + 2 * request.alternatives):
+                self.attempt(start, relaxation_config(request))
 
     @property
     def _config(self) -> RelaxationConfig:
         """Settings with at most the work that is left."""
         return self.attempts.limited(relaxation_config(self.request))
 
-    def _of_further_searches(
-        self, further: list[Iterator[Start]]
-    ) -> Iterator[tuple[Start, RelaxationConfig]]:
-        """The courses of one repeated search, other parts, and the courses of more searches."""
+    def _search_again(self, further: list[Iterator[Start]]) -> None:
+        """Try the courses of one repeated search, other parts, and the courses of more searches."""
         found = True
         for courses in further[:1]:
-            if self.attempts.another_search_pays():
-                found = yield from self._of_search(courses)
-        yield from self._with_other_parts()
+            if self.attempts.should_search_again():
+                found = self._try_courses(courses)
+        self._try_other_parts()
         for courses in further[1:]:
-            if not (found and self.attempts.another_search_pays()):
+            if not (found and self.attempts.should_search_again()):
                 break
-            found = yield from self._of_search(courses)
-            if self.attempts.fruitless == 0:
-                yield from self._with_other_parts()
+            found = self._try_courses(courses)
+            if self.attempts.searches_without_gain == 0:
+                self._try_other_parts()
 
-    def _of_search(
-        self, courses: Iterator[Start]
-    ) -> Generator[tuple[Start, RelaxationConfig], None, bool]:
-        """The best courses of a repeated search; returns whether there were any.
+    def _try_courses(self, courses: Iterator[Start]) -> bool:
+        """Try the best courses of a repeated search; returns whether there were any.
 
         On rough meshes hardly any course is simple, and each failure takes long.
         """
@@ -132,17 +134,17 @@ class FurtherStarts:
         start = next(courses, None)
         if start is None:
             return False
-        yield start, self._config
-        yield from self._other_courses(courses)
+        self.attempt(start, self._config)
+        self._try_other_courses(courses)
         self.attempts.end_search()
         return True
 
-    def _other_courses(self, courses: Iterator[Start]) -> Iterator[tuple[Start, RelaxationConfig]]:
-        """The next courses of a search as long as its best curve is extremely bent."""
+    def _try_other_courses(self, courses: Iterator[Start]) -> None:
+        """Try the next courses of a search as long as its best curve is extremely bent."""
         first = len(self.starts) - 1
         while (
             len(self.starts) - first < COURSES_OF_A_SEARCH
-            and self.attempts.another_course_pays(first)
+            and self.attempts.should_try_another_course(first)
         ):  # fmt: skip
             known = [
                 start.curve for start in self.starts[first:] if isinstance(start.curve, NodedCurve)
@@ -150,15 +152,15 @@ class FurtherStarts:
             start = next((start for start in courses if is_new(start, known)), None)
             if start is None:
                 break
-            yield start, self._config
+            self.attempt(start, self._config)
 
-    def _with_other_parts(self) -> Iterator[tuple[Start, RelaxationConfig]]:
-        """The best curve with other courses in the parts that bend most."""
+    def _try_other_parts(self) -> None:
+        """Try the best curve with other courses in the parts that bend most."""
         attempts = self.attempts
         tried: list[FloatArray] = []
-        attempts.fruitless = 0  # whether parts pay does not follow from the searches before
+        attempts.searches_without_gain = 0  # those before say nothing about parts
         for _ in range(SEARCHES_FOR_PARTS):
-            if not attempts.part_pays():
+            if not attempts.should_try_another_part():
                 break
             best = attempts.best
             curve = attempts.curves[best]
@@ -169,7 +171,7 @@ class FurtherStarts:
             attempts.parts += 1
             courses = self.search.with_other_part(self.request, self.starts[best], curve, part)
             for start in itertools.islice(courses, COURSES_OF_A_PART):
-                yield start, attempts.limited(WARM)
+                self.attempt(start, attempts.limited(WARM))
             attempts.end_search(of_part=True)
-            if attempts.fruitless == 0:
+            if attempts.searches_without_gain == 0:
                 tried = []  # the best curve is another one now
