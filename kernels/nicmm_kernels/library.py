@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Loads the library, and checks everything that is passed to it.
+
+The library trusts the sizes that it is given, so they are all derived from the arrays here, and
+nothing else in the project calls it. It checks every index before it uses it.
+
+A call may not take long, since other code has to look after progress and cancelling. So a function
+whose work has no small bound stops after a certain amount of it, and is called again until all is
+done; in between, it calls a function of the caller.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+MOST_WORK = 500_000
+"""Number of faces that a call may cross before it returns, which takes some 0.03 s."""
+
+LIBRARY_VARIABLE = "NICMM_KERNELS_LIBRARY"
+"""Environment variable with the path of another library, such as one that checks itself."""
+
+_FILES = {"win32": "nicmm_kernels.dll", "darwin": "libnicmm_kernels.dylib"}
+_ERRORS = {
+    1: "an index is out of range",
+    2: "an array is too small",
+    3: "a value is NaN or infinite",
+    4: "a matrix is not positive definite",
+}
+_FLOAT, _INT, _BOOL = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.bool_)
+_POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
+
+
+class KernelError(RuntimeError):
+    """A kernel is not installed, or was given data that it cannot use."""
+
+
+# The library
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    given = os.environ.get(LIBRARY_VARIABLE)
+    file = _FILES.get(sys.platform, "libnicmm_kernels.so")
+    path = Path(given) if given else Path(__file__).resolve().with_name(file)
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise KernelError(
+            f"The compiled kernels of NICMM Curves for {platform.system()} on "
+            f"{platform.machine()} cannot be loaded from {path} ({error}). Install the package "
+            "for this platform; in a copy of the sources, run: python3 build.py test --quick"
+        ) from error
+    reference = ctypes.POINTER
+    library.trace_from.argtypes = [
+        reference(_Mesh), _POINTER, reference(TraceLimits), _COUNT, *[_POINTER] * 5,
+        reference(_COUNT), _COUNT, reference(_COUNT),
+    ]  # fmt: skip
+    library.trace_between.argtypes = [
+        reference(_Mesh), _POINTER, _COUNT, _COUNT, reference(_TracePairs), reference(_Crossings),
+        _COUNT, reference(_COUNT),
+    ]  # fmt: skip
+    return library
+
+
+def _check(code: int, name: str) -> None:
+    if code:
+        raise KernelError(f"{name}: {_ERRORS.get(code, f'unknown error {code}')}")
+
+
+# Arrays
+
+
+def _address(name: str, array: Any, dtype: np.dtype[Any], *shape: int) -> int:
+    """The address of an array, which has to have this type and shape and to be contiguous."""
+    if not isinstance(array, np.ndarray):
+        raise KernelError(f"{name} is {type(array).__name__}; pass an array")
+    if array.dtype != dtype:
+        raise KernelError(f"{name} has type {array.dtype}; pass {dtype}")
+    if array.shape != shape:
+        raise KernelError(f"{name} has shape {array.shape}; pass {shape}")
+    if not array.flags.c_contiguous:
+        raise KernelError(f"{name} has strides {array.strides}; pass a contiguous array")
+    return array.ctypes.data
+
+
+def _optional(name: str, array: Any, dtype: np.dtype[Any], *shape: int) -> int | None:
+    return None if array is None else _address(name, array, dtype, *shape)
+
+
+def _rows(name: str, array: Any) -> int:
+    """Length of the first axis of an array, from which other shapes follow."""
+    if not isinstance(array, np.ndarray) or array.ndim == 0:
+        raise KernelError(f"{name} is {type(array).__name__}; pass an array of items")
+    return len(array)
+
+
+# The mesh
+
+
+class _Mesh(ctypes.Structure):
+    _fields_ = [
+        ("vertices", _POINTER),
+        ("faces", _POINTER),
+        ("face_normals", _POINTER),
+        ("opposite_sides", _POINTER),
+        ("vertex_count", _COUNT),
+        ("face_count", _COUNT),
+        ("is_oriented", _COUNT),
+    ]
+
+
+class MeshArrays:
+    """The arrays of a mesh, checked once for all calls. They must not change afterwards.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+        Positions.
+    faces : (F, 3) int array
+        Vertices of each face.
+    face_normals : (F, 3) float array
+        Unit vectors; zero where a face has no area.
+    opposite_sides : (3 F,) int array
+        For side 3 f + j, opposite corner j of face f, the same edge as a side of the adjacent face;
+        the side itself where there is none, or more than one.
+    is_oriented : bool
+        Whether no two faces traverse an edge in the same direction.
+    """
+
+    def __init__(
+        self,
+        vertices: FloatArray,
+        faces: IntArray,
+        face_normals: FloatArray,
+        opposite_sides: IntArray,
+        is_oriented: bool,
+    ) -> None:
+        self.vertex_count = _rows("vertices", vertices)
+        self.face_count = _rows("faces", faces)
+        self._given = (vertices, faces, face_normals, opposite_sides, is_oriented)
+        self.pointers = _Mesh(
+            _address("vertices", vertices, _FLOAT, self.vertex_count, 3),
+            _address("faces", faces, _INT, self.face_count, 3),
+            _address("face_normals", face_normals, _FLOAT, self.face_count, 3),
+            _address("opposite_sides", opposite_sides, _INT, 3 * self.face_count),
+            self.vertex_count,
+            self.face_count,
+            int(is_oriented),
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies have pointers of their own."""
+        return MeshArrays, self._given
+
+
+# Traces
+
+
+class TraceLimits(ctypes.Structure):
+    """Limits of traces.
+
+    Parameters
+    ----------
+    least_inside : float
+        Least barycentric coordinate of a point strictly inside its face.
+    most_faces : int
+        Number of faces after which a trace ends.
+    """
+
+    _fields_ = [("least_inside", ctypes.c_double), ("most_faces", _COUNT)]
+
+
+def trace_from(
+    mesh: MeshArrays,
+    faces: IntArray,
+    barycentric: FloatArray,
+    directions: FloatArray,
+    lengths: FloatArray,
+    folded: BoolArray | None,
+    limits: TraceLimits,
+    meanwhile: Callable[[], object],
+) -> tuple[IntArray, FloatArray, BoolArray, int]:
+    """Move m points straight along the surface.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+    faces : (m,) int array
+        Faces of the points.
+    barycentric : (m, 3) float array
+        Coordinates in them, all of them positive.
+    directions : (m, 3) float array
+        Unit vectors, nearly tangent to the faces.
+    lengths : (m,) float array
+        Distances to move, in mesh units; not negative.
+    folded : (F,) bool array or None
+        Faces over which traces run backward.
+    limits : TraceLimits
+    meanwhile : callable
+        Called after every `MOST_WORK` faces.
+
+    Returns
+    -------
+    (m,) int array, (m, 3) float array
+        Faces of the moved points and coordinates in them.
+    (m,) bool array
+        Whether each point stopped at a boundary or a non-manifold edge.
+    int
+        Greatest number of faces that a point passed.
+    """
+    m = _rows("faces", faces)
+    _address("faces", faces, _INT, m)
+    _address("barycentric", barycentric, _FLOAT, m, 3)
+    faces, barycentric, blocked = faces.copy(), barycentric.copy(), np.zeros(m, dtype=np.bool_)
+    done, most_passed = _COUNT(0), _COUNT(0)
+    arguments = (
+        mesh.pointers, _optional("folded", folded, _BOOL, mesh.face_count), limits, m,
+        faces.ctypes.data, barycentric.ctypes.data,
+        _address("directions", directions, _FLOAT, m, 3), _address("lengths", lengths, _FLOAT, m),
+        blocked.ctypes.data, most_passed, MOST_WORK, done,
+    )  # fmt: skip
+    while done.value < m:
+        if done.value:
+            meanwhile()
+        _check(_library().trace_from(*arguments), "trace_from")
+    return faces, barycentric, blocked, most_passed.value
+
+
+class _TracePairs(ctypes.Structure):
+    _fields_ = [
+        ("start_faces", _POINTER),
+        ("starts", _POINTER),
+        ("end_faces", _POINTER),
+        ("ends", _POINTER),
+        ("normals", _POINTER),
+        ("ahead", _POINTER),
+        ("longest", _POINTER),
+        ("fold_margin", ctypes.c_double),
+        ("reached", _POINTER),
+        ("crossing_counts", _POINTER),
+    ]
+
+
+class _Crossings(ctypes.Structure):
+    _fields_ = [("room", _COUNT), ("count", _COUNT), ("faces", _POINTER), ("barycentric", _POINTER)]
+
+
+CROSSINGS_OF_A_TRACE = 8
+"""Number of crossings for which there is room for each trace; where it is not enough, traces are
+found in several calls."""
+
+
+def trace_between(
+    mesh: MeshArrays,
+    starts: tuple[IntArray, FloatArray],
+    ends: tuple[IntArray, FloatArray],
+    normals: FloatArray,
+    longest: FloatArray,
+    folded: BoolArray | None,
+    fold_margin: float,
+    ahead: FloatArray | None,
+    most_faces: int,
+    meanwhile: Callable[[], object],
+) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+    """Trace between m pairs of points.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+    starts, ends : tuple of (m,) int array and (m, 3) float array
+        Faces of the points and barycentric coordinates in them; those of starts are positive.
+    normals : (m, 3) float array
+        Vectors in the planes of the traces, besides those from the starts to the ends.
+    longest : (m,) float array
+        Greatest lengths up to the faces of the ends, in mesh units.
+    folded : (F,) bool array or None
+        Faces over which the length of traces counts as negative.
+    fold_margin : float
+        Additional length, in mesh units, before such parts are subtracted.
+    ahead : (m, 3) float array or None
+        Directions in which the traces leave their starts; by default those to the ends.
+    most_faces : int
+        Number of faces after which a trace ends.
+    meanwhile : callable
+        Called between two calls of the kernel, at least after every `MOST_WORK` faces.
+
+    Returns
+    -------
+    (m,) bool array
+        Whether each trace reached its end.
+    (m,) int array
+        Number of crossings of each trace with edges; 0 if it did not reach its end.
+    (q,) int array, (q, 3) float array
+        The crossings in order: the face that is entered, and barycentric coordinates in it.
+    """
+    m = _rows("longest", longest)
+    room = most_faces + CROSSINGS_OF_A_TRACE * m
+    reached, counts = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.int64)
+    pairs = _TracePairs(
+        _address("start faces", starts[0], _INT, m), _address("starts", starts[1], _FLOAT, m, 3),
+        _address("end faces", ends[0], _INT, m), _address("ends", ends[1], _FLOAT, m, 3),
+        _address("normals", normals, _FLOAT, m, 3), _optional("ahead", ahead, _FLOAT, m, 3),
+        _address("longest", longest, _FLOAT, m), fold_margin,
+        reached.ctypes.data, counts.ctypes.data,
+    )  # fmt: skip
+    faces, barycentric = np.empty(room, dtype=np.int64), np.empty((room, 3))
+    crossings = _Crossings(room, 0, faces.ctypes.data, barycentric.ctypes.data)
+    done = _COUNT(0)
+    arguments = (
+        mesh.pointers, _optional("folded", folded, _BOOL, mesh.face_count), most_faces, m, pairs,
+        crossings, MOST_WORK, done,
+    )  # fmt: skip
+    parts = []
+    while done.value < m:
+        if done.value:
+            meanwhile()
+            crossings.count = 0
+        _check(_library().trace_between(*arguments), "trace_between")
+        parts.append((faces[: crossings.count].copy(), barycentric[: crossings.count].copy()))
+    if len(parts) == 1:
+        return reached, counts, *parts[0]
+    found_faces = np.concatenate([faces[:0], *(part[0] for part in parts)])
+    return reached, counts, found_faces, np.concatenate([barycentric[:0], *(p[1] for p in parts)])
