@@ -6,6 +6,34 @@ of the installed package; there is one for every platform, and it does not depen
 Python. While it computes, other threads of Python run.
 """
 
-from .library import KernelError, MeshArrays, TraceLimits, trace_between, trace_from
+from .library import (
+    ContactRules,
+    EnergyRules,
+    KernelError,
+    MeshArrays,
+    RelaxationRules,
+    SpacingRules,
+    StepRules,
+    SurfaceArrays,
+    TraceLimits,
+    even_arcs,
+    relax_curves,
+    trace_between,
+    trace_from,
+)
 
-__all__ = ["KernelError", "MeshArrays", "TraceLimits", "trace_between", "trace_from"]
+__all__ = [
+    "ContactRules",
+    "EnergyRules",
+    "KernelError",
+    "MeshArrays",
+    "RelaxationRules",
+    "SpacingRules",
+    "StepRules",
+    "SurfaceArrays",
+    "TraceLimits",
+    "even_arcs",
+    "relax_curves",
+    "trace_between",
+    "trace_from",
+]

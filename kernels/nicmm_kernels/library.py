@@ -34,14 +34,15 @@ LIBRARY_VARIABLE = "NICMM_KERNELS_LIBRARY"
 """Environment variable with the path of another library, such as one that checks itself."""
 
 _FILES = {"win32": "nicmm_kernels.dll", "darwin": "libnicmm_kernels.dylib"}
+_TOO_SMALL = 2
 _ERRORS = {
     1: "an index is out of range",
-    2: "an array is too small",
+    _TOO_SMALL: "an array is too small",
     3: "a value is NaN or infinite",
     4: "a matrix is not positive definite",
 }
 _FLOAT, _INT, _BOOL = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.bool_)
-_POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
+_POINTER, _COUNT, _NUMBER = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
 class KernelError(RuntimeError):
@@ -68,6 +69,13 @@ def _library() -> ctypes.CDLL:
     library.trace_from.argtypes = [
         reference(_Mesh), _POINTER, reference(TraceLimits), _COUNT, *[_POINTER] * 5,
         reference(_COUNT), _COUNT, reference(_COUNT),
+    ]  # fmt: skip
+    library.even_arcs.argtypes = [reference(SpacingRules), *[_COUNT] * 4, *[_POINTER] * 6]
+    library.relaxation_items.argtypes = [_COUNT, _COUNT]
+    library.relaxation_items.restype = _COUNT
+    library.relax_curves.argtypes = [
+        reference(_Surface), reference(RelaxationRules), reference(_CurveBatch), _COUNT, _POINTER,
+        _COUNT, _COUNT,
     ]  # fmt: skip
     library.trace_between.argtypes = [
         reference(_Mesh), _POINTER, _COUNT, _COUNT, reference(_TracePairs), reference(_Crossings),
@@ -104,7 +112,7 @@ def _optional(name: str, array: Any, dtype: np.dtype[Any], *shape: int) -> int |
 def _rows(name: str, array: Any) -> int:
     """Length of the first axis of an array, from which other shapes follow."""
     if not isinstance(array, np.ndarray) or array.ndim == 0:
-        raise KernelError(f"{name} is {type(array).__name__}; pass an array of items")
+        raise KernelError(f"{name} is {type(array).__name__}; pass an array")
     return len(array)
 
 
@@ -181,7 +189,7 @@ class TraceLimits(ctypes.Structure):
         Number of faces after which a trace ends.
     """
 
-    _fields_ = [("least_inside", ctypes.c_double), ("most_faces", _COUNT)]
+    _fields_ = [("least_inside", _NUMBER), ("most_faces", _COUNT)]
 
 
 def trace_from(
@@ -249,7 +257,7 @@ class _TracePairs(ctypes.Structure):
         ("normals", _POINTER),
         ("ahead", _POINTER),
         ("longest", _POINTER),
-        ("fold_margin", ctypes.c_double),
+        ("fold_margin", _NUMBER),
         ("reached", _POINTER),
         ("crossing_counts", _POINTER),
     ]
@@ -335,3 +343,318 @@ def trace_between(
         return reached, counts, *parts[0]
     found_faces = np.concatenate([faces[:0], *(part[0] for part in parts)])
     return reached, counts, found_faces, np.concatenate([barycentric[:0], *(p[1] for p in parts)])
+
+
+# Relaxation
+
+
+class _Surface(ctypes.Structure):
+    _fields_ = [
+        ("mesh", _Mesh),
+        ("vertex_normals", _POINTER),
+        ("folded", _POINTER),
+        ("feature_map", _POINTER),
+        ("feature_weight", _NUMBER),
+    ]
+
+
+class SurfaceArrays:
+    """The arrays of a surface, checked once for all calls. They must not change afterwards.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+    vertex_normals : (V, 3) float array
+        Unit vectors of arbitrary sign.
+    folded : (F,) bool array or None
+        Faces that are folded back over others.
+    feature_map : (V,) float array or None
+        φ_fea.
+    feature_weight : float
+        Factor of the map, in 1/length².
+    """
+
+    def __init__(
+        self,
+        mesh: MeshArrays,
+        vertex_normals: FloatArray,
+        folded: BoolArray | None,
+        feature_map: FloatArray | None,
+        feature_weight: float,
+    ) -> None:
+        self.mesh = mesh
+        self._given = (mesh, vertex_normals, folded, feature_map, feature_weight)
+        self.pointers = _Surface(
+            mesh.pointers,
+            _address("vertex_normals", vertex_normals, _FLOAT, mesh.vertex_count, 3),
+            _optional("folded", folded, _BOOL, mesh.face_count),
+            _optional("feature_map", feature_map, _FLOAT, mesh.vertex_count),
+            feature_weight,
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies have pointers of their own."""
+        return SurfaceArrays, self._given
+
+
+class ContactRules(ctypes.Structure):
+    """When two nodes of a curve are in contact.
+
+    Parameters
+    ----------
+    clearance : float
+        Distance below which strands repel, in mean distances between neighbouring nodes.
+    different_strands : float
+        Distance along the curve, in clearances, above which nodes belong to different strands.
+    same_side : float
+        Least cosine between the normals of two nodes in contact.
+    rounded : float
+        Least mean distance between neighbouring nodes, relative to the greatest coordinate.
+    """
+
+    _fields_ = [
+        ("clearance", _NUMBER),
+        ("different_strands", _NUMBER),
+        ("same_side", _NUMBER),
+        ("rounded", _NUMBER),
+    ]
+
+
+class SpacingRules(ctypes.Structure):
+    """How nodes are spaced.
+
+    Parameters
+    ----------
+    nodes_per_radian : float
+        Additional nodes per radian by which the normals turn.
+    short_move : float
+        Move below which a node stays, in mean distances between neighbouring nodes.
+    """
+
+    _fields_ = [("nodes_per_radian", _NUMBER), ("short_move", _NUMBER)]
+
+
+def even_arcs(
+    normals: FloatArray,
+    step_lengths: FloatArray,
+    lengths: FloatArray,
+    fixed: BoolArray,
+    closed: bool,
+    times: int,
+    rules: SpacingRules,
+) -> tuple[FloatArray, FloatArray]:
+    """Arc lengths of c curves of n nodes each, and those at which new nodes are even.
+
+    Parameters
+    ----------
+    normals : (c, n, 3) float array
+        Unit normals of the surface at the nodes. New nodes are closer together where they turn.
+    step_lengths : (c, n) float array
+        Distances from each node to the next; zero at the last node of an open curve.
+    lengths : (c, n) float array
+        Lengths of the ways from each node to the next, which may be longer.
+    fixed : (c, n) bool array
+        Nodes that stay. The first one of each curve is one of them.
+    closed : bool
+        Whether the last node of each curve is joined to its first.
+    times : int
+        Number of new steps for each step.
+    rules : SpacingRules
+
+    Returns
+    -------
+    (c, n + 1) float array
+        Weighted arc lengths at the nodes and at the end of each curve.
+    (c, m) float array
+        Those of the new nodes. There are m = times n of a closed curve, and times (n - 1) + 1 of an
+        open one.
+    """
+    c, n = _curves("fixed", fixed)
+    if times < 1:
+        raise KernelError(f"times is {times}; pass a positive number")
+    arcs = np.zeros((c, n + 1))
+    wanted = np.zeros((c, times * n if closed else times * (n - 1) + 1))
+    _check(
+        _library().even_arcs(
+            rules, c, n, int(closed), times, _address("normals", normals, _FLOAT, c, n, 3),
+            _address("step_lengths", step_lengths, _FLOAT, c, n),
+            _address("lengths", lengths, _FLOAT, c, n), _first_fixed(fixed, c, n),
+            arcs.ctypes.data, wanted.ctypes.data,
+        ),
+        "even_arcs",
+    )  # fmt: skip
+    return arcs, wanted
+
+
+def _curves(name: str, array: Any) -> tuple[int, int]:
+    """Number of curves and of nodes of each, from an array with a row for each curve."""
+    c = _rows(name, array)
+    if array.ndim != 2 or array.shape[1] == 0:
+        raise KernelError(f"{name} has shape {array.shape}; pass one row per curve")
+    return c, array.shape[1]
+
+
+def _first_fixed(fixed: BoolArray, c: int, n: int) -> int:
+    """The address of the marks of fixed nodes, (c, n), which include the first of each curve."""
+    address = _address("fixed", fixed, _BOOL, c, n)
+    if not fixed[:, 0].all():
+        raise KernelError("fixed is False at the first node of a curve; it must not move")
+    return address
+
+
+class EnergyRules(ctypes.Structure):
+    """How the terms of the energy are balanced.
+
+    Parameters
+    ----------
+    smoothness : float
+        Divisor of the tension and of the weight of a map.
+    over_tension : float
+        Multiple of the tension that is added to the weight of a map.
+    contact : float
+        Contact energy of a curve whose strands touch everywhere, relative to its energy without
+        maps; 0 if strands may cross.
+    shortest : float
+        Least length of a step by which the tension is divided, in mesh units.
+    """
+
+    _fields_ = [
+        ("smoothness", _NUMBER),
+        ("over_tension", _NUMBER),
+        ("contact", _NUMBER),
+        ("shortest", _NUMBER),
+    ]
+
+
+class StepRules(ctypes.Structure):
+    """How many steps are taken, and how far they go.
+
+    Lengths are in mean distances between neighbouring nodes.
+
+    Parameters
+    ----------
+    iterations : int
+        Greatest number of steps.
+    respacing : int
+        Number of steps from one respacing of the nodes to the next.
+    quiet : int
+        Number of consecutive quiet steps after which a curve has converged.
+    least_decrease : float
+        Relative decrease of the energy up to which a step counts as quiet, if no node has moved by
+        more than half of `longest_move` either.
+    longest_move : float
+        Trust radius of the linearised energy.
+    least_damping, most_damping : float
+        Damping of the first step and its lower bound, and the damping above which a curve stays.
+    damping_factor : float
+        Factor by which damping rises after a failed step and falls after a successful one.
+    """
+
+    _fields_ = [
+        ("iterations", _COUNT),
+        ("respacing", _COUNT),
+        ("quiet", _COUNT),
+        ("least_decrease", _NUMBER),
+        ("longest_move", _NUMBER),
+        ("least_damping", _NUMBER),
+        ("most_damping", _NUMBER),
+        ("damping_factor", _NUMBER),
+    ]
+
+
+class RelaxationRules(ctypes.Structure):
+    """All rules of a relaxation.
+
+    Parameters
+    ----------
+    traces : TraceLimits
+    contact : ContactRules
+    spacing : SpacingRules
+    energy : EnergyRules
+    steps : StepRules
+    """
+
+    _fields_ = [
+        ("traces", TraceLimits),
+        ("contact", ContactRules),
+        ("spacing", SpacingRules),
+        ("energy", EnergyRules),
+        ("steps", StepRules),
+    ]
+
+
+class _CurveBatch(ctypes.Structure):
+    _fields_ = [
+        ("c", _COUNT),
+        ("n", _COUNT),
+        ("closed", _COUNT),
+        ("faces", _POINTER),
+        ("barycentric", _POINTER),
+        ("fixed", _POINTER),
+        ("iterations", _POINTER),
+        ("quiet", _POINTER),
+        ("dampings", _POINTER),
+    ]
+
+
+PAIRS_OF_A_NODE = 8
+"""Number of close nodes for which there is room at first; there is more room when it is needed."""
+
+
+def relax_curves(
+    surface: SurfaceArrays,
+    faces: IntArray,
+    barycentric: FloatArray,
+    fixed: BoolArray,
+    closed: bool,
+    rules: RelaxationRules,
+    meanwhile: Callable[[], object],
+) -> tuple[IntArray, FloatArray]:
+    """Relax c curves of n nodes each; every curve is relaxed on its own.
+
+    Parameters
+    ----------
+    surface : SurfaceArrays
+    faces : (c, n) int array
+        Faces of the nodes.
+    barycentric : (c, n, 3) float array
+        Coordinates in them.
+    fixed : (c, n) bool array
+        Nodes that do not move. The first one of each curve is one of them.
+    closed : bool
+        Whether the last node of each curve is joined to its first.
+    rules : RelaxationRules
+    meanwhile : callable
+        Called after every `MOST_WORK` faces, or the time of as many.
+
+    Returns
+    -------
+    (c, n) int array, (c, n, 3) float array
+        Faces of the relaxed nodes and coordinates in them.
+    """
+    c, n = _curves("faces", faces)
+    _address("faces", faces, _INT, c, n)
+    _address("barycentric", barycentric, _FLOAT, c, n, 3)
+    of_fixed = _first_fixed(fixed, c, n)
+    faces, barycentric = faces.copy(), barycentric.copy()
+    iterations, quiet = np.zeros(c, dtype=np.int64), np.zeros(c, dtype=np.int64)
+    dampings = np.full(c, rules.steps.least_damping)
+    curves = _CurveBatch(
+        c, n, int(closed), faces.ctypes.data, barycentric.ctypes.data, of_fixed,
+        iterations.ctypes.data, quiet.ctypes.data, dampings.ctypes.data,
+    )  # fmt: skip
+    library, room, started = _library(), PAIRS_OF_A_NODE * n, False
+    while (iterations < rules.steps.iterations).any():
+        if started:
+            meanwhile()
+        started = True
+        items = library.relaxation_items(n, room)
+        scratch = np.empty(items)
+        code = library.relax_curves(
+            surface.pointers, rules, curves, room, scratch.ctypes.data, items, MOST_WORK
+        )
+        if code == _TOO_SMALL and room < n * n:
+            room = max(4 * room, n)
+        else:
+            _check(code, "relax_curves")
+    return faces, barycentric

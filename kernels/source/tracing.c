@@ -5,7 +5,6 @@
    crossed next, so a trace cannot get lost between two faces. */
 #include "tracing.h"
 
-#include <float.h>
 #include <string.h>
 
 #include "vectors.h"
@@ -140,7 +139,7 @@ static int stop_before(const Mesh *mesh, const Crossing *entry, const Crossing *
     memcpy(begin, barycentric, sizeof begin);
     if (entry) TRY(on_side(mesh, *face, entry->side, entry->share, begin));
     TRY(on_side(mesh, *face, exit->side, exit->share, end));
-    double share = lesser(to_go, exit->length) / greater(exit->length, DBL_MIN);
+    double share = lesser(to_go, exit->length) / greater(exit->length, TINY);
     for (int j = 0; j < 3; j++) barycentric[j] = begin[j] + share * (end[j] - begin[j]);
     return OK;
 }

@@ -5,8 +5,12 @@
 #ifndef NICMM_VECTORS_H
 #define NICMM_VECTORS_H
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
+
+/* Least divisor, for quotients whose dividend is zero whenever the divisor is. */
+#define TINY DBL_MIN
 
 static inline double dot(const double *one, const double *other)
 {

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import nicmm_kernels
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -50,6 +51,18 @@ class CurveSurface:
     feature_map: FloatArray | None = None
     feature_weight: float = 0.0
     folded: BoolArray | None = None
+
+    @cached_property
+    def for_kernels(self) -> nicmm_kernels.SurfaceArrays:
+        """The surface as compiled kernels read it."""
+        feature_map = self.feature_map
+        return nicmm_kernels.SurfaceArrays(
+            self.mesh.for_kernels,
+            np.ascontiguousarray(self.vertex_normals),
+            self.folded,
+            None if feature_map is None else np.ascontiguousarray(feature_map),
+            self.feature_weight,
+        )
 
     @cached_property
     def edge_graph(self) -> sparse.csr_array:

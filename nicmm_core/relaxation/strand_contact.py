@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import nicmm_kernels
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -24,6 +25,7 @@ SAME_SIDE = 0.3
 It excludes strands on opposite sides of a thin part.
 """
 
+RULES = nicmm_kernels.ContactRules(CLEARANCE, DIFFERENT_STRANDS, SAME_SIDE, tolerances.ROUNDED)
 
 NEARBY = 2.0
 """Distance, in clearances, within which pairs of nodes are kept for tests after short moves."""

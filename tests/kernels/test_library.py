@@ -13,6 +13,7 @@ from nicmm_kernels import KernelError
 
 import build
 from nicmm_core import shapes
+from tests.core.checks import points_near
 
 BALL = shapes.sphere(2)
 LIMITS = nicmm_kernels.TraceLimits(1e-6, 4096)
@@ -55,10 +56,93 @@ def arguments_between(m=4):
     }
 
 
+def tangled_curves(c, n=60):
+    """Places of the nodes of c closed curves that cross and approach themselves."""
+    angle = np.arange(n) * 2.0 * np.pi / n
+    height = 0.4 * np.sin(3.0 * angle + np.arange(c)[:, None])
+    angle = 2.0 * angle + 0.1 * np.sin(angle)
+    ring = np.sqrt(1.0 - height**2)
+    positions = np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=-1)
+    places = points_near(BALL, positions.reshape(-1, 3))
+    return places.faces.reshape(c, n), places.barycentric.reshape(c, n, 3)
+
+
+def rules(smoothness=1.0):
+    return nicmm_kernels.RelaxationRules(
+        LIMITS,
+        nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12),
+        nicmm_kernels.SpacingRules(1.0, 1e-3),
+        nicmm_kernels.EnergyRules(smoothness, 4.0, 10.0, 1e-12),
+        nicmm_kernels.StepRules(9, 3, 2, 1e-3, 1.0, 1e-6, 1e2, 10.0),
+    )
+
+
+def arguments_relax(c=4):
+    """Arguments of `relax_curves` for c curves, by name."""
+    faces, barycentric = tangled_curves(c)
+    fixed = np.zeros(faces.shape, dtype=bool)
+    fixed[:, ::20] = True
+    vertices = BALL.vertices
+    arrays = nicmm_kernels.SurfaceArrays(
+        BALL.for_kernels, vertices.copy(), None, 1.0 + 0.5 * np.sin(9.0 * vertices[:, 0]), 5.0
+    )
+    return {
+        "surface": arrays,
+        "faces": faces,
+        "barycentric": barycentric,
+        "fixed": fixed,
+        "closed": True,
+        "rules": rules(),
+        "meanwhile": nothing,
+    }
+
+
+def arguments_even(c=4, n=9):
+    """Arguments of `even_arcs` for c curves, by name."""
+    fixed = np.zeros((c, n), dtype=bool)
+    fixed[:, ::4] = True
+    return {
+        "normals": np.tile([0.0, 0.0, 1.0], (c, n, 1)),
+        "step_lengths": np.ones((c, n)),
+        "lengths": np.linspace(1.0, 2.0, c * n).reshape(c, n),
+        "fixed": fixed,
+        "closed": True,
+        "times": 3,
+        "rules": nicmm_kernels.SpacingRules(1.0, 1e-3),
+    }
+
+
 CALLS = {
     "trace_from": (nicmm_kernels.trace_from, arguments_from),
     "trace_between": (nicmm_kernels.trace_between, arguments_between),
+    "relax_curves": (nicmm_kernels.relax_curves, arguments_relax),
+    "even_arcs": (nicmm_kernels.even_arcs, arguments_even),
 }
+
+FINITE = {
+    "trace_from": [("barycentric", None), ("directions", None), ("lengths", None)],
+    "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
+    "relax_curves": [("barycentric", None)],
+}
+"""Arrays whose values have to be finite; others may have any values."""
+
+FACES = {
+    "trace_from": [("faces", None)],
+    "trace_between": [("starts", 0), ("ends", 0)],
+    "relax_curves": [("faces", None)],
+}
+"""Arrays of indices of faces."""
+
+RESUMED = ["trace_from", "trace_between", "relax_curves"]
+"""Kernels whose work has no small bound."""
+
+
+def with_mesh(given, mesh):
+    """Arguments with other arrays of the mesh."""
+    if "surface" not in given:
+        return {**given, "mesh": mesh}
+    normals = BALL.vertices.copy()
+    return {**given, "surface": nicmm_kernels.SurfaceArrays(mesh, normals, None, None, 0.0)}
 
 
 def arrays_in(given):
@@ -115,17 +199,9 @@ def test_arrays_that_do_not_fit_are_refused(name, place):
             function(**replaced(given, place, lambda array, changed=changed: changed))
 
 
-@given(st.sampled_from(sorted(CALLS)), st.data())
+@given(st.sampled_from(sorted(FINITE)), st.data())
 def test_numbers_that_are_not_finite_are_refused(name, data):
     function, arguments = CALLS[name]
-    given = arguments()
-    floats = [
-        place
-        for place in arrays_in(given)
-        if array_at(given, place).dtype == np.float64
-        and place[0] != "longest"  # a trace may have any length
-    ]
-    place = data.draw(st.sampled_from(floats))
 
     def spoilt(array):
         array = array.copy()
@@ -133,24 +209,23 @@ def test_numbers_that_are_not_finite_are_refused(name, data):
         return array
 
     with pytest.raises(KernelError, match="NaN or infinite"):
-        function(**replaced(given, place, spoilt))
+        function(**replaced(arguments(), data.draw(st.sampled_from(FINITE[name])), spoilt))
 
 
-@given(st.sampled_from(sorted(CALLS)), BAD_INDICES, st.integers(0, 3), st.booleans())
-def test_faces_that_do_not_exist_are_refused(name, index, row, at_end):
+@given(st.sampled_from(sorted(FACES)), BAD_INDICES, st.data())
+def test_faces_that_do_not_exist_are_refused(name, index, data):
     function, arguments = CALLS[name]
-    place = {"trace_from": ("faces", None), "trace_between": ("ends" if at_end else "starts", 0)}
 
     def spoilt(faces):
         faces = faces.copy()
-        faces[row] = index
+        faces.flat[data.draw(st.integers(0, faces.size - 1))] = index
         return faces
 
     with pytest.raises(KernelError, match="index is out of range"):
-        function(**replaced(arguments(), place[name], spoilt))
+        function(**replaced(arguments(), data.draw(st.sampled_from(FACES[name])), spoilt))
 
 
-@given(st.sampled_from(sorted(CALLS)), BAD_INDICES, st.booleans(), st.integers(0, 10**6))
+@given(st.sampled_from(sorted(FACES)), BAD_INDICES, st.booleans(), st.integers(0, 10**6))
 def test_meshes_with_wrong_indices_crash_nothing(name, index, in_faces, at):
     """Only the indices that are used are checked, so a trace elsewhere may succeed."""
     function, arguments = CALLS[name]
@@ -158,14 +233,13 @@ def test_meshes_with_wrong_indices_crash_nothing(name, index, in_faces, at):
     spoilt = faces.ravel() if in_faces else opposite
     spoilt[at % spoilt.size] = index if index < 0 else index + 3 * len(BALL.faces)
     mesh = nicmm_kernels.MeshArrays(BALL.vertices, faces, BALL.face_normals, opposite, True)
-    given = {**arguments(8), "mesh": mesh}
     try:
-        function(**given)
+        function(**with_mesh(arguments(), mesh))
     except KernelError as error:
         assert "index is out of range" in str(error)
 
 
-@given(st.sampled_from(sorted(CALLS)), st.integers(0, 2**32 - 1))
+@given(st.sampled_from(sorted(FACES)), st.integers(0, 2**32 - 1))
 def test_meshes_with_arbitrary_neighbours_crash_nothing(name, seed):
     function, arguments = CALLS[name]
     rng = np.random.default_rng(seed)
@@ -174,7 +248,7 @@ def test_meshes_with_arbitrary_neighbours_crash_nothing(name, seed):
     mesh = nicmm_kernels.MeshArrays(
         BALL.vertices, BALL.faces, BALL.face_normals, opposite, oriented
     )
-    function(**{**arguments(8), "mesh": mesh})
+    function(**with_mesh(arguments(), mesh))
 
 
 @pytest.mark.parametrize(
@@ -203,13 +277,13 @@ def test_copies_of_a_mesh_have_their_own_pointers():
     assert (one[1] == other[1]).all()
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", RESUMED)
 def test_calls_of_bounded_work_give_the_same_as_a_single_one(name, monkeypatch):
     function, arguments = CALLS[name]
-    whole = function(**arguments(40))
+    whole = function(**arguments(20))
     pauses = []
     monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 7)
-    parts = function(**{**arguments(40), "meanwhile": lambda: pauses.append(None)})
+    parts = function(**{**arguments(20), "meanwhile": lambda: pauses.append(None)})
     assert len(pauses) > 5
     for one, other in zip(whole, parts, strict=True):
         assert np.array_equal(one, other)
@@ -223,20 +297,58 @@ def test_crossings_that_do_not_fit_are_found_in_several_calls(monkeypatch):
         assert np.array_equal(one, other)
 
 
+def test_contacts_that_do_not_fit_get_more_room(monkeypatch):
+    whole = nicmm_kernels.relax_curves(**arguments_relax())
+    monkeypatch.setattr(nicmm_kernels.library, "PAIRS_OF_A_NODE", 0)
+    pauses = []
+    given = {**arguments_relax(), "meanwhile": lambda: pauses.append(None)}
+    few = nicmm_kernels.relax_curves(**given)
+    assert pauses
+    for one, other in zip(whole, few, strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", ["relax_curves", "even_arcs"])
+def test_curves_without_a_fixed_start_or_without_nodes_are_refused(name):
+    function, arguments = CALLS[name]
+    given = arguments()
+    fixed = given["fixed"].copy()
+    fixed[2, 0] = False
+    with pytest.raises(KernelError, match="first node"):
+        function(**{**given, "fixed": fixed})
+    key = "faces" if "faces" in given else "fixed"
+    with pytest.raises(KernelError, match="one row per curve"):
+        function(**{**given, key: given[key][:, :0]})
+
+
+@pytest.mark.parametrize("name", ["relax_curves", "even_arcs"])
+def test_a_curve_does_not_depend_on_the_others(name):
+    function, arguments = CALLS[name]
+    given = arguments()
+    together = function(**given)
+    for curve in range(4):
+        own = {k: v[[curve]] if isinstance(v, np.ndarray) else v for k, v in given.items()}
+        for one, other in zip(function(**own), together, strict=True):
+            assert np.array_equal(one[0], other[curve])
+
+
 def test_an_exception_between_two_calls_ends_the_function(monkeypatch):
     monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 1)
 
     def cancel():
         raise InterruptedError
 
-    for function, arguments in CALLS.values():
+    for name in RESUMED:
+        function, arguments = CALLS[name]
         with pytest.raises(InterruptedError):
             function(**{**arguments(), "meanwhile": cancel})
 
 
-def test_no_points_give_no_result():
-    assert all(np.size(part) <= 1 for part in nicmm_kernels.trace_from(**arguments_from(0)))
-    assert all(len(part) == 0 for part in nicmm_kernels.trace_between(**arguments_between(0)))
+@pytest.mark.parametrize("name", CALLS)
+def test_no_points_or_curves_give_no_result(name):
+    function, arguments = CALLS[name]
+    for part in function(**arguments(0)):
+        assert isinstance(part, int) or len(part) == 0
 
 
 def test_missing_library_says_what_to_do(tmp_path):
