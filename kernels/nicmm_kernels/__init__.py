@@ -6,33 +6,46 @@ of the installed package; there is one for every platform, and it does not depen
 Python. While it computes, other threads of Python run.
 """
 
-from .library import (
+from .energy import (
     ContactRules,
     EnergyRules,
-    KernelError,
-    MeshArrays,
-    RelaxationRules,
-    SpacingRules,
-    StepRules,
-    SurfaceArrays,
-    TraceLimits,
-    even_arcs,
-    relax_curves,
-    trace_between,
-    trace_from,
+    Weights,
+    balance,
+    close_pairs,
+    conormal_derivatives,
+    damped_step,
+    elastic_energy,
+    elastic_system,
+    find_contacts,
+    predicted_decrease,
 )
+from .library import KernelError
+from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
+from .relaxation import RelaxationRules, StepRules, relax_curves
+from .traces import MeshArrays, TraceLimits, trace_between, trace_from
 
 __all__ = [
     "ContactRules",
     "EnergyRules",
     "KernelError",
     "MeshArrays",
+    "NodeArrays",
     "RelaxationRules",
     "SpacingRules",
     "StepRules",
     "SurfaceArrays",
     "TraceLimits",
+    "Weights",
+    "balance",
+    "close_pairs",
+    "conormal_derivatives",
+    "damped_step",
+    "elastic_energy",
+    "elastic_system",
     "even_arcs",
+    "find_contacts",
+    "place_nodes",
+    "predicted_decrease",
     "relax_curves",
     "trace_between",
     "trace_from",

@@ -23,7 +23,7 @@ double clearance_of(const Nodes *nodes, const ContactRules *rules)
     double least = 0.0;
     for (int64_t i = 0; i < 3 * nodes->n; i++) least = greater(least, fabs(nodes->positions[i]));
     least = greater(rules->rounded * least, TINY);
-    return rules->clearance * greater(length_of_curve(nodes) / (double)nodes->n, least);
+    return rules->clearance * greater(mean_step(nodes), least);
 }
 
 int find_close_pairs(const Nodes *nodes, const ContactRules *rules, double reach, double *arcs,

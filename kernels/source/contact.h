@@ -31,10 +31,10 @@ double clearance_of(const Nodes *nodes, const ContactRules *rules);
 
 /* Finds the pairs of nodes that are at most `reach` clearances apart, but far along the curve.
    `arcs`, (n), is scratch. Returns ARRAY_TOO_SMALL if there is no room for all of them. */
-int find_close_pairs(const Nodes *nodes, const ContactRules *rules, double reach, double *arcs,
-                     Contacts *contacts);
+EXPORTED int find_close_pairs(const Nodes *nodes, const ContactRules *rules, double reach,
+                              double *arcs, Contacts *contacts);
 
 /* Finds the contacts among the pairs: closer than the clearance, on one side of the surface. */
-int find_contacts(const Nodes *nodes, const ContactRules *rules, Contacts *contacts);
+EXPORTED int find_contacts(const Nodes *nodes, const ContactRules *rules, Contacts *contacts);
 
 #endif

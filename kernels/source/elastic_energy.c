@@ -51,13 +51,13 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
 Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *rules,
                 double *held_ds)
 {
-    double turn = 2.0 * PI / length_of_curve(nodes);
-    Weights weights = {turn * turn / rules->smoothness, 0.0, 0.0, NULL};
+    double turn = 2.0 * PI / length_of_curve(nodes), tension = turn * turn / rules->smoothness;
+    Weights weights = {rules->tautness * tension, 0.0, 0.0, NULL};
     if (rules->contact > 0.0)
         weights.contact = rules->contact * elastic_energy(nodes, &weights) / (double)nodes->n;
     if (surface->feature_map) {
         weights.feature =
-            surface->feature_weight / rules->smoothness + rules->over_tension * weights.tension;
+            surface->feature_weight / rules->smoothness + rules->over_tension * tension;
         weights.held_ds = held_ds;
         for (int64_t i = 0; i < nodes->n; i++) held_ds[i] = arc_of_node(nodes, i);
     }
@@ -73,8 +73,8 @@ double contact_energy(const Contacts *contacts, const Weights *weights)
 }
 
 /* Derivatives of the normal at a node and of phi_fea there by a move along the conormal. */
-static int conormal_derivatives(const Surface *surface, const Nodes *nodes, int64_t i,
-                                double turn[3], double *drift)
+static int conormal_derivative(const Surface *surface, const Nodes *nodes, int64_t i,
+                               double turn[3], double *drift)
 {
     const double *corners[3], *conormal = nodes->conormals + 3 * i;
     const double *normal = nodes->normals + 3 * i;
@@ -105,6 +105,13 @@ static int conormal_derivatives(const Surface *surface, const Nodes *nodes, int6
     return surface->feature_map ? weighted_feature(surface, face, change, drift) : OK;
 }
 
+int conormal_derivatives(const Surface *surface, const Nodes *nodes, double *turns, double *drifts)
+{
+    for (int64_t i = 0; i < nodes->n; i++)
+        TRY(conormal_derivative(surface, nodes, i, turns + 3 * i, drifts + i));
+    return OK;
+}
+
 /* Computes the residuals of a node and their derivatives. */
 static int linearise_node(const Surface *surface, const Nodes *nodes, const Weights *weights,
                           int64_t i, const Linearisation *linearisation)
@@ -117,7 +124,7 @@ static int linearise_node(const Surface *surface, const Nodes *nodes, const Weig
     double normal_turn[3], flat_before[3], flat_after[3], by_before[3], by_after[3], by_here[3];
     double along_before[3], along_after[3], along_here[3];
     double *drift = linearisation->drift + i;
-    TRY(conormal_derivatives(surface, nodes, i, normal_turn, drift));
+    TRY(conormal_derivative(surface, nodes, i, normal_turn, drift));
 
     Turn turn = turn_at(before, after, normal);
     for (int axis = 0; axis < 3; axis++) {
@@ -172,7 +179,7 @@ static inline double dot2(const double *one, const double *other)
 }
 
 int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *weights,
-                    const EnergyRules *rules, const Linearisation *linearisation, const System *system)
+                    double shortest, const Linearisation *linearisation, const System *system)
 {
     int64_t n = nodes->n;
     for (int64_t i = 0; i < n; i++)
@@ -200,7 +207,7 @@ int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *w
     for (int64_t i = 0; i < n; i++) {
         if (!nodes->closed && i == n - 1) continue;
         int64_t j = node_after(nodes, i);
-        double length = greater(nodes->step_lengths[i], rules->shortest);
+        double length = greater(nodes->step_lengths[i], shortest);
         double stiffness = tension_at(nodes, weights, i) / length;
         /* Without an orientation, moves of two neighbours to the same side may have opposite
            signs. */
@@ -224,6 +231,60 @@ int add_contact(const Nodes *nodes, const Contacts *contacts, const Weights *wei
             system->slope[i] += pull * approach;
             system->bands[i] += 2.0 * weight * (approach * approach);
         }
+    }
+    return OK;
+}
+
+/* The functions below are those of one curve that the caller relaxes itself. */
+
+/* Energy of a curve with contact; `contacts` is NULL if strands may cross. */
+EXPORTED int energy_of_curve(const Nodes *nodes, const Weights *weights, const Contacts *contacts,
+                             double *energy)
+{
+    *energy = elastic_energy(nodes, weights);
+    if (contacts) *energy += contact_energy(contacts, weights);
+    return OK;
+}
+
+/* Weights of a curve; `held_ds`, (n), becomes their ds if there is a map. */
+EXPORTED int balance_of_curve(const Surface *surface, const Nodes *nodes,
+                              const EnergyRules *rules, double *held_ds, Weights *weights)
+{
+    *weights = balance(surface, nodes, rules, held_ds);
+    return OK;
+}
+
+EXPORTED int64_t system_items(int64_t n)
+{
+    return items_of_linearisation(n);
+}
+
+/* Assembles the system of a curve with contact; `contacts` is NULL if strands may cross.
+
+   pair_entries : (3, p) become the contributions of the p contacts to the entries (i, i), (i, j)
+   and (j, j) of the matrix, where i and j are the two nodes; the bands do not include them
+   scratch : items of eight bytes, as many as `system_items` says */
+EXPORTED int system_of_curve(const Surface *surface, const Nodes *nodes, const Weights *weights,
+                             double shortest, const Contacts *contacts, double *scratch,
+                             int64_t scratch_items, const System *system, double *pair_entries)
+{
+    Scratch all = {scratch, scratch_items};
+    Linearisation linearisation;
+    TRY(take_linearisation(&all, nodes->n, &linearisation));
+    TRY(assemble_system(surface, nodes, weights, shortest, &linearisation, system));
+    if (!contacts) return OK;
+    int64_t count = contacts->count;
+    for (int64_t p = 0; p < count; p++) {
+        /* A pair counts for both of its nodes. */
+        double weight = 2.0 * weights->contact, pull = weight * contacts->overlaps[p];
+        const double *by = contacts->approaches + 2 * p;
+        const int64_t *ends = contacts->ends + 2 * p;
+        CHECK(ends[0], nodes->n);
+        CHECK(ends[1], nodes->n);
+        for (int end = 0; end < 2; end++) system->slope[ends[end]] += pull * by[end];
+        pair_entries[p] = weight * (by[0] * by[0]);
+        pair_entries[count + p] = weight * (by[0] * by[1]);
+        pair_entries[2 * count + p] = weight * (by[1] * by[1]);
     }
     return OK;
 }

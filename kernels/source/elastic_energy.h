@@ -8,10 +8,10 @@
 
 typedef struct {
     double smoothness;   /* divisor of the tension and of the weight of a map */
+    double tautness;     /* factor of the tension, but not of the weight of a map */
     double over_tension; /* multiple of the tension added to the weight of a map */
     double contact;      /* contact energy of a curve whose strands touch everywhere, relative to
                             its energy without maps; 0 if strands may cross */
-    double shortest;     /* least length of a step by which the tension is divided */
 } EnergyRules;
 
 /* Weights of the energy terms of one curve. */
@@ -47,11 +47,15 @@ Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *r
 /* Energy without contact. */
 double elastic_energy(const Nodes *nodes, const Weights *weights);
 
-/* Assembles the system without contact. */
+/* Assembles the system without contact. `shortest` is the least length of a step that divides. */
 int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *weights,
-                    const EnergyRules *rules, const Linearisation *linearisation, const System *system);
+                    double shortest, const Linearisation *linearisation, const System *system);
 
 double contact_energy(const Contacts *contacts, const Weights *weights);
+
+/* Derivatives of the normals, (n, 3), and of phi_fea, (n), by moves along the conormals. */
+EXPORTED int conormal_derivatives(const Surface *surface, const Nodes *nodes, double *turns,
+                                  double *drifts);
 
 /* Adds contact to a system, with diagonal entries only, so that the matrix stays banded. They
    overestimate the stiffness, since 2 (a^2 + b^2) is never less than (a + b)^2. */

@@ -84,6 +84,26 @@ void measure_nodes(const Nodes *nodes)
     }
 }
 
+/* Measures c curves, whose nodes are all in one set of arrays. */
+EXPORTED int measure_curves(const Nodes *all, int64_t c)
+{
+    if (c < 1 || all->n % c != 0) return INDEX_OUT_OF_RANGE;
+    int64_t n = all->n / c;
+    for (int64_t curve = 0; curve < c; curve++) {
+        int64_t first = curve * n;
+        Nodes nodes = {.n = n,
+                       .closed = all->closed,
+                       .positions = all->positions + 3 * first,
+                       .normals = all->normals + 3 * first,
+                       .steps = all->steps + 3 * first,
+                       .step_lengths = all->step_lengths + first,
+                       .conormals = all->conormals + 3 * first,
+                       .angles = all->angles + first};
+        measure_nodes(&nodes);
+    }
+    return OK;
+}
+
 void copy_places(const Nodes *from, const Nodes *to)
 {
     memcpy(to->faces, from->faces, (size_t)from->n * sizeof *from->faces);
@@ -95,4 +115,10 @@ double length_of_curve(const Nodes *nodes)
     double sum = 0.0;
     for (int64_t i = 0; i < nodes->n; i++) sum += nodes->step_lengths[i];
     return sum;
+}
+
+double mean_step(const Nodes *nodes)
+{
+    int64_t steps = nodes->closed ? nodes->n : nodes->n - 1;
+    return steps > 0 ? length_of_curve(nodes) / (double)steps : 0.0;
 }

@@ -56,7 +56,7 @@ int64_t items_of_nodes(int64_t n);
 int take_nodes(Scratch *scratch, int64_t n, int64_t closed, Nodes *nodes);
 
 /* Computes positions, normals and phi_fea of nodes from their places in faces. */
-int place_nodes(const Surface *surface, const Nodes *nodes);
+EXPORTED int place_nodes(const Surface *surface, const Nodes *nodes);
 
 /* Computes steps, their lengths, conormals and angles from positions and normals. */
 void measure_nodes(const Nodes *nodes);
@@ -65,5 +65,8 @@ void measure_nodes(const Nodes *nodes);
 void copy_places(const Nodes *from, const Nodes *to);
 
 double length_of_curve(const Nodes *nodes);
+
+/* Mean distance between neighbouring nodes. */
+double mean_step(const Nodes *nodes);
 
 #endif

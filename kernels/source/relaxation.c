@@ -23,6 +23,8 @@ typedef struct {
     double least_damping;  /* of the first step, and lower bound afterwards */
     double most_damping;   /* damping above which a curve stays */
     double damping_factor; /* by which damping rises after a failed step, and falls otherwise */
+    double shortest;       /* least length of a step by which the tension is divided, in mesh
+                              units */
 } StepRules;
 
 typedef struct {
@@ -154,7 +156,7 @@ static int step_curve(const Surface *surface, const RelaxationRules *rules, cons
         Weights without_map = {weights.tension, 0.0, 0.0, NULL};
         scale = elastic_energy(now, &without_map);
     }
-    TRY(assemble_system(surface, now, &weights, &rules->energy, &space->linearisation,
+    TRY(assemble_system(surface, now, &weights, steps->shortest, &space->linearisation,
                         &space->system));
     if (rules->energy.contact > 0.0)
         TRY(add_contact(now, &space->contacts, &weights, &space->system));

@@ -223,9 +223,10 @@ int move_point(const Mesh *mesh, const uint8_t *folded, const TraceLimits *limit
    the traces have passed `most_work` faces, so that the caller can do something else in between.
 
    faces : (n) faces of the points; replaced
-   barycentric : (n, 3) coordinates in them, strictly inside; replaced
+   barycentric : (n, 3) coordinates in them; replaced
    directions : (n, 3) unit vectors, nearly tangent to the faces
-   lengths : (n) distances to move, not negative
+   lengths : (n) distances to move, not negative. Points with length zero stay, wherever they are;
+   all others are strictly inside their faces
    blocked : (n) becomes whether each point stopped at a boundary
    most_passed : raised to the greatest number of faces that a point passed
    done : raised to the number of points that have been moved */
@@ -238,10 +239,12 @@ EXPORTED int trace_from(const Mesh *mesh, const uint8_t *folded, const TraceLimi
     for (; *done < n && work < most_work; ++*done) {
         int64_t i = *done, passed = 0;
         CHECK(i, n);
+        work++;
+        if (lengths[i] == 0.0) continue;
         TRY(move_point(mesh, folded, limits, directions + 3 * i, lengths[i], faces + i,
                        barycentric + 3 * i, blocked + i, &passed));
         if (passed > *most_passed) *most_passed = passed;
-        work += 1 + passed;
+        work += passed;
     }
     return OK;
 }

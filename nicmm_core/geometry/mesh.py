@@ -169,7 +169,7 @@ class Mesh:
             np.ascontiguousarray(self.vertices),
             np.ascontiguousarray(self.faces),
             self.face_normals,
-            self.opposite_sides,
+            np.ascontiguousarray(self.opposite_sides, np.int64),  # 32 bits in NumPy 1 on Windows
             self.is_oriented,
         )
 

@@ -86,8 +86,8 @@ def trace_between(
     checkpoint()
     reached, counts, faces, barycentric = nicmm_kernels.trace_between(
         mesh.for_kernels,
-        contiguous(start),
-        contiguous(end),
+        start.for_kernels,
+        end.for_kernels,
         np.ascontiguousarray(normals),
         np.ascontiguousarray(longest),
         folded,
@@ -118,18 +118,18 @@ def trace_from(
     ----------
     mesh : Mesh
     start : SurfacePoints
-        m points, each strictly inside its face.
+        m points, each strictly inside its face unless its distance is zero.
     direction : (m, 3) float array
         Unit vectors, nearly tangent to the faces.
     length : (m,) float array
-        Distances to move, in mesh units; not negative.
+        Distances to move, in mesh units; not negative. Where it is zero, the point stays as it is.
     folded : (F,) bool array, optional
         Whether each face of the mesh is folded back over its neighbours.
 
     Returns
     -------
     SurfacePoints
-        The moved points, strictly inside their faces.
+        The moved points; those that moved are strictly inside their faces.
     (m,) bool array
         Whether each point stopped at a boundary or a non-manifold edge.
     int
@@ -138,7 +138,7 @@ def trace_from(
     checkpoint()
     faces, barycentric, blocked, most_passed = nicmm_kernels.trace_from(
         mesh.for_kernels,
-        *contiguous(start),
+        *start.for_kernels,
         np.ascontiguousarray(direction),
         np.ascontiguousarray(length),
         folded,
@@ -146,11 +146,6 @@ def trace_from(
         checkpoint,
     )
     return SurfacePoints(faces, barycentric), blocked, most_passed
-
-
-def contiguous(points: SurfacePoints) -> tuple[IntArray, FloatArray]:
-    """Faces and barycentric coordinates of points, (m,) and (m, 3), as kernels read them."""
-    return np.ascontiguousarray(points.faces), np.ascontiguousarray(points.barycentric)
 
 
 def strictly_inside(barycentric: FloatArray) -> FloatArray:

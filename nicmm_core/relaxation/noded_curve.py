@@ -200,20 +200,10 @@ def shifted(
     int
         Greatest number of faces that a node has passed.
     """
-    going = np.flatnonzero(length)
-    targets, stuck, passed = trace_from(
-        surface.mesh,
-        nodes.places[going],
-        direction.T.take(going, axis=1).T,
-        length.take(going),
-        surface.folded,
+    places, blocked, passed = trace_from(
+        surface.mesh, nodes.places, direction, length, surface.folded
     )
-    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
-    faces[going], barycentric[going] = targets.faces, targets.barycentric
-    blocked = np.zeros(len(length), dtype=bool)
-    blocked[going] = stuck
-    moved = nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed, nodes.curves)
-    return moved, blocked, passed
+    return nodes_at(surface, places, nodes.closed, nodes.curves), blocked, passed
 
 
 def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:

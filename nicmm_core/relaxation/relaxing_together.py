@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import nicmm_kernels
 import numpy as np
 
-from ..geometry import tolerances, tracing
+from ..geometry import tracing
 from ..geometry.array_types import BoolArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 from . import even_nodes, strand_contact
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .elastic_energy import CONTACT, OVER_TENSION
+from .elastic_energy import energy_rules, shortest_step
 from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
 
 
@@ -79,12 +79,7 @@ def relax_together(
         tracing.LIMITS,
         strand_contact.RULES,
         even_nodes.RULES,
-        nicmm_kernels.EnergyRules(
-            smoothness,
-            OVER_TENSION,
-            CONTACT if config.contact else 0.0,
-            tolerances.SAME_POSITION * surface.mesh.diagonal,
-        ),
+        energy_rules(smoothness, config.contact),
         nicmm_kernels.StepRules(
             config.iterations,
             config.respacing,
@@ -94,13 +89,15 @@ def relax_together(
             steps.least_damping(size),
             steps.most_damping,
             DAMPING_FACTOR,
+            shortest_step(surface),
         ),
     )
     checkpoint()
+    faces, barycentric = nodes.places.for_kernels
     faces, barycentric = nicmm_kernels.relax_curves(
         surface.for_kernels,
-        nodes.places.faces.reshape(-1, size),
-        np.ascontiguousarray(nodes.places.barycentric).reshape(-1, size, 3),
+        faces.reshape(-1, size),
+        barycentric.reshape(-1, size, 3),
         fixed.reshape(-1, size),
         nodes.closed,
         rules,
@@ -115,6 +112,6 @@ def curves_of(nodes: Nodes, which: IntArray) -> Nodes:
     size = nodes.per_curve
     place = (which[:, None] * size + np.arange(size)).ravel()
     return Nodes(
-        nodes.places[place], nodes.closed, nodes.positions.T.take(place, axis=1).T,
-        nodes.normals.T.take(place, axis=1).T, nodes.phi_fea.take(place), len(which),
+        nodes.places[place], nodes.closed, nodes.positions.take(place, axis=0),
+        nodes.normals.take(place, axis=0), nodes.phi_fea.take(place), len(which),
     )  # fmt: skip
