@@ -6,6 +6,7 @@ of the installed package; there is one for every platform, and it does not depen
 Python. While it computes, other threads of Python run.
 """
 
+from .crossings import meeting_segments
 from .energy import (
     ContactRules,
     EnergyRules,
@@ -20,6 +21,7 @@ from .energy import (
     predicted_decrease,
 )
 from .library import KernelError
+from .node_traces import trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
@@ -44,9 +46,11 @@ __all__ = [
     "elastic_system",
     "even_arcs",
     "find_contacts",
+    "meeting_segments",
     "place_nodes",
     "predicted_decrease",
     "relax_curves",
     "trace_between",
     "trace_from",
+    "trace_steps",
 ]

@@ -81,7 +81,13 @@ class Kernel:
     @cached_property
     def result(self) -> Any:
         """The function itself, which returns an error code or a number."""
-        function = getattr(_library(), self._name)
+        function = getattr(_library(), self._name, None)
+        if function is None:
+            raise KernelError(
+                f"The compiled kernels of NICMM Curves have no {self._name}: they are those of "
+                "another version. Install the package again; in a copy of the sources, run: "
+                "python3 build.py test --quick"
+            )
         function.restype = COUNT if self._name.endswith("_items") else ctypes.c_int
         function.argtypes = [
             ctypes.POINTER(kind) if issubclass(kind, ctypes.Structure) else kind

@@ -176,18 +176,62 @@ class _TracePairs(ctypes.Structure):
     ]
 
 
-class _Crossings(ctypes.Structure):
+class Crossings(ctypes.Structure):
+    """Crossings as the library writes them."""
+
     _fields_ = [("room", COUNT), ("count", COUNT), ("faces", POINTER), ("barycentric", POINTER)]
 
 
 _TRACE_BETWEEN = Kernel(
-    "trace_between", MeshPointers, POINTER, COUNT, COUNT, _TracePairs, _Crossings, COUNT,
+    "trace_between", MeshPointers, POINTER, COUNT, COUNT, _TracePairs, Crossings, COUNT,
     ctypes.POINTER(COUNT),
 )  # fmt: skip
 
 CROSSINGS_OF_A_TRACE = 8
 """Number of crossings for which there is room for each trace; where it is not enough, traces are
 found in several calls."""
+
+
+class FoundTraces:
+    """The results of kernels that find m traces in several calls.
+
+    Parameters
+    ----------
+    m : int
+        Number of traces.
+    most_faces : int
+        Number of faces after which a trace ends.
+    """
+
+    def __init__(self, m: int, most_faces: int) -> None:
+        room = most_faces + CROSSINGS_OF_A_TRACE * m
+        self.reached, self.counts = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.int64)
+        self._faces, self._barycentric = np.empty(room, dtype=np.int64), np.empty((room, 3))
+        self.crossings = Crossings(room, 0, self._faces.ctypes.data, self._barycentric.ctypes.data)
+        self.done = COUNT(0)
+        self._parts: list[tuple[IntArray, FloatArray]] = []
+
+    def next_call(self, meanwhile: Callable[[], object]) -> bool:
+        """Whether another call is needed; then store what the last one has found."""
+        if not self.done.value:
+            return len(self.reached) > 0
+        self._store()
+        if self.done.value < len(self.reached):
+            meanwhile()
+            return True
+        return False
+
+    def _store(self) -> None:
+        count, self.crossings.count = self.crossings.count, 0
+        self._parts.append((self._faces[:count].copy(), self._barycentric[:count].copy()))
+
+    def result(self) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+        """Which traces reached their ends, their numbers of crossings, and these crossings."""
+        if len(self._parts) == 1:
+            return self.reached, self.counts, *self._parts[0]
+        faces = np.concatenate([self._faces[:0], *(part[0] for part in self._parts)])
+        barycentric = np.concatenate([self._barycentric[:0], *(part[1] for part in self._parts)])
+        return self.reached, self.counts, faces, barycentric
 
 
 def trace_between(
@@ -234,30 +278,18 @@ def trace_between(
         The crossings in order: the face that is entered, and barycentric coordinates in it.
     """
     m = rows("longest", longest)
-    room = most_faces + CROSSINGS_OF_A_TRACE * m
-    reached, counts = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.int64)
+    found = FoundTraces(m, most_faces)
     pairs = _TracePairs(
         address("start faces", starts[0], INT, m), address("starts", starts[1], FLOAT, m, 3),
         address("end faces", ends[0], INT, m), address("ends", ends[1], FLOAT, m, 3),
         address("normals", normals, FLOAT, m, 3), optional_address("ahead", ahead, FLOAT, m, 3),
         address("longest", longest, FLOAT, m), fold_margin,
-        reached.ctypes.data, counts.ctypes.data,
+        found.reached.ctypes.data, found.counts.ctypes.data,
     )  # fmt: skip
-    faces, barycentric = np.empty(room, dtype=np.int64), np.empty((room, 3))
-    crossings = _Crossings(room, 0, faces.ctypes.data, barycentric.ctypes.data)
-    done = COUNT(0)
-    arguments = (
-        mesh.pointers, optional_address("folded", folded, BOOL, mesh.face_count), most_faces, m,
-        pairs, crossings, library.MOST_WORK, done,
-    )  # fmt: skip
-    parts = []
-    while done.value < m:
-        if done.value:
-            meanwhile()
-            crossings.count = 0
-        _TRACE_BETWEEN(*arguments)
-        parts.append((faces[: crossings.count].copy(), barycentric[: crossings.count].copy()))
-    if len(parts) == 1:
-        return reached, counts, *parts[0]
-    found_faces = np.concatenate([faces[:0], *(part[0] for part in parts)])
-    return reached, counts, found_faces, np.concatenate([barycentric[:0], *(p[1] for p in parts)])
+    of_folded = optional_address("folded", folded, BOOL, mesh.face_count)
+    while found.next_call(meanwhile):
+        _TRACE_BETWEEN(
+            mesh.pointers, of_folded, most_faces, m, pairs, found.crossings, library.MOST_WORK,
+            found.done,
+        )  # fmt: skip
+    return found.result()

@@ -300,14 +300,6 @@ typedef struct {
     int64_t *crossing_counts;      /* (m) becomes the number of crossings of each trace */
 } TracePairs;
 
-/* Crossings of traces, in order. */
-typedef struct {
-    int64_t room;        /* number of crossings that the arrays can hold */
-    int64_t count;       /* number of crossings that they hold */
-    int64_t *faces;      /* (room) the face that the trace enters at each crossing */
-    double *barycentric; /* (room, 3) the crossing, in this face */
-} Crossings;
-
 /* Adds a crossing to those of a trace from index `first` on. Of consecutive crossings at one
    vertex, only the last is kept. */
 static int add_crossing(const Mesh *mesh, const Crossing *crossing, int64_t first,
@@ -326,54 +318,50 @@ static int add_crossing(const Mesh *mesh, const Crossing *crossing, int64_t firs
     return OK;
 }
 
-/* Traces from one point to another; `passed` becomes the number of faces passed. */
-static int trace_pair(const Mesh *mesh, const uint8_t *folded, int64_t most_faces,
-                      const TracePairs *pairs, int64_t i, Crossings *crossings, int64_t *passed)
+int trace_to(const Mesh *mesh, const uint8_t *folded, int64_t most_faces,
+             const TraceRequest *request, Crossings *crossings, uint8_t *reached, int64_t *passed)
 {
-    int64_t face = pairs->start_faces[i], end_face = pairs->end_faces[i];
-    const double *start = pairs->starts + 3 * i, *end = pairs->ends + 3 * i, *corners[3];
-    const double *normal = pairs->normals + 3 * i;
+    int64_t face = request->start_face, end_face = request->end_face;
+    const double *corners[3];
     int64_t first = crossings->count, last_vertex = -1;
     Trace trace;
     double goal[3], forward[3], offsets[3][3];
-    *passed = 0;
     TRY(corners_of(mesh, end_face, corners));
-    interpolate(corners, end, goal);
+    interpolate(corners, request->end, goal);
     TRY(corners_of(mesh, face, corners));
-    interpolate(corners, start, trace.origin);
-    if (!are_finite(goal, 3) || !are_finite(trace.origin, 3) || !are_finite(normal, 3))
+    interpolate(corners, request->start, trace.origin);
+    if (!are_finite(goal, 3) || !are_finite(trace.origin, 3) || !are_finite(request->normal, 3))
         return NOT_FINITE;
     int arrived, crosses;
-    TRY(is_in_face(mesh, end_face, end, face, &arrived));
-    pairs->reached[i] = (uint8_t)arrived;
+    TRY(is_in_face(mesh, end_face, request->end, face, &arrived));
+    *reached = (uint8_t)arrived;
     if (arrived) return OK;
     memcpy(trace.position, trace.origin, sizeof trace.position);
     for (int axis = 0; axis < 3; axis++) {
         forward[axis] = goal[axis] - trace.origin[axis];
         for (int j = 0; j < 3; j++) offsets[j][axis] = corners[j][axis] - trace.origin[axis];
     }
-    cross(normal, forward, trace.plane_normal);
-    leave_first_face(&trace, face, offsets, pairs->ahead ? pairs->ahead + 3 * i : forward,
-                     &crosses);
+    cross(request->normal, forward, trace.plane_normal);
+    leave_first_face(&trace, face, offsets, request->ahead ? request->ahead : forward, &crosses);
     double travelled = 0.0, covered = 0.0;
     Crossing crossing;
-    while (crosses && *passed < most_faces) {
+    for (int64_t count = 0; crosses && count < most_faces; count++) {
         TRY(cross_side(mesh, &trace, &crossing));
         ++*passed;
         travelled += crossing.length;
         covered += folded && folded[crossing.side / 3] ? -crossing.length : crossing.length;
         if (crossing.beyond == crossing.side || crossing.beyond / 3 == face ||
-            travelled > pairs->longest[i] + pairs->fold_margin)
+            travelled > request->longest + request->fold_margin)
             break;
         TRY(add_crossing(mesh, &crossing, first, &last_vertex, crossings));
-        TRY(is_in_face(mesh, end_face, end, crossing.beyond / 3, &arrived));
+        TRY(is_in_face(mesh, end_face, request->end, crossing.beyond / 3, &arrived));
         if (arrived) {
-            pairs->reached[i] = covered <= pairs->longest[i];
+            *reached = covered <= request->longest;
             break;
         }
         TRY(enter_face(mesh, &trace, &crossing));
     }
-    if (!pairs->reached[i]) crossings->count = first;
+    if (!*reached) crossings->count = first;
     return OK;
 }
 
@@ -389,11 +377,15 @@ EXPORTED int trace_between(const Mesh *mesh, const uint8_t *folded, int64_t most
     int64_t work = 0;
     for (; *done < m && work < most_work; ++*done) {
         if (crossings->room - crossings->count < most_faces) return OK;
-        int64_t first = crossings->count, passed;
-        CHECK(*done, m);
-        TRY(trace_pair(mesh, folded, most_faces, pairs, *done, crossings, &passed));
-        pairs->crossing_counts[*done] = crossings->count - first;
-        work += 1 + passed;
+        int64_t i = *done, first = crossings->count;
+        CHECK(i, m);
+        TraceRequest request = {pairs->start_faces[i], pairs->starts + 3 * i,
+                                pairs->end_faces[i],   pairs->ends + 3 * i,
+                                pairs->normals + 3 * i, pairs->ahead ? pairs->ahead + 3 * i : NULL,
+                                pairs->longest[i],     pairs->fold_margin};
+        work++;
+        TRY(trace_to(mesh, folded, most_faces, &request, crossings, pairs->reached + i, &work));
+        pairs->crossing_counts[i] = crossings->count - first;
     }
     return OK;
 }

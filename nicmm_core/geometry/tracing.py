@@ -91,12 +91,22 @@ def trace_between(
         np.ascontiguousarray(normals),
         np.ascontiguousarray(longest),
         folded,
-        0.0 if folded is None else FOLDS * mesh.mean_edge_length,
+        fold_margin(mesh, folded),
         None if ahead is None else np.ascontiguousarray(ahead),
         MOST_FACES,
         checkpoint,
     )
-    return Traces(reached, np.arange(len(counts)).repeat(counts), SurfacePoints(faces, barycentric))
+    return traces_found(reached, counts, SurfacePoints(faces, barycentric))
+
+
+def fold_margin(mesh: Mesh, folded: BoolArray | None) -> float:
+    """Extra length of traces before backward parts over folded faces are subtracted."""
+    return 0.0 if folded is None else FOLDS * mesh.mean_edge_length
+
+
+def traces_found(reached: BoolArray, counts: IntArray, crossings: SurfacePoints) -> Traces:
+    """Traces from the number of crossings of each, (m,), and all crossings in order."""
+    return Traces(reached, np.arange(len(counts)).repeat(counts), crossings)
 
 
 def trace_from(

@@ -176,7 +176,37 @@ def arguments_step():
     return {**given, "fixed": np.arange(60) % 20 == 0, "damping": 1e-3}
 
 
+def arguments_steps(m=59):
+    """Arguments of `trace_steps` for m steps of a curve, by name."""
+    given = arguments_nodes()
+    return {
+        "surface": surface_arrays(),
+        "nodes": nicmm_kernels.NodeArrays(**given),
+        "places": (given["faces"], np.clip(given["barycentric"], 1e-6, None)),
+        "start": np.arange(m) + 1,
+        "end": np.arange(m),
+        "detour": 3.0,
+        "fold_margin": 0.1,
+        "most_faces": 4096,
+        "meanwhile": nothing,
+    }
+
+
+def arguments_segments(s=40):
+    """Arguments of `meeting_segments` for s segments in two groups, by name."""
+    generator = np.random.default_rng(5)
+    return {
+        "groups": generator.integers(0, 2, s),
+        "starts": generator.random((s, 2)),
+        "ends": generator.random((s, 2)),
+        "touching": 1e-12,
+        "meanwhile": nothing,
+    }
+
+
 CALLS = {
+    "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
+    "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
     "place_nodes": (nicmm_kernels.place_nodes, arguments_place),
     "NodeArrays": (nicmm_kernels.NodeArrays, arguments_nodes),
     "find_contacts": (nicmm_kernels.find_contacts, arguments_contacts),
@@ -193,11 +223,13 @@ CALLS = {
 FINITE = {
     "trace_from": [("barycentric", None), ("directions", None), ("lengths", None)],
     "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
+    "trace_steps": [("places", 1)],
     "relax_curves": [("barycentric", None)],
 }
 """Arrays whose values have to be finite; others may have any values."""
 
 INDICES = {
+    "trace_steps": [("places", 0), ("start", None), ("end", None)],
     "place_nodes": [("faces", None)],
     "find_contacts": [("pairs", None)],
     "elastic_system": [("contacts", 0)],
@@ -209,10 +241,10 @@ INDICES = {
 }
 """Arrays of indices."""
 
-ON_MESHES = ["place_nodes", "relax_curves", "trace_between", "trace_from"]
+ON_MESHES = ["place_nodes", "relax_curves", "trace_between", "trace_from", "trace_steps"]
 """Kernels that read a mesh."""
 
-RESUMED = ["trace_from", "trace_between", "relax_curves"]
+RESUMED = ["trace_from", "trace_between", "trace_steps", "relax_curves", "meeting_segments"]
 """Kernels whose work has no small bound."""
 
 
@@ -441,6 +473,29 @@ def test_a_curve_does_not_depend_on_the_others(name):
             assert np.array_equal(one[0], other[curve])
 
 
+def test_segments_that_meet_are_those_of_brute_force(monkeypatch):
+    """Two segments meet if each one's ends lie on both sides of the other one."""
+    given = arguments_segments()
+    start, end = given["starts"], given["ends"]
+
+    def side(a, b, c):
+        return np.sign(np.cross(b - a, c - a))
+
+    expected = {
+        (i, j)
+        for i in range(40)
+        for j in range(i + 1, 40)
+        if given["groups"][i] == given["groups"][j]
+        and side(start[i], end[i], start[j]) != side(start[i], end[i], end[j])
+        and side(start[j], end[j], start[i]) != side(start[j], end[j], end[i])
+    }
+    for room in (4, 0):  # in one call or in many
+        monkeypatch.setattr(nicmm_kernels.crossings, "PAIRS_OF_A_SEGMENT", room)
+        found = nicmm_kernels.meeting_segments(**given)
+        assert {tuple(sorted(pair)) for pair in found.tolist()} == expected
+        assert len(found) == len(expected) > 50
+
+
 def test_an_exception_between_two_calls_ends_the_function(monkeypatch):
     monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 1)
 
@@ -460,6 +515,7 @@ def test_no_points_or_curves_give_no_result(name):
         assert isinstance(part, int) or len(part) == 0
 
 
+@pytest.mark.slow
 def test_missing_library_says_what_to_do(tmp_path):
     script = (
         "import nicmm_core as n, nicmm_core.shapes as s; n.design_curve(s.sphere(2), [0, 9, 50])"
