@@ -20,7 +20,7 @@ from .energy import (
     find_contacts,
     predicted_decrease,
 )
-from .library import KernelError
+from .library import KernelError, MissingLibraryError
 from .node_traces import trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
@@ -31,6 +31,7 @@ __all__ = [
     "EnergyRules",
     "KernelError",
     "MeshArrays",
+    "MissingLibraryError",
     "NodeArrays",
     "RelaxationRules",
     "SpacingRules",

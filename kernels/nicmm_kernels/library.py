@@ -47,7 +47,11 @@ _ERRORS = {
 
 
 class KernelError(RuntimeError):
-    """A kernel is not installed, or was given data that it cannot use."""
+    """A kernel was given data that it cannot use."""
+
+
+class MissingLibraryError(KernelError, ImportError):
+    """The compiled kernels are not installed for this platform, or those of another version are."""
 
 
 @cache
@@ -58,7 +62,7 @@ def _library() -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        raise KernelError(
+        raise MissingLibraryError(
             f"The compiled kernels of NICMM Curves for {platform.system()} on "
             f"{platform.machine()} cannot be loaded from {path} ({error}). Install the package "
             "for this platform; in a copy of the sources, run: python3 build.py test --quick"
@@ -83,7 +87,7 @@ class Kernel:
         """The function itself, which returns an error code or a number."""
         function = getattr(_library(), self._name, None)
         if function is None:
-            raise KernelError(
+            raise MissingLibraryError(
                 f"The compiled kernels of NICMM Curves have no {self._name}: they are those of "
                 "another version. Install the package again; in a copy of the sources, run: "
                 "python3 build.py test --quick"

@@ -515,6 +515,13 @@ def test_no_points_or_curves_give_no_result(name):
         assert isinstance(part, int) or len(part) == 0
 
 
+def test_a_library_of_another_version_says_what_to_do():
+    """The extension reports ImportErrors in a message of its own."""
+    for kind in (KernelError, ImportError):
+        with pytest.raises(kind, match="have no future_kernel: they are those of another version"):
+            nicmm_kernels.library.Kernel("future_kernel")()
+
+
 @pytest.mark.slow
 def test_missing_library_says_what_to_do(tmp_path):
     script = (
@@ -528,7 +535,7 @@ def test_missing_library_says_what_to_do(tmp_path):
         text=True,
         check=False,
     )
-    assert "KernelError: The compiled kernels of NICMM Curves for" in ran.stderr
+    assert "MissingLibraryError: The compiled kernels of NICMM Curves for" in ran.stderr
     assert "cannot be loaded" in ran.stderr and "Install the package" in ran.stderr
 
 
