@@ -21,7 +21,7 @@ from .energy import (
     predicted_decrease,
 )
 from .library import KernelError, MissingLibraryError
-from .node_traces import trace_steps
+from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
@@ -35,6 +35,7 @@ __all__ = [
     "NodeArrays",
     "RelaxationRules",
     "SpacingRules",
+    "StepLimits",
     "StepRules",
     "SurfaceArrays",
     "TraceLimits",
@@ -53,5 +54,6 @@ __all__ = [
     "relax_curves",
     "trace_between",
     "trace_from",
+    "trace_polyline",
     "trace_steps",
 ]

@@ -225,13 +225,21 @@ class FoundTraces:
         count, self.crossings.count = self.crossings.count, 0
         self._parts.append((self._faces[:count].copy(), self._barycentric[:count].copy()))
 
+    @property
+    def count(self) -> int:
+        """Number of crossings found so far."""
+        return sum(len(part[0]) for part in self._parts)
+
+    def crossings_in_order(self) -> tuple[IntArray, FloatArray]:
+        """Faces and coordinates of all crossings."""
+        if len(self._parts) == 1:
+            return self._parts[0]
+        faces = np.concatenate([self._faces[:0], *(part[0] for part in self._parts)])
+        return faces, np.concatenate([self._barycentric[:0], *(part[1] for part in self._parts)])
+
     def result(self) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
         """Which traces reached their ends, their numbers of crossings, and these crossings."""
-        if len(self._parts) == 1:
-            return self.reached, self.counts, *self._parts[0]
-        faces = np.concatenate([self._faces[:0], *(part[0] for part in self._parts)])
-        barycentric = np.concatenate([self._barycentric[:0], *(part[1] for part in self._parts)])
-        return self.reached, self.counts, faces, barycentric
+        return self.reached, self.counts, *self.crossings_in_order()
 
 
 def trace_between(

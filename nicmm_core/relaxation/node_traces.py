@@ -184,12 +184,16 @@ def traces_of_steps(
         places.for_kernels,
         np.ascontiguousarray(start, np.int64),
         np.ascontiguousarray(end, np.int64),
-        DETOUR,
-        fold_margin(surface.mesh, surface.folded),
-        MOST_FACES,
+        step_limits(surface),
         checkpoint,
     )
     return traces_found(reached, counts, SurfacePoints(faces, barycentric))
+
+
+def step_limits(surface: CurveSurface) -> nicmm_kernels.StepLimits:
+    """Limits of the traces between nodes."""
+    margin = fold_margin(surface.mesh, surface.folded)
+    return nicmm_kernels.StepLimits(DETOUR, margin, MOST_FACES)
 
 
 def _along_edges(

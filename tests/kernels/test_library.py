@@ -185,10 +185,21 @@ def arguments_steps(m=59):
         "places": (given["faces"], np.clip(given["barycentric"], 1e-6, None)),
         "start": np.arange(m) + 1,
         "end": np.arange(m),
-        "detour": 3.0,
-        "fold_margin": 0.1,
-        "most_faces": 4096,
+        "limits": nicmm_kernels.StepLimits(3.0, 0.1, 4096),
         "meanwhile": nothing,
+    }
+
+
+def arguments_polyline(m=30):
+    """Arguments of `trace_polyline` that traces m steps and keeps the others, by name."""
+    given = arguments_steps()
+    faces, barycentric = given["places"]
+    return {
+        **{name: given[name] for name in ("surface", "nodes", "places", "limits", "meanwhile")},
+        "is_control": np.arange(60) % 20 == 0,
+        "kept": np.arange(60) >= m,
+        "former_index": np.arange(60),
+        "former": (faces, barycentric),
     }
 
 
@@ -206,6 +217,7 @@ def arguments_segments(s=40):
 
 CALLS = {
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
+    "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
     "place_nodes": (nicmm_kernels.place_nodes, arguments_place),
     "NodeArrays": (nicmm_kernels.NodeArrays, arguments_nodes),
@@ -262,7 +274,8 @@ def arrays_in(given):
         if isinstance(value, np.ndarray):
             yield name, None
         if isinstance(value, tuple):
-            yield from ((name, number) for number in range(len(value)))
+            arrays = (number for number, part in enumerate(value) if isinstance(part, np.ndarray))
+            yield from ((name, number) for number in arrays)
 
 
 def replaced(given, place, change):
@@ -418,7 +431,7 @@ def test_copies_of_a_mesh_have_their_own_pointers():
     assert (one[1] == other[1]).all()
 
 
-@pytest.mark.parametrize("name", RESUMED)
+@pytest.mark.parametrize("name", [*RESUMED, "trace_polyline"])
 def test_calls_of_bounded_work_give_the_same_as_a_single_one(name, monkeypatch):
     function, arguments = CALLS[name]
     whole = function(**arguments(20))
@@ -473,6 +486,37 @@ def test_a_curve_does_not_depend_on_the_others(name):
             assert np.array_equal(one[0], other[curve])
 
 
+@given(BAD_INDICES, st.integers(31, 59))
+def test_pieces_outside_the_former_polyline_are_refused(index, node):
+    given = arguments_polyline()
+    given["former_index"][node] = index
+    with pytest.raises(KernelError, match="index is out of range"):
+        nicmm_kernels.trace_polyline(**given)
+
+
+def test_a_traced_polyline_has_the_traces_of_its_steps():
+    """Steps from control points are traced backward, and the others forward."""
+    given = arguments_polyline(60)
+    faces, barycentric, node_index, lost = nicmm_kernels.trace_polyline(**given)
+    assert not lost.any() and len(faces) > 120
+    step = np.arange(60)
+    ahead = (step, (step + 1) % 60)
+    common = {name: given[name] for name in ("surface", "nodes", "places", "limits", "meanwhile")}
+    for is_backward in (False, True):
+        start, end = reversed(ahead) if is_backward else ahead
+        _, counts, crossed, _ = nicmm_kernels.trace_steps(**common, start=start, end=end)
+        pieces = np.split(crossed, np.cumsum(counts)[:-1])
+        for i in np.flatnonzero(given["is_control"] == is_backward):
+            last = node_index[i + 1] if i < 59 else len(faces)
+            piece = faces[node_index[i] : last]
+            # Each point belongs to the face of the segment after it.
+            first = given["places"][0][start[i]]
+            expected = np.append(first, pieces[i])
+            np.testing.assert_array_equal(piece, expected[::-1] if is_backward else expected)
+    sums = barycentric.sum(axis=1)
+    np.testing.assert_allclose(sums[np.delete(np.arange(len(faces)), node_index)], 1.0)
+
+
 def test_segments_that_meet_are_those_of_brute_force(monkeypatch):
     """Two segments meet if each one's ends lie on both sides of the other one."""
     given = arguments_segments()
@@ -502,7 +546,7 @@ def test_an_exception_between_two_calls_ends_the_function(monkeypatch):
     def cancel():
         raise InterruptedError
 
-    for name in RESUMED:
+    for name in [*RESUMED, "trace_polyline"]:
         function, arguments = CALLS[name]
         with pytest.raises(InterruptedError):
             function(**{**arguments(), "meanwhile": cancel})
