@@ -169,10 +169,6 @@ class Nodes:
         """Values at nodes, (n,), as one row per curve, (c, n / c)."""
         return values.reshape(self.curves, -1)
 
-    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of the curves, (c,), repeated for their nodes, (n,)."""
-        return values.repeat(self.per_curve)
-
     @cached_property
     def first(self) -> IntArray:
         """Index of the first node of each curve, (c,)."""
