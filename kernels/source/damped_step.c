@@ -3,8 +3,9 @@
 
 #include "profile_matrix.h"
 
-/* Bands on one side of the diagonal, after the nodes have been put in the order 0, n-1, 1, n-2, …:
-   there, nodes that are at most two apart on the closed curve are at most four positions apart. */
+/* Bands on one side of the diagonal, after the nodes have been put in the order 0, n - 1, 1, n - 2
+   and so on: there, nodes that are at most two apart on the closed curve are at most four positions
+   apart. */
 #define SIDE_BANDS 4
 #define STORED_BANDS (SIDE_BANDS + 1)
 
@@ -20,7 +21,7 @@ static int64_t position_in_order(int64_t node, int64_t n)
 
 /* Solves a positive definite system by Cholesky's method.
 
-   matrix : (n, 5) entries (i, i), (i + 1, i), …, (i + 4, i) of each column; replaced by the factor
+   matrix : (n, 5) entries (i, i), (i + 1, i), ..., (i + 4, i) of each column; becomes the factor
    values : (n) right-hand side, replaced by the solution */
 static int solve(int64_t n, double *matrix, double *values)
 {

@@ -7,7 +7,7 @@ int64_t items_of_even_nodes(int64_t n)
 }
 
 /* Weighted arc lengths at the nodes and at the end of the curve, (n + 1), which is the first node
-   again if the curve is closed. `lengths`, (n), are those of the ways from each node to the next. */
+   again if the curve is closed. `lengths`, (n), are those of the ways to the next nodes. */
 static void find_arcs(const Nodes *nodes, const SpacingRules *rules, const double *lengths,
                       double *arcs)
 {

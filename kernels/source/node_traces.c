@@ -8,7 +8,7 @@
 typedef struct {
     const int64_t *faces;      /* (n) faces of the nodes */
     const double *barycentric; /* (n, 3) coordinates in them; those of starts strictly inside */
-    double detour;             /* greatest length of a trace, relative to the distance of its nodes */
+    double detour;             /* greatest length of a trace, relative to the distance of nodes */
     double fold_margin;        /* length allowed before backward parts over folds are subtracted */
     int64_t most_faces;        /* number of faces after which a trace ends */
 } NodePlaces;
@@ -105,15 +105,15 @@ EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const
 
 /* The polyline of a curve of n nodes, and what is known about it. */
 typedef struct {
-    const uint8_t *is_control;     /* (n) control points, which need not lie strictly inside faces */
-    const uint8_t *kept;           /* (n) nodes after which the former polyline is kept */
-    const int64_t *former_index;   /* (n) index of each node in the former polyline, ascending */
+    const uint8_t *is_control;   /* (n) control points, which need not lie strictly inside faces */
+    const uint8_t *kept;         /* (n) nodes after which the former polyline is kept */
+    const int64_t *former_index; /* (n) index of each node in the former polyline, ascending */
     int64_t former_count;
-    const int64_t *former_faces;   /* (former_count) faces of the segments of the former polyline */
-    const double *former_places;   /* (former_count, 3) coordinates of its points in them */
-    int64_t before;                /* number of points that earlier calls have found */
-    int64_t *node_index;           /* (n) becomes the index of each node in the polyline */
-    uint8_t *lost;                 /* (n) becomes whether the trace to the next node failed */
+    const int64_t *former_faces; /* (former_count) faces of the segments of the former polyline */
+    const double *former_places; /* (former_count, 3) coordinates of its points in them */
+    int64_t before;              /* number of points that earlier calls have found */
+    int64_t *node_index;         /* (n) becomes the index of each node in the polyline */
+    uint8_t *lost;               /* (n) becomes whether the trace to the next node failed */
 } TracedPolyline;
 
 static int add_point(int64_t face, const double *barycentric, Crossings *points)

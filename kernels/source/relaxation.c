@@ -17,8 +17,8 @@ typedef struct {
     int64_t iterations;    /* greatest number of steps */
     int64_t respacing;     /* number of steps from one respacing of the nodes to the next */
     int64_t quiet;         /* number of consecutive quiet steps after which a curve has converged */
-    double least_decrease; /* relative decrease of the energy up to which a step is quiet, if no node
-                              has moved by more than half of longest_move either */
+    double least_decrease; /* relative decrease of the energy up to which a step is quiet, if no
+                              node has moved by more than half of longest_move either */
     double longest_move;   /* trust radius of the linearised energy */
     double least_damping;  /* of the first step, and lower bound afterwards */
     double most_damping;   /* damping above which a curve stays */
