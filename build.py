@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
+KERNELS = ROOT / "kernels"
 VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 DIST = ROOT / "dist"
@@ -44,6 +45,9 @@ LARGEST_ZIP = 120e6
 
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
 """Environment of the tests: there is a process per core, and more threads only slow them down."""
+
+KERNEL_PLATFORMS = ("linux-x64", "linux-arm64", "windows-x64", "macos-arm64", "macos-x64")
+"""Platforms for which the wheel of the compiled kernels is built, with a zip or without."""
 
 # NumPy is not bundled: all extensions share the NumPy that Blender includes.
 BUNDLED = ("libigl", "scipy")
@@ -122,6 +126,7 @@ def ensure_environment() -> None:
     fingerprint = hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest()
     stamp = VENV / "installed.sha256"
     if VENV_PYTHON.exists() and stamp.is_file() and stamp.read_text() == fingerprint:
+        compile_kernels()
         return
     if VENV.is_symlink():
         raise BuildError(
@@ -138,6 +143,18 @@ def ensure_environment() -> None:
             "connection and run the same command again"
         )
     stamp.write_text(fingerprint)
+    compile_kernels()
+
+
+def compile_kernels() -> None:
+    """Compile the kernels unless their sources are unchanged, and let `.venv/` import them."""
+    if run([VENV_PYTHON, KERNELS / "compile_library.py"]) != 0:
+        raise BuildError("The kernels could not be compiled; see the output above")
+    if VENV.is_symlink():
+        return  # the environment of another copy of the sources, which has its own kernels
+    pattern = "Lib/site-packages" if os.name == "nt" else "lib/python*/site-packages"
+    for packages in VENV.glob(pattern):
+        (packages / "nicmm_kernels.pth").write_text(f"{KERNELS}\n", encoding="utf-8")
 
 
 # The extension
@@ -192,6 +209,18 @@ def download(requirement: str, blender_platform: str, python: str) -> Path:
     return next(folder.glob(pattern))
 
 
+def kernel_wheel(name: str) -> Path:
+    """The wheel of the compiled kernels for a platform, built anew; it serves every Python."""
+    folder = DIST / "wheels" / f"{name}-kernels"
+    shutil.rmtree(folder, ignore_errors=True)
+    say(f"Building the wheel of the kernels for {name}")
+    command: list[str | Path] = [VENV_PYTHON, "-m", "pip", "wheel", "--quiet", "--no-deps"]
+    command += ["--no-build-isolation", "--wheel-dir", folder, KERNELS]
+    if run(command, {"NICMM_KERNELS_PLATFORM": name}) != 0:
+        raise BuildError(f"The kernels could not be built for {name}; see the output above")
+    return next(folder.glob("nicmm_kernels-*.whl"))
+
+
 def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bool) -> list[Path]:
     """The wheels that a zip contains, each once."""
     requirements = [pinned(name) for name in BUNDLED]
@@ -208,6 +237,8 @@ def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bo
         if not any(tag in wheel.name for wheel in found):
             raise BuildError(f"No wheel is built for Python {python} itself ({tag.strip('-')})")
         wheels.update({wheel.name: wheel for wheel in found})
+    kernels = kernel_wheel(blender_platform)
+    wheels[kernels.name] = kernels
     return sorted(wheels.values(), key=lambda wheel: wheel.name)
 
 
@@ -282,6 +313,8 @@ def command_demo(arguments: argparse.Namespace) -> int:
 
 def command_test(arguments: argparse.Namespace) -> int:
     ensure_environment()
+    if arguments.sanitize:
+        return test_sanitized(arguments.pytest_arguments)
     checks = {
         "ruff check": ["ruff", "check"],
         "ruff format": ["ruff", "format", "--check"],
@@ -302,6 +335,25 @@ def command_test(arguments: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def test_sanitized(arguments: Sequence[str]) -> int:
+    """Run the quick tests of the core with kernels that check themselves, compiled by gcc."""
+    if run([VENV_PYTHON, KERNELS / "compile_library.py", "sanitized"]) != 0:
+        raise BuildError("gcc with its sanitizers is needed; see the output above")
+    runtime = subprocess.run(
+        ["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
+    )
+    environment = {
+        **ONE_THREAD,
+        "NICMM_KERNELS_LIBRARY": str(KERNELS / "nicmm_kernels/libnicmm_kernels_sanitized.so"),
+        "LD_PRELOAD": runtime.stdout.strip(),
+        # Python itself frees little at its end, and tests ask for more memory than there is.
+        "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",
+    }
+    options = ["--numprocesses=auto", "--dist=worksteal", "-m", "not slow"]
+    where = arguments or ["tests/core", "tests/kernels"]
+    return run([VENV_PYTHON, "-m", "pytest", *options, *where], environment)
+
+
 def command_package(arguments: argparse.Namespace) -> int:
     for blender_platform in arguments.platform or PLATFORMS:
         archive = package(
@@ -311,6 +363,10 @@ def command_package(arguments: argparse.Namespace) -> int:
             arguments.output.resolve(),
         )
         say(f"{archive} ({archive.stat().st_size / 1e6:.0f} MB)")
+    if not arguments.platform:
+        for name in KERNEL_PLATFORMS:
+            if name not in PLATFORMS:  # those of the zips have been built with them
+                say(f"{kernel_wheel(name)}")
     return 0
 
 
@@ -326,6 +382,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
     test = commands.add_parser("test", help="run every check")
     test.add_argument("--quick", action="store_true", help="leave out the slow tests")
+    test.add_argument(
+        "--sanitize",
+        action="store_true",
+        help="run the quick tests of the core with memory checks of the kernels (Linux, gcc)",
+    )
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
     )

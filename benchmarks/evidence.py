@@ -39,6 +39,9 @@ QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
 """Output folder of quick and smoke runs; not under version control."""
 
 WEIGHTS = "nicmm_core/network/weights"
+KERNELS = ROOT / "kernels"
+"""Compiled kernels: all files of the C sources, and of the package that passes arrays to them."""
+
 PRESENTATION = tuple(
     f"benchmarks/{name}.py" for name in ("__init__", "evidence", "progress", "report", "scale")
 )
@@ -162,6 +165,9 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
             continue
         digests[relative], imported = _whole(read(path), path)
         waiting += imported
+    if "nicmm_core/geometry/mesh.py" in digests:  # the first module that uses the kernels
+        for path in sorted([*KERNELS.glob("source/*.[ch]"), *KERNELS.glob("nicmm_kernels/*.py")]):
+            digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
     if "network" not in excluded:
         for path in sorted((ROOT / WEIGHTS).iterdir()):
             if path.is_file() and path.suffix != ".py":

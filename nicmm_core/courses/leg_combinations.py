@@ -14,7 +14,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.crossings import overlapping_segments, segments_meet
+from ..geometry.crossings import meeting_segments
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
@@ -189,7 +189,7 @@ def crossing_legs(curves: LegCurves) -> BoolArray:
     count, leg, legs = curves.nodes.per_curve, curves.leg, curves.ends
     curve = segments.node // count
     group = (leg[curve] // curves.n_legs) * len(curves.surface.mesh.faces) + segments.face
-    one, other = overlapping_segments(group, segments.start, segments.end)
+    one, other = meeting_segments(group, segments.start, segments.end).T
     first, second = curve[one], curve[other]
     kept = (leg[first] != leg[second]) | ((first == second) & (np.abs(one - other) > 1))
     one, other, first, second = one[kept], other[kept], first[kept], second[kept]
@@ -202,10 +202,9 @@ def crossing_legs(curves: LegCurves) -> BoolArray:
                 & (segments.node[one] % count == node)
                 & (segments.node[other] % count == node_there)
             )
-    one, other, first, second = one[~common], other[~common], first[~common], second[~common]
-    meet = segments_meet(segments.start, segments.end, one, other)
+    first, second = first[~common], second[~common]
     crosses = np.zeros((len(leg), len(leg)), dtype=bool)
-    crosses[first[meet], second[meet]] = crosses[second[meet], first[meet]] = True
+    crosses[first, second] = crosses[second, first] = True
     return crosses
 
 

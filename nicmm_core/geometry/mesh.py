@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cached_property
 
 import igl
+import nicmm_kernels
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -160,6 +161,17 @@ class Mesh:
     def is_oriented(self) -> bool:
         """Whether no two faces traverse an edge in the same direction."""
         return not len(self.unoriented_vertices)
+
+    @cached_property
+    def for_kernels(self) -> nicmm_kernels.MeshArrays:
+        """The mesh as compiled kernels read it."""
+        return nicmm_kernels.MeshArrays(
+            np.ascontiguousarray(self.vertices),
+            np.ascontiguousarray(self.faces),
+            self.face_normals,
+            np.ascontiguousarray(self.opposite_sides, np.int64),  # 32 bits in NumPy 1 on Windows
+            self.is_oriented,
+        )
 
     @cached_property
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:

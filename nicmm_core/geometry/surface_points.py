@@ -42,6 +42,12 @@ class SurfacePoints:
         """Positions of the points in space, shape (k, 3)."""
         return interpolated(corners_of(mesh, self.faces), self.barycentric.T).T
 
+    @property
+    def for_kernels(self) -> tuple[IntArray, FloatArray]:
+        """Faces and coordinates as compiled kernels read them."""
+        # Where integers have 32 bits by default, as in NumPy 1 on Windows, indices may have, too.
+        return np.ascontiguousarray(self.faces, np.int64), np.ascontiguousarray(self.barycentric)
+
     def __len__(self) -> int:
         return len(self.faces)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
+import nicmm_kernels
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -14,8 +15,7 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh, edge_lengths
 from ..geometry.normals import normals_and_folds
-from ..geometry.surface_points import SurfacePoints, at_corners, corners_of, interpolated
-from ..geometry.vectors import cross, dot, lengths, unit
+from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import feature_map
 
 FEATURE_TENSION = 600.0
@@ -50,6 +50,18 @@ class CurveSurface:
     feature_map: FloatArray | None = None
     feature_weight: float = 0.0
     folded: BoolArray | None = None
+
+    @cached_property
+    def for_kernels(self) -> nicmm_kernels.SurfaceArrays:
+        """The surface as compiled kernels read it."""
+        feature_map = self.feature_map
+        return nicmm_kernels.SurfaceArrays(
+            self.mesh.for_kernels,
+            np.ascontiguousarray(self.vertex_normals),
+            self.folded,
+            None if feature_map is None else np.ascontiguousarray(feature_map),
+            self.feature_weight,
+        )
 
     @cached_property
     def edge_graph(self) -> sparse.csr_array:
@@ -111,17 +123,36 @@ class Nodes:
         return len(self.positions) // self.curves
 
     @cached_property
+    def for_kernels(self) -> nicmm_kernels.NodeArrays:
+        """The nodes as compiled kernels read them, with what they compute from the positions."""
+        return nicmm_kernels.NodeArrays(
+            *self.places.for_kernels,
+            np.ascontiguousarray(self.positions),
+            np.ascontiguousarray(self.normals),
+            np.ascontiguousarray(self.phi_fea),
+            self.closed,
+            self.curves,
+        )
+
+    @property
     def steps(self) -> FloatArray:
         """Vectors from each node to the next, (n, 3); zero at the last node of an open curve."""
-        steps = self.after_each(self.positions.T) - self.positions.T
-        if not self.closed:
-            steps[:, self.last] = 0.0
-        return steps.T
+        return self.for_kernels.steps
 
-    @cached_property
+    @property
     def step_lengths(self) -> FloatArray:
         """Distances from each node to the next, (n,); zero at the last node of an open curve."""
-        return lengths(self.steps.T)
+        return self.for_kernels.step_lengths
+
+    @property
+    def conormals(self) -> FloatArray:
+        """Unit vectors in the tangent planes, normal to the curve, shape (n, 3)."""
+        return self.for_kernels.conormals
+
+    @property
+    def angles(self) -> FloatArray:
+        """Turning in the tangent planes, in radians, (n,); zero at the ends of open curves."""
+        return self.for_kernels.angles
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -137,10 +168,6 @@ class Nodes:
     def by_curve(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values at nodes, (n,), as one row per curve, (c, n / c)."""
         return values.reshape(self.curves, -1)
-
-    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of the curves, (c,), repeated for their nodes, (n,)."""
-        return values.repeat(self.per_curve)
 
     @cached_property
     def first(self) -> IntArray:
@@ -177,87 +204,10 @@ class Nodes:
         result[..., self.first] = values[..., self.last]
         return result
 
-    @cached_property
-    def conormals(self) -> FloatArray:
-        """Unit vectors in the tangent planes, normal to the curve, shape (n, 3)."""
-        along = self.steps.T / np.maximum(self.step_lengths, tolerances.TINY)
-        return unit(cross(self.normals.T, along + self.before_each(along))).T
-
-    @cached_property
-    def turns(self) -> Turns:
-        """Turning of the curves at the nodes."""
-        after, normal = self.steps.T, self.normals.T
-        before = self.before_each(after)
-        out_before, out_after = dot(before, normal), dot(after, normal)
-        product = cross(before, after)
-        sine, cosine = dot(product, normal), dot(before, after) - out_before * out_after
-        angle = np.arctan2(sine, cosine)
-        if not self.closed:
-            angle[self.first] = angle[self.last] = 0.0
-        return Turns(before, out_before, out_after, product, sine, cosine, angle)
-
-    def conormal_derivatives(self, surface: CurveSurface) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of the normals, (n, 3), and of φ_fea, (n,), by moves along conormals."""
-        mesh, faces, conormals = surface.mesh, self.places.faces, self.conormals.T
-        a, b, c = corners_of(mesh, faces)
-        one, other = b - a, c - a
-        # Barycentric coordinates of the move: least squares in the plane of the face.
-        p, q, r = dot(one, one), dot(one, other), dot(other, other)
-        f, g = dot(one, conormals), dot(other, conormals)
-        # Not below its rounding error, where two long sides are almost parallel.
-        determinant = np.maximum(p * r - q * q, np.finfo(float).eps * p * r)
-        determinant = np.maximum(determinant, tolerances.TINY)
-        u, v = (r * f - q * g) / determinant, (p * g - q * f) / determinant
-        change = np.array([-u - v, u, v])
-        normals, corner_normals = self.normals.T, _corner_normals(surface, faces)
-        length = dot(interpolated(corner_normals, self.places.barycentric.T), normals)
-        turn = interpolated(corner_normals, change) / np.maximum(length, tolerances.TINY)
-        turn -= dot(turn, normals) * normals
-        drift = np.zeros(len(faces))
-        if surface.feature_map is not None:
-            drift = dot(change, surface.feature_map[mesh.faces[faces]].T)
-        return turn.T, drift
-
-
-class Turns(NamedTuple):
-    """Turning of curves at their n nodes.
-
-    Attributes
-    ----------
-    before : (3, n) float array
-        The step to each node.
-    out_before, out_after : (n,) float array
-        Components along the normal of the steps before and after each node.
-    product : (3, n) float array
-        Cross product of both steps.
-    sine, cosine : (n,) float array
-        Sine and cosine of the angle, times the lengths of both steps in the tangent plane.
-    angle : (n,) float array
-        Turning angle in the tangent plane, in radians; zero at the ends of open curves.
-    """
-
-    before: FloatArray
-    out_before: FloatArray
-    out_after: FloatArray
-    product: FloatArray
-    sine: FloatArray
-    cosine: FloatArray
-    angle: FloatArray
-
 
 def nodes_at(surface: CurveSurface, places: SurfacePoints, closed: bool, curves: int = 1) -> Nodes:
     """Create nodes at given places, with the normals and φ_fea that the energy needs."""
-    weight = places.barycentric.T
-    normals = unit(interpolated(_corner_normals(surface, places.faces), weight)).T
-    phi_fea = np.ones(len(places))
-    if surface.feature_map is not None:
-        phi_fea = dot(weight, surface.feature_map[surface.mesh.faces[places.faces]].T)
-    return Nodes(places, closed, places.positions(surface.mesh), normals, phi_fea, curves)
-
-
-def _corner_normals(surface: CurveSurface, faces: IntArray) -> FloatArray:
-    """Vertex normals at the corners, turned to the side of each face, shape (3, 3, n)."""
-    normals = at_corners(surface.mesh, faces, surface.vertex_normals)
-    of_faces = surface.mesh.face_normals.take(faces, axis=0).T.copy()
-    against = dot(normals.swapaxes(0, 1), of_faces[:, None]) < 0.0
-    return np.where(against[:, None], -normals, normals) if against.any() else normals
+    positions, normals, phi_fea = nicmm_kernels.place_nodes(
+        surface.for_kernels, *places.for_kernels
+    )
+    return Nodes(places, closed, positions, normals, phi_fea, curves)

@@ -1,10 +1,11 @@
-"""Spaces the nodes of several curves evenly between their fixed nodes.
+"""Places new nodes on several curves, evenly spaced between fixed nodes.
 
 Nodes are closer together where the normals turn, as around the edge of a thin part.
 """
 
 from __future__ import annotations
 
+import nicmm_kernels
 import numpy as np
 
 from ..geometry import tolerances
@@ -13,44 +14,20 @@ from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import lengths
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .node_traces import NodeTraces, places_along, traces_between_nodes
-from .noded_curve import shifted
 
 NODES_PER_RADIAN = 1.0
 """Additional nodes per radian by which the normals turn."""
 
 SHORT_MOVE = 1e-3
-"""Move, in mean distances between nodes, below which `evened` leaves a node in place."""
+"""Move, in mean distances between nodes, below which a node stays when nodes are respaced."""
+
+RULES = nicmm_kernels.SpacingRules(NODES_PER_RADIAN, SHORT_MOVE)
 
 LENGTH_WITHOUT_TRACE = 2.0
 """Assumed length of a step whose trace fails, relative to the distance between its nodes.
 
 The trace fails around a thin part, where the way over the surface is longer.
 """
-
-
-def evened(surface: CurveSurface, nodes: Nodes, fixed: BoolArray) -> Nodes:
-    """Move nodes so that they are evenly spaced along the straight lines between them.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-        c curves with n / c nodes each.
-    fixed : (n,) bool array
-        Which nodes stay. The first node of each curve is one of them.
-    """
-    arc, along = _even_arcs(nodes, nodes.step_lengths, fixed, 1)
-    last = np.where(nodes.closed, nodes.first, nodes.last)
-    around = np.append(nodes.by_curve(np.arange(len(nodes.positions))), last[:, None], axis=1)
-    path = nodes.positions[around.ravel()]
-    target = np.stack([np.interp(along, arc, axis) for axis in path.T], axis=1)
-    move = target - nodes.positions
-    move -= (move * nodes.normals).sum(axis=1, keepdims=True) * nodes.normals
-    length = np.linalg.norm(move, axis=1)
-    direction = move / np.maximum(length, tolerances.TINY)[:, None]
-    mean = nodes.spread(nodes.by_curve(nodes.step_lengths).mean(axis=1))
-    length[fixed | (length < SHORT_MOVE * mean)] = 0.0
-    return shifted(surface, nodes, direction, length)[0]
 
 
 def resampled(
@@ -126,18 +103,15 @@ def _even_arcs(
     is closed, the last one if it is open. The first array, (c (n / c + 1),), includes these nodes,
     the second one does not.
     """
-    size = nodes.per_curve
-    mean = nodes.by_curve(step_lengths).mean(axis=1)
-    turning = np.linalg.norm(nodes.after_each(nodes.normals.T).T - nodes.normals, axis=1)
-    turning[nodes.step_lengths == 0.0] = 0.0  # at the end of an open curve
-    weighted = nodes.by_curve(step_lengths + NODES_PER_RADIAN * nodes.spread(mean) * turning)
-    ends = np.ones((nodes.curves, size + 1), dtype=bool)
-    ends[:, :-1] = nodes.by_curve(fixed)
-    total = weighted.sum(axis=1)
-    arcs = np.zeros((nodes.curves, size + 1))
-    weighted.cumsum(axis=1, out=arcs[:, 1:])
-    arc = (arcs + (total.cumsum() - total)[:, None]).ravel()
-    count = times * size if nodes.closed else times * (size - 1) + 1
-    wanted = np.arange(nodes.curves)[:, None] * (size + 1) + np.arange(count) / times
-    place = ends.ravel().nonzero()[0]
-    return arc, np.interp(wanted.ravel(), place, arc[place])
+    arcs, wanted = nicmm_kernels.even_arcs(
+        np.ascontiguousarray(nodes.normals).reshape(nodes.curves, -1, 3),
+        nodes.by_curve(nodes.step_lengths),
+        nodes.by_curve(step_lengths),
+        nodes.by_curve(fixed),
+        nodes.closed,
+        times,
+        RULES,
+    )
+    total = arcs[:, -1:]
+    before = total.cumsum(axis=0) - total
+    return (arcs + before).ravel(), (wanted + before).ravel()

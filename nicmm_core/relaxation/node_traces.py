@@ -9,16 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
 from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.crossings import overlapping_segments, segments_meet
+from ..geometry.crossings import meeting_segments
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
-from ..geometry.tracing import Traces, strictly_inside, trace_between
-from ..geometry.vectors import lengths, unit
+from ..geometry.tracing import (
+    MOST_FACES,
+    Traces,
+    fold_margin,
+    strictly_inside,
+    traces_found,
+)
+from ..geometry.vectors import lengths
+from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
 
 DETOUR = 3.0
@@ -93,14 +101,13 @@ def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     size = nodes.per_curve
     curve = segments.node // size
     group = curve * len(surface.mesh.faces) + segments.face
-    one, other = overlapping_segments(group, segments.start, segments.end)
+    one, other = meeting_segments(group, segments.start, segments.end).T
     apart = np.abs(one - other)
     if nodes.closed:
         first = np.searchsorted(curve, np.arange(nodes.curves + 1))
         apart = np.minimum(apart, np.diff(first)[curve[one]] - apart)
     one, other = one[apart > 1], other[apart > 1]
-    meet = segments_meet(segments.start, segments.end, one, other)
-    pairs = np.stack([segments.node[one[meet]], segments.node[other[meet]]], axis=1)
+    pairs = np.stack([segments.node[one], segments.node[other]], axis=1)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
@@ -170,31 +177,23 @@ def traces_of_steps(
     start, end : (m,) int array
         Indices of the nodes at which the traces start and end.
     """
-    mesh, one, other = surface.mesh, nodes.normals[start], nodes.normals[end]
-    if not mesh.is_oriented:  # turn both normals to the same side
-        other = np.where((one * other).sum(axis=1, keepdims=True) < 0.0, -other, other)
-    distance = np.linalg.norm(nodes.positions[end] - nodes.positions[start], axis=1)
-    traces = trace_between(
-        mesh, places[start], places[end], one + other, DETOUR * distance, surface.folded
+    checkpoint()
+    reached, counts, faces, barycentric = nicmm_kernels.trace_steps(
+        surface.for_kernels,
+        nodes.for_kernels,
+        places.for_kernels,
+        np.ascontiguousarray(start, np.int64),
+        np.ascontiguousarray(end, np.int64),
+        step_limits(surface),
+        checkpoint,
     )
-    lost = np.flatnonzero(~traces.reached)
-    if not len(lost):
-        return traces
-    start, end = start[lost], end[lost]
-    onward = nodes.steps
-    backward = -nodes.before_each(onward.T).T
-    goes_on = (nodes.following[start] == end)[:, None]
-    before = np.where(goes_on, -backward[start], -onward[start])
-    after = np.where(goes_on, -onward[end], -backward[end])
-    length = np.maximum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
-    ahead = unit(before.T).T + unit(after.T).T
-    longest = DETOUR * np.maximum(distance[lost], length)
-    found = trace_between(mesh, places[start], places[end], ahead, longest, surface.folded, ahead)
-    reached = traces.reached.copy()
-    reached[lost] = found.reached
-    pair = np.concatenate([traces.pair, lost[found.pair]])
-    order = np.argsort(pair, kind="stable")
-    return Traces(reached, pair[order], joined([traces.crossings, found.crossings])[order])
+    return traces_found(reached, counts, SurfacePoints(faces, barycentric))
+
+
+def step_limits(surface: CurveSurface) -> nicmm_kernels.StepLimits:
+    """Limits of the traces between nodes."""
+    margin = fold_margin(surface.mesh, surface.folded)
+    return nicmm_kernels.StepLimits(DETOUR, margin, MOST_FACES)
 
 
 def _along_edges(

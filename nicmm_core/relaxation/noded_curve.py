@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import nicmm_kernels
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
@@ -23,7 +24,7 @@ from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .node_spacing import arc_lengths, node_arcs
-from .node_traces import traces_of_steps
+from .node_traces import step_limits
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, within which a new node replaces an old point."""
@@ -200,20 +201,10 @@ def shifted(
     int
         Greatest number of faces that a node has passed.
     """
-    going = np.flatnonzero(length)
-    targets, stuck, passed = trace_from(
-        surface.mesh,
-        nodes.places[going],
-        direction.T.take(going, axis=1).T,
-        length.take(going),
-        surface.folded,
+    places, blocked, passed = trace_from(
+        surface.mesh, nodes.places, direction, length, surface.folded
     )
-    faces, barycentric = nodes.places.faces.copy(), nodes.places.barycentric.copy()
-    faces[going], barycentric[going] = targets.faces, targets.barycentric
-    blocked = np.zeros(len(length), dtype=bool)
-    blocked[going] = stuck
-    moved = nodes_at(surface, SurfacePoints(faces, barycentric), nodes.closed, nodes.curves)
-    return moved, blocked, passed
+    return nodes_at(surface, places, nodes.closed, nodes.curves), blocked, passed
 
 
 def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:
@@ -353,85 +344,18 @@ def _traced_polyline(
     (n,) bool array
         Nodes whose trace to the next node failed; there the polyline has no points in between.
     """
-    places = nodes.places
-    n = len(places)
-    node = np.arange(n if curve.closed else n - 1)
-    following = (node + 1) % n
-    changed = ~kept[node]
-    lost = np.zeros(n, dtype=bool)
-    parts = [_kept_pieces(curve, np.flatnonzero(~changed))]
-    controls = np.zeros(n, dtype=bool)
+    controls = np.zeros(len(nodes.positions), dtype=bool)
     controls[curve.control_nodes] = True
-    # A trace must start strictly inside a face. Control points may lie elsewhere, so traces from
-    # them run backward, and no trace joins two control points.
-    untraceable = changed & controls[node] & controls[following]
-    if untraceable.any():
-        lost[node[untraceable]] = True
-        parts.append((node[untraceable], places[node[untraceable]]))
-        changed &= ~untraceable
-    for backwards in (False, True):
-        here = node[changed & (controls[node] == backwards)]
-        ends = (here, following[here])
-        part, reached = _traced_pieces(surface, nodes, here, ends, backwards)
-        lost[here[~reached]] = True
-        parts.append(part)
-    if not curve.closed:
-        parts.append((np.array([n - 1]), places[np.array([n - 1])]))
-    owner = np.concatenate([part[0] for part in parts])
-    order = np.argsort(owner, kind="stable")
-    polyline = joined([part[1] for part in parts])[order]
-    return polyline, np.searchsorted(owner[order], np.arange(n)), lost
-
-
-Pieces = tuple[IntArray, SurfacePoints]
-"""Pieces of a polyline: for each point the node at which its piece starts, and the points.
-
-A piece ends before the next node, and its first point is its node.
-"""
-
-
-def _kept_pieces(curve: NodedCurve, nodes: IntArray) -> Pieces:
-    """The present pieces of the polyline after some nodes."""
-    bounds = np.append(curve.node_index, len(curve.polyline))
-    count = bounds[nodes + 1] - bounds[nodes]
-    owner = np.repeat(nodes, count)
-    offset = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    return owner, curve.polyline[bounds[owner] + offset]
-
-
-def _traced_pieces(
-    surface: CurveSurface,
-    of: Nodes,
-    nodes: IntArray,
-    ends: tuple[IntArray, IntArray],
-    backwards: bool,
-) -> tuple[Pieces, BoolArray]:
-    """Pieces traced from nodes to the next nodes, and which traces reached their ends.
-
-    If `backwards`, each trace runs from the next node to the node, and the piece is its reverse.
-    """
-    mesh, places = surface.mesh, of.places
-    start, end = reversed(ends) if backwards else ends
-    traces = traces_of_steps(surface, of, places, start, end)
-    first, crossings = places[start], traces.crossings
-    if not backwards:
-        owner = np.concatenate([nodes, nodes[traces.pair]])
-        order = np.argsort(owner, kind="stable")
-        points = joined([first, crossings])
-        return (owner[order], points[order]), traces.reached
-    # In the reverse, a crossing belongs to the face that the trace left there, and the first node
-    # to the face in which the trace ended.
-    begins = np.searchsorted(traces.pair, np.arange(len(nodes)))
-    ends_at = np.searchsorted(traces.pair, np.arange(len(nodes)), side="right")
-    came_from = np.roll(crossings.faces, 1)
-    passes = ends_at > begins
-    came_from[begins[passes]] = first.faces[passes]
-    last_face = first.faces.copy()
-    last_face[passes] = crossings.faces[ends_at[passes] - 1]
-    reverse = np.arange(len(crossings))[::-1]
-    crossings = in_faces(mesh, crossings, came_from)[reverse]
-    # Where a trace failed, the coordinates of its node are meaningless and ignored.
-    node_points = in_faces(mesh, places[end], last_face)
-    owner = np.concatenate([nodes, nodes[traces.pair][reverse]])
-    order = np.argsort(owner, kind="stable")
-    return (owner[order], joined([node_points, crossings])[order]), traces.reached
+    checkpoint()
+    faces, barycentric, node_index, lost = nicmm_kernels.trace_polyline(
+        surface.for_kernels,
+        nodes.for_kernels,
+        nodes.places.for_kernels,
+        controls,
+        kept,
+        np.ascontiguousarray(curve.node_index, np.int64),
+        curve.polyline.for_kernels,
+        step_limits(surface),
+        checkpoint,
+    )
+    return SurfacePoints(faces, barycentric), node_index, lost

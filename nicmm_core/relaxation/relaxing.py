@@ -32,7 +32,7 @@ from ..geometry.curve import SurfaceCurve
 from ..progress import CancelledError
 from ..status import Status
 from .curve_nodes import CurveSurface, Nodes
-from .elastic_energy import balance, bending_energy, energy_scales, feature_energy
+from .elastic_energy import balance, bending_energy, energy_scale, feature_energy
 from .levenberg_marquardt import (
     DAMPING_FACTOR,
     Linearised,
@@ -323,8 +323,7 @@ class _State:
     @property
     def energy_scale(self) -> float:
         """Energy that decreases are compared with."""
-        energies = np.array([self.here.energy])
-        return float(energy_scales(self.here.nodes, self.stepping.weights, energies)[0])
+        return energy_scale(self.here.nodes, self.stepping.weights, self.here.energy)
 
     @property
     def predicted_decrease(self) -> float:

@@ -230,9 +230,11 @@ def _with_paths(
     paths: dict[int, SurfacePoints],
 ) -> NodedCurve:
     """The polyline with paths along edges in place of failed traces."""
-    bounds = np.append(node_index, len(polyline))
+    if not paths:
+        return NodedCurve(curve.nodes, curve.control_nodes, polyline, node_index)
+    bounds = np.append(node_index, len(polyline)).tolist()
     parts = [
-        paths.get(node, polyline[np.arange(bounds[node], bounds[node + 1])])
+        paths.get(node, polyline[slice(*bounds[node : node + 2])])
         for node in range(len(node_index))
     ]
     lengths = np.array([len(part) for part in parts])

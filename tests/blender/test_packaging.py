@@ -41,6 +41,23 @@ def test_every_requirement_is_pinned_and_justified():
         build.pinned("blas")
 
 
+def test_kernels_are_compiled_by_the_pinned_compiler():
+    for project in (build.ROOT, build.KERNELS):
+        settings = tomllib.loads((project / "pyproject.toml").read_text())
+        assert build.pinned("ziglang") in settings["build-system"]["requires"]
+
+
+@pytest.mark.slow
+def test_wheel_of_the_kernels_holds_one_library():
+    wheel = build.kernel_wheel("linux-arm64")
+    assert wheel.name.endswith("-py3-none-manylinux_2_28_aarch64.whl")
+    with zipfile.ZipFile(wheel) as opened:
+        files = [name for name in opened.namelist() if ".dist-info/" not in name]
+    binary = [name for name in files if not name.endswith((".py", "/py.typed"))]
+    assert binary == ["nicmm_kernels/libnicmm_kernels.so"]
+    assert {"nicmm_kernels/__init__.py", "nicmm_kernels/library.py"} <= set(files)
+
+
 def test_staged_folder_is_clean(tmp_path):
     build.stage(tmp_path / "stage")
     staged = {path.relative_to(tmp_path / "stage").as_posix() for path in tmp_path.rglob("*")}
@@ -58,7 +75,9 @@ def test_zip_holds_the_wheels_of_every_blender(archive):
     assert sorted(manifest["wheels"]) == sorted(f"./{wheel}" for wheel in wheels)
     assert manifest["platforms"] == [build.this_platform()]
     packages = {wheel.split("/")[1].split("-")[0] for wheel in wheels}
-    assert packages == {"libigl", "scipy"}
+    assert packages == {"libigl", "nicmm_kernels", "scipy"}
+    assert [wheel for wheel in wheels if "nicmm_kernels" in wheel and "-py3-none-" in wheel]
+    assert not [name for name in names if name.endswith((".so", ".dll", ".dylib"))]
     for python in build.BLENDER_PYTHONS:
         assert [wheel for wheel in wheels if f"-cp{python.replace('.', '')}-" in wheel]
     assert {"__init__.py", "nicmm_core/__init__.py", "nicmm_blender/__init__.py"} <= set(names)

@@ -16,11 +16,10 @@ from nicmm_core.relaxation.elastic_energy import (
     ElasticSystem,
     balance,
     bending_energy,
-    curve_energies,
     damped_step,
     elastic_energy,
     elastic_system,
-    energy_scales,
+    energy_scale,
     feature_energy,
     predicted_decrease,
 )
@@ -195,11 +194,11 @@ def test_decreases_are_compared_with_the_energy_without_maps(flat_disc):
     lane = np.full(len(flat_disc.vertices), 0.1)
     nodes = nodes_on(flat_disc, circle(angles(64), 0.6), feature_map=lane)
     weights = balance(surface_of(flat_disc, lane, 1e3), nodes, 1.0, apart=True)
-    energies = curve_energies(nodes, weights)
-    assert energies[0] < 0.0
+    energy = elastic_energy(nodes, weights)
+    assert energy < 0.0
     length = weights.tension * nodes.lengths.sum()
-    scale = energy_scales(nodes, weights, energies)
-    assert scale == pytest.approx([bending_energy(nodes) + length])
+    scale = energy_scale(nodes, weights, energy)
+    assert scale == pytest.approx(bending_energy(nodes) + length)
 
 
 def test_a_lane_does_not_pay_for_length_in_it(flat_disc):
@@ -351,7 +350,6 @@ def test_with_contact_a_step_solves_the_dense_system_too(count, held):
     free[list(held)] = False
     step = damped_step(system, free, damping=0.01)
     kept = dense(system)[np.ix_(free, free)]
-    np.testing.assert_allclose(system.diagonal, np.diag(dense(system)))
     kept = kept + 0.01 * np.diag(kept).max() * np.eye(free.sum())
     np.testing.assert_array_equal(step[~free], 0.0)
     np.testing.assert_allclose(step[free], np.linalg.solve(kept, -system.slope[free]), rtol=1e-7)

@@ -1,0 +1,217 @@
+/* Straight traces between the nodes of curves. */
+#include <string.h>
+
+#include "nodes.h"
+#include "tracing.h"
+
+/* What all traces between nodes have in common. */
+typedef struct {
+    const int64_t *faces;      /* (n) faces of the nodes */
+    const double *barycentric; /* (n, 3) coordinates in them; those of starts strictly inside */
+    double detour;             /* greatest length of a trace, relative to the distance of nodes */
+    double fold_margin;        /* length allowed before backward parts over folds are subtracted */
+    int64_t most_faces;        /* number of faces after which a trace ends */
+} NodePlaces;
+
+/* Traces in the plane that contains the mean normal of both nodes. */
+static int trace_by_normals(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                            int64_t from, int64_t to, TraceRequest *request, Crossings *crossings,
+                            uint8_t *reached, int64_t *work)
+{
+    const double *one = nodes->normals + 3 * from, *other = nodes->normals + 3 * to;
+    /* Without an orientation, both normals are turned to the same side. */
+    double sign = !surface->mesh.is_oriented && dot(one, other) < 0.0 ? -1.0 : 1.0, normal[3];
+    for (int axis = 0; axis < 3; axis++) normal[axis] = one[axis] + sign * other[axis];
+    request->normal = normal;
+    return trace_to(&surface->mesh, surface->folded, places->most_faces, request, crossings,
+                    reached, work);
+}
+
+/* Traces in the plane that contains the mean direction of the curve before and after the step.
+   Around the edge of a thin part the normals of both nodes may be opposite, and no plane that
+   contains their mean contains a trace. */
+static int trace_around_edge(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                             int64_t per_curve, int64_t from, int64_t to, TraceRequest *request,
+                             Crossings *crossings, uint8_t *reached, int64_t *work)
+{
+    int64_t from_first = from - from % per_curve, to_first = to - to % per_curve;
+    int64_t before_from = from > from_first ? from - 1 : from_first + per_curve - 1;
+    int64_t before_to = to > to_first ? to - 1 : to_first + per_curve - 1;
+    int goes_on = before_to == from;
+    const double *earlier = nodes->steps + 3 * (goes_on ? before_from : from);
+    const double *later = nodes->steps + 3 * (goes_on ? to : before_to);
+    double sign = goes_on ? 1.0 : -1.0, ahead[3];
+    double before = length_of(earlier), after = length_of(later);
+    for (int axis = 0; axis < 3; axis++)
+        ahead[axis] = sign * (earlier[axis] / greater(before, TINY)) -
+                      sign * (later[axis] / greater(after, TINY));
+    request->normal = request->ahead = ahead;
+    request->longest = greater(request->longest, places->detour * greater(before, after));
+    return trace_to(&surface->mesh, surface->folded, places->most_faces, request, crossings,
+                    reached, work);
+}
+
+/* Traces from a node to the next one or the previous one, in one of these planes. */
+static int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                      int64_t per_curve, int64_t from, int64_t to, Crossings *crossings,
+                      uint8_t *reached, int64_t *work)
+{
+    CHECK(from, nodes->n);
+    CHECK(to, nodes->n);
+    double distance = distance_between(nodes->positions + 3 * to, nodes->positions + 3 * from);
+    TraceRequest request = {.start_face = places->faces[from],
+                            .start = places->barycentric + 3 * from,
+                            .end_face = places->faces[to],
+                            .end = places->barycentric + 3 * to,
+                            .longest = places->detour * distance,
+                            .fold_margin = places->fold_margin};
+    ++*work;
+    TRY(trace_by_normals(surface, places, nodes, from, to, &request, crossings, reached, work));
+    if (*reached) return OK;
+    return trace_around_edge(surface, places, nodes, per_curve, from, to, &request, crossings,
+                             reached, work);
+}
+
+/* The steps of which traces are asked for, and what was found. */
+typedef struct {
+    int64_t m;
+    const int64_t *from;      /* (m) nodes at which the traces start */
+    const int64_t *to;        /* (m) nodes at which they end: the next ones or the previous ones */
+    uint8_t *reached;         /* (m) becomes whether each trace reached its end */
+    int64_t *crossing_counts; /* (m) becomes the number of crossings of each trace */
+} StepTraces;
+
+/* Traces from m nodes of c curves to the next or previous nodes, from the step of index `done` on.
+
+   It returns early when the traces have passed `most_work` faces, or when the room that is left may
+   not suffice for another trace; `done` is raised to the number of steps that have been traced. */
+EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                         int64_t c, const StepTraces *steps, Crossings *crossings,
+                         int64_t most_work, int64_t *done)
+{
+    if (crossings->room < places->most_faces) return ARRAY_TOO_SMALL;
+    if (c < 1 || nodes->n < c) return INDEX_OUT_OF_RANGE;
+    int64_t work = 0;
+    for (; *done < steps->m && work < most_work; ++*done) {
+        if (crossings->room - crossings->count < places->most_faces) return OK;
+        CHECK(*done, steps->m);
+        int64_t first = crossings->count;
+        TRY(trace_step(surface, places, nodes, nodes->n / c, steps->from[*done], steps->to[*done],
+                       crossings, steps->reached + *done, &work));
+        steps->crossing_counts[*done] = crossings->count - first;
+    }
+    return OK;
+}
+
+/* The polyline of a curve of n nodes, and what is known about it. */
+typedef struct {
+    const uint8_t *is_control;   /* (n) control points, which need not lie strictly inside faces */
+    const uint8_t *kept;         /* (n) nodes after which the former polyline is kept */
+    const int64_t *former_index; /* (n) index of each node in the former polyline, ascending */
+    int64_t former_count;
+    const int64_t *former_faces; /* (former_count) faces of the segments of the former polyline */
+    const double *former_places; /* (former_count, 3) coordinates of its points in them */
+    int64_t before;              /* number of points that earlier calls have found */
+    int64_t *node_index;         /* (n) becomes the index of each node in the polyline */
+    uint8_t *lost;               /* (n) becomes whether the trace to the next node failed */
+} TracedPolyline;
+
+static int add_point(int64_t face, const double *barycentric, Crossings *points)
+{
+    CHECK(points->count, points->room);
+    points->faces[points->count] = face;
+    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
+    points->count++;
+    return OK;
+}
+
+/* Expresses a point in another face that contains it. */
+static int change_face(const Mesh *mesh, int64_t face, int64_t *own_face, double barycentric[3])
+{
+    double changed[3] = {0.0, 0.0, 0.0};
+    for (int j = 0; j < 3; j++) {
+        int64_t corner, vertex;
+        TRY(vertex_at(mesh, 3 * face + j, &corner));
+        for (int k = 0; k < 3; k++) {
+            TRY(vertex_at(mesh, 3 * *own_face + k, &vertex));
+            if (vertex == corner) changed[j] = barycentric[k];
+        }
+    }
+    memcpy(barycentric, changed, sizeof changed);
+    *own_face = face;
+    return OK;
+}
+
+/* Reverses a trace that has come from `start_face`, whose last point is that of index `first`, and
+   whose crossings follow. In the reverse, a crossing belongs to the face that the trace left there,
+   and the last point to the face in which the trace ended. */
+static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Crossings *points)
+{
+    int64_t *faces = points->faces;
+    double *places = points->barycentric;
+    int64_t last = points->count - 1, end_face = last > first ? faces[last] : start_face;
+    TRY(change_face(mesh, end_face, faces + first, places + 3 * first));
+    for (int64_t k = last; k > first; k--) {
+        int64_t left = k > first + 1 ? faces[k - 1] : start_face;
+        TRY(change_face(mesh, left, faces + k, places + 3 * k));
+    }
+    for (int64_t low = first + 1, high = last; low < high; low++, high--) {
+        int64_t face = faces[low];
+        double place[3];
+        faces[low] = faces[high];
+        faces[high] = face;
+        memcpy(place, places + 3 * low, sizeof place);
+        memcpy(places + 3 * low, places + 3 * high, sizeof place);
+        memcpy(places + 3 * high, place, sizeof place);
+    }
+    return OK;
+}
+
+static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, Crossings *points)
+{
+    int64_t first = polyline->former_index[i];
+    int64_t end = i + 1 < n ? polyline->former_index[i + 1] : polyline->former_count;
+    CHECK(first, polyline->former_count);
+    CHECK(end, polyline->former_count + 1);
+    for (int64_t k = first; k < end; k++)
+        TRY(add_point(polyline->former_faces[k], polyline->former_places + 3 * k, points));
+    return OK;
+}
+
+/* Traces a polyline through the nodes of a curve, from the node of index `done` on.
+
+   Where a trace fails, the polyline has no points between the two nodes. The call returns early
+   when the traces have passed `most_work` faces, or when the room that is left may not suffice for
+   another piece; `done` is raised to the number of nodes that have been passed. */
+EXPORTED int trace_polyline(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                            const TracedPolyline *polyline, Crossings *points, int64_t most_work,
+                            int64_t *done)
+{
+    int64_t n = nodes->n, work = 0;
+    int64_t most = 1 + (polyline->former_count > places->most_faces ? polyline->former_count
+                                                                    : places->most_faces);
+    if (points->room < most) return ARRAY_TOO_SMALL;
+    for (; *done < n && work < most_work; ++*done) {
+        if (points->room - points->count < most) return OK;
+        int64_t i = *done, next = node_after(nodes, i), first = points->count;
+        CHECK(i, n);
+        polyline->node_index[i] = polyline->before + first;
+        int has_step = nodes->closed || i < n - 1;
+        if (has_step && polyline->kept[i]) {
+            TRY(copy_piece(polyline, n, i, points));
+            continue;
+        }
+        TRY(add_point(places->faces[i], places->barycentric + 3 * i, points));
+        if (!has_step) continue;
+        /* A trace must start strictly inside a face. So traces from control points run backward,
+           and no trace joins two control points. */
+        uint8_t reached = 0, backward = polyline->is_control[i];
+        if (!(backward && polyline->is_control[next]))
+            TRY(trace_step(surface, places, nodes, n, backward ? next : i, backward ? i : next,
+                           points, &reached, &work));
+        polyline->lost[i] = !reached;
+        if (reached && backward)
+            TRY(reverse_trace(&surface->mesh, places->faces[next], first, points));
+    }
+    return OK;
+}

@@ -1,0 +1,599 @@
+"""The door of the compiled kernels: what does not fit raises an error, and crashes nothing."""
+
+import pickle
+import subprocess
+import sys
+
+import nicmm_kernels
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nicmm_kernels import KernelError
+
+import build
+from nicmm_core import shapes
+from tests.core.checks import points_near
+
+BALL = shapes.sphere(2)
+CONTACT_RULES = nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12)
+LIMITS = nicmm_kernels.TraceLimits(1e-6, 4096)
+BAD_NUMBERS = st.sampled_from([np.nan, np.inf, -np.inf])
+BAD_INDICES = st.integers(-(2**62), 2**62).filter(lambda i: not 0 <= i < len(BALL.faces))
+
+
+def nothing():
+    pass
+
+
+def arguments_from(m=4):
+    """Arguments of `trace_from` for m points, by name."""
+    return {
+        "mesh": BALL.for_kernels,
+        "faces": np.arange(m),
+        "barycentric": np.full((m, 3), 1.0 / 3.0),
+        "directions": np.cross(BALL.face_normals[:m], [0.1, 0.2, 0.3]),
+        "lengths": np.full(m, 0.5),
+        "folded": np.zeros(len(BALL.faces), dtype=bool),
+        "limits": LIMITS,
+        "meanwhile": nothing,
+    }
+
+
+def arguments_between(m=4):
+    """Arguments of `trace_between` for m pairs of points, by name."""
+    third = np.full((m, 3), 1.0 / 3.0)
+    return {
+        "mesh": BALL.for_kernels,
+        "starts": (np.arange(m), third),
+        "ends": (np.arange(m) + 7, third.copy()),
+        "normals": BALL.face_normals[:m].copy(),
+        "longest": np.full(m, 5.0),
+        "folded": np.zeros(len(BALL.faces), dtype=bool),
+        "fold_margin": 0.1,
+        "ahead": None,
+        "most_faces": 4096,
+        "meanwhile": nothing,
+    }
+
+
+def tangled_curves(c, n=60):
+    """Places of the nodes of c closed curves that cross and approach themselves."""
+    angle = np.arange(n) * 2.0 * np.pi / n
+    height = 0.4 * np.sin(3.0 * angle + np.arange(c)[:, None])
+    angle = 2.0 * angle + 0.1 * np.sin(angle)
+    ring = np.sqrt(1.0 - height**2)
+    positions = np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=-1)
+    places = points_near(BALL, positions.reshape(-1, 3))
+    return places.faces.reshape(c, n), places.barycentric.reshape(c, n, 3)
+
+
+def rules(smoothness=1.0):
+    return nicmm_kernels.RelaxationRules(
+        LIMITS,
+        CONTACT_RULES,
+        nicmm_kernels.SpacingRules(1.0, 1e-3),
+        nicmm_kernels.EnergyRules(smoothness, 1.0, 4.0, 10.0),
+        nicmm_kernels.StepRules(9, 3, 2, 1e-3, 1.0, 1e-6, 1e2, 10.0, 1e-12),
+    )
+
+
+def arguments_relax(c=4):
+    """Arguments of `relax_curves` for c curves, by name."""
+    faces, barycentric = tangled_curves(c)
+    fixed = np.zeros(faces.shape, dtype=bool)
+    fixed[:, ::20] = True
+    return {
+        "surface": surface_arrays(),
+        "faces": faces,
+        "barycentric": barycentric,
+        "fixed": fixed,
+        "closed": True,
+        "rules": rules(),
+        "meanwhile": nothing,
+    }
+
+
+def arguments_even(c=4, n=9):
+    """Arguments of `even_arcs` for c curves, by name."""
+    fixed = np.zeros((c, n), dtype=bool)
+    fixed[:, ::4] = True
+    return {
+        "normals": np.tile([0.0, 0.0, 1.0], (c, n, 1)),
+        "step_lengths": np.ones((c, n)),
+        "lengths": np.linspace(1.0, 2.0, c * n).reshape(c, n),
+        "fixed": fixed,
+        "closed": True,
+        "times": 3,
+        "rules": nicmm_kernels.SpacingRules(1.0, 1e-3),
+    }
+
+
+def surface_arrays():
+    """The ball with a map."""
+    vertices = BALL.vertices.copy()
+    feature_map = 1.0 + 0.5 * np.sin(9.0 * vertices[:, 0])
+    return nicmm_kernels.SurfaceArrays(BALL.for_kernels, vertices, None, feature_map, 5.0)
+
+
+def arguments_place():
+    """Arguments of `place_nodes`, by name."""
+    faces, barycentric = tangled_curves(1)
+    return {"surface": surface_arrays(), "faces": faces[0], "barycentric": barycentric[0]}
+
+
+def arguments_nodes():
+    """Arguments of `NodeArrays` for one curve, by name."""
+    given = arguments_place()
+    positions, normals, phi_fea = nicmm_kernels.place_nodes(**given)
+    return {
+        "faces": given["faces"],
+        "barycentric": given["barycentric"],
+        "positions": positions,
+        "normals": normals,
+        "phi_fea": phi_fea,
+        "closed": True,
+    }
+
+
+def arguments_contacts():
+    """Arguments of `find_contacts`, by name."""
+    nodes = nicmm_kernels.NodeArrays(**arguments_nodes())
+    pairs = nicmm_kernels.close_pairs(nodes, CONTACT_RULES, 2.0)
+    return {"nodes": nodes, "rules": CONTACT_RULES, "pairs": pairs}
+
+
+def arguments_system():
+    """Arguments of `elastic_system`, by name."""
+    given = arguments_contacts()
+    return {
+        "surface": surface_arrays(),
+        "nodes": given["nodes"],
+        "weights": nicmm_kernels.Weights(3.0, 5.0, 1.0, np.full(60, 0.1)),
+        "shortest": 1e-12,
+        "contacts": nicmm_kernels.find_contacts(**given),
+    }
+
+
+def arguments_energy():
+    """Arguments of `elastic_energy`, by name."""
+    return {name: arguments_system()[name] for name in ("nodes", "weights", "contacts")}
+
+
+def arguments_decrease():
+    """Arguments of `predicted_decrease`, by name."""
+    given = arguments_system()
+    bands, slope, entries = nicmm_kernels.elastic_system(**given)
+    pairs = given["contacts"][0].copy()
+    moves = np.linspace(-1.0, 1.0, 60)
+    return {"bands": bands, "slope": slope, "pairs": pairs, "entries": entries, "moves": moves}
+
+
+def arguments_step():
+    """Arguments of `damped_step`, by name."""
+    given = arguments_decrease()
+    del given["moves"]
+    return {**given, "fixed": np.arange(60) % 20 == 0, "damping": 1e-3}
+
+
+def arguments_steps(m=59):
+    """Arguments of `trace_steps` for m steps of a curve, by name."""
+    given = arguments_nodes()
+    return {
+        "surface": surface_arrays(),
+        "nodes": nicmm_kernels.NodeArrays(**given),
+        "places": (given["faces"], np.clip(given["barycentric"], 1e-6, None)),
+        "start": np.arange(m) + 1,
+        "end": np.arange(m),
+        "limits": nicmm_kernels.StepLimits(3.0, 0.1, 4096),
+        "meanwhile": nothing,
+    }
+
+
+def arguments_polyline(m=30):
+    """Arguments of `trace_polyline` that traces m steps and keeps the others, by name."""
+    given = arguments_steps()
+    faces, barycentric = given["places"]
+    return {
+        **{name: given[name] for name in ("surface", "nodes", "places", "limits", "meanwhile")},
+        "is_control": np.arange(60) % 20 == 0,
+        "kept": np.arange(60) >= m,
+        "former_index": np.arange(60),
+        "former": (faces, barycentric),
+    }
+
+
+def arguments_segments(s=40):
+    """Arguments of `meeting_segments` for s segments in two groups, by name."""
+    generator = np.random.default_rng(5)
+    return {
+        "groups": generator.integers(0, 2, s),
+        "starts": generator.random((s, 2)),
+        "ends": generator.random((s, 2)),
+        "touching": 1e-12,
+        "meanwhile": nothing,
+    }
+
+
+CALLS = {
+    "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
+    "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
+    "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
+    "place_nodes": (nicmm_kernels.place_nodes, arguments_place),
+    "NodeArrays": (nicmm_kernels.NodeArrays, arguments_nodes),
+    "find_contacts": (nicmm_kernels.find_contacts, arguments_contacts),
+    "elastic_energy": (nicmm_kernels.elastic_energy, arguments_energy),
+    "elastic_system": (nicmm_kernels.elastic_system, arguments_system),
+    "damped_step": (nicmm_kernels.damped_step, arguments_step),
+    "predicted_decrease": (nicmm_kernels.predicted_decrease, arguments_decrease),
+    "trace_from": (nicmm_kernels.trace_from, arguments_from),
+    "trace_between": (nicmm_kernels.trace_between, arguments_between),
+    "relax_curves": (nicmm_kernels.relax_curves, arguments_relax),
+    "even_arcs": (nicmm_kernels.even_arcs, arguments_even),
+}
+
+FINITE = {
+    "trace_from": [("barycentric", None), ("directions", None), ("lengths", None)],
+    "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
+    "trace_steps": [("places", 1)],
+    "relax_curves": [("barycentric", None)],
+}
+"""Arrays whose values have to be finite; others may have any values."""
+
+INDICES = {
+    "trace_steps": [("places", 0), ("start", None), ("end", None)],
+    "place_nodes": [("faces", None)],
+    "find_contacts": [("pairs", None)],
+    "elastic_system": [("contacts", 0)],
+    "damped_step": [("pairs", None)],
+    "predicted_decrease": [("pairs", None)],
+    "trace_from": [("faces", None)],
+    "trace_between": [("starts", 0), ("ends", 0)],
+    "relax_curves": [("faces", None)],
+}
+"""Arrays of indices."""
+
+ON_MESHES = ["place_nodes", "relax_curves", "trace_between", "trace_from", "trace_steps"]
+"""Kernels that read a mesh."""
+
+RESUMED = ["trace_from", "trace_between", "trace_steps", "relax_curves", "meeting_segments"]
+"""Kernels whose work has no small bound."""
+
+
+def with_mesh(given, mesh):
+    """Arguments with other arrays of the mesh."""
+    if "surface" not in given:
+        return {**given, "mesh": mesh}
+    normals = BALL.vertices.copy()
+    return {**given, "surface": nicmm_kernels.SurfaceArrays(mesh, normals, None, None, 0.0)}
+
+
+def arrays_in(given):
+    """Names of the arrays among arguments; those in tuples also have a number."""
+    for name, value in given.items():
+        if isinstance(value, np.ndarray):
+            yield name, None
+        if isinstance(value, tuple):
+            arrays = (number for number, part in enumerate(value) if isinstance(part, np.ndarray))
+            yield from ((name, number) for number in arrays)
+
+
+def replaced(given, place, change):
+    """Arguments with one array replaced by a function of it."""
+    name, number = place
+    value = given[name]
+    if number is not None:
+        changed = list(value)
+        changed[number] = change(changed[number])
+        return {**given, name: tuple(changed)}
+    return {**given, name: change(value)}
+
+
+PLACES = [
+    (name, place) for name, (_, arguments) in CALLS.items() for place in arrays_in(arguments())
+]
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_the_arguments_of_these_tests_are_valid(name):
+    function, arguments = CALLS[name]
+    function(**arguments())
+
+
+def array_at(given, place):
+    name, number = place
+    return given[name] if number is None else given[name][number]
+
+
+@pytest.mark.parametrize(("name", "place"), PLACES)
+def test_arrays_that_do_not_fit_are_refused(name, place):
+    function, arguments = CALLS[name]
+    given = arguments()
+    array = array_at(given, place)
+    other_type = np.float32 if array.dtype == np.float64 else np.int32
+    for changed, message in (
+        (array.astype(other_type), f"type {np.dtype(other_type)}; pass"),
+        (array[..., :-1].copy(), "shape .*; pass"),
+        (array[..., None], "shape .*; pass"),
+        (np.repeat(array, 2, axis=0)[::2], "strides .*; pass"),
+        (array[::-1], "strides .*; pass"),
+        (array.tolist(), "is list; pass an array"),
+    ):
+        with pytest.raises(KernelError, match=message):
+            function(**replaced(given, place, lambda array, changed=changed: changed))
+
+
+@given(st.sampled_from(sorted(FINITE)), st.data())
+def test_numbers_that_are_not_finite_are_refused(name, data):
+    function, arguments = CALLS[name]
+
+    def spoilt(array):
+        array = array.copy()
+        array.flat[data.draw(st.integers(0, array.size - 1))] = data.draw(BAD_NUMBERS)
+        return array
+
+    with pytest.raises(KernelError, match="NaN or infinite"):
+        function(**replaced(arguments(), data.draw(st.sampled_from(FINITE[name])), spoilt))
+
+
+@given(st.sampled_from(sorted(INDICES)), BAD_INDICES, st.data())
+def test_indices_of_what_does_not_exist_are_refused(name, index, data):
+    function, arguments = CALLS[name]
+
+    def spoilt(faces):
+        faces = faces.copy()
+        faces.flat[data.draw(st.integers(0, faces.size - 1))] = index
+        return faces
+
+    with pytest.raises(KernelError, match="index is out of range"):
+        function(**replaced(arguments(), data.draw(st.sampled_from(INDICES[name])), spoilt))
+
+
+@given(st.sampled_from(ON_MESHES), BAD_INDICES, st.booleans(), st.integers(0, 10**6))
+def test_meshes_with_wrong_indices_crash_nothing(name, index, in_faces, at):
+    """Only the indices that are used are checked, so a trace elsewhere may succeed."""
+    function, arguments = CALLS[name]
+    faces, opposite = BALL.faces.copy(), BALL.opposite_sides.copy()
+    spoilt = faces.ravel() if in_faces else opposite
+    spoilt[at % spoilt.size] = index if index < 0 else index + 3 * len(BALL.faces)
+    mesh = nicmm_kernels.MeshArrays(BALL.vertices, faces, BALL.face_normals, opposite, True)
+    try:
+        function(**with_mesh(arguments(), mesh))
+    except KernelError as error:
+        assert "index is out of range" in str(error)
+
+
+@given(st.sampled_from(ON_MESHES), st.integers(0, 2**32 - 1))
+def test_meshes_with_arbitrary_neighbours_crash_nothing(name, seed):
+    function, arguments = CALLS[name]
+    rng = np.random.default_rng(seed)
+    opposite = rng.integers(0, 3 * len(BALL.faces), 3 * len(BALL.faces))
+    oriented = bool(rng.integers(2))
+    mesh = nicmm_kernels.MeshArrays(
+        BALL.vertices, BALL.faces, BALL.face_normals, opposite, oriented
+    )
+    function(**with_mesh(arguments(), mesh))
+
+
+@pytest.mark.parametrize(
+    ("place", "change"),
+    [
+        (0, lambda vertices: vertices[:, :2]),
+        (1, lambda faces: faces.astype(np.int32)),
+        (2, lambda normals: normals[:-1]),
+        (3, lambda opposite: opposite.reshape(-1, 3)),
+    ],
+)
+def test_mesh_arrays_that_do_not_fit_are_refused(place, change):
+    arrays = [BALL.vertices, BALL.faces, BALL.face_normals, BALL.opposite_sides]
+    arrays[place] = change(arrays[place])
+    with pytest.raises(KernelError, match="pass"):
+        nicmm_kernels.MeshArrays(*arrays, True)
+
+
+def test_other_arrays_that_do_not_fit_are_refused():
+    normals, none = BALL.vertices.copy(), None
+    with pytest.raises(KernelError, match="vertex_normals has shape"):
+        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals[1:], none, none, 0.0)
+    with pytest.raises(KernelError, match="feature_map has type int64"):
+        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, none, np.arange(len(normals)), 0.0)
+    with pytest.raises(KernelError, match="folded has shape"):
+        nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, np.ones(3, bool), none, 0.0)
+    given = arguments_energy()
+    for held in (np.ones(59), np.ones(60, dtype=np.float32), np.ones(120)[::2]):
+        weights = nicmm_kernels.Weights(1.0, 0.0, 1.0, held)
+        with pytest.raises(KernelError, match="held has"):
+            nicmm_kernels.elastic_energy(**{**given, "weights": weights})
+
+
+def test_kernels_of_one_curve_refuse_several():
+    nodes = nicmm_kernels.NodeArrays(**arguments_nodes(), curves=2)
+    with pytest.raises(KernelError, match="2 curves; pass the nodes of one"):
+        nicmm_kernels.close_pairs(nodes, CONTACT_RULES, 1.0)
+    with pytest.raises(KernelError, match="curves is 7; pass a divisor"):
+        nicmm_kernels.NodeArrays(**arguments_nodes(), curves=7)
+
+
+def test_close_pairs_that_do_not_fit_get_more_room(monkeypatch):
+    given = arguments_contacts()
+    assert len(given["pairs"]) > 60
+    monkeypatch.setattr(nicmm_kernels.energy, "PAIRS_OF_A_NODE", 0)
+    np.testing.assert_array_equal(arguments_contacts()["pairs"], given["pairs"])
+
+
+def test_copies_of_a_mesh_have_their_own_pointers():
+    copy = pickle.loads(pickle.dumps(BALL.for_kernels))
+    assert copy.pointers.vertices != BALL.for_kernels.pointers.vertices
+    one, other = (
+        nicmm_kernels.trace_from(**{**arguments_from(), "mesh": mesh})
+        for mesh in (BALL.for_kernels, copy)
+    )
+    assert (one[1] == other[1]).all()
+
+
+@pytest.mark.parametrize("name", [*RESUMED, "trace_polyline"])
+def test_calls_of_bounded_work_give_the_same_as_a_single_one(name, monkeypatch):
+    function, arguments = CALLS[name]
+    whole = function(**arguments(20))
+    pauses = []
+    monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 7)
+    parts = function(**{**arguments(20), "meanwhile": lambda: pauses.append(None)})
+    assert len(pauses) > 5
+    for one, other in zip(whole, parts, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_crossings_that_do_not_fit_are_found_in_several_calls(monkeypatch):
+    whole = nicmm_kernels.trace_between(**arguments_between(40))
+    monkeypatch.setattr(nicmm_kernels.traces, "CROSSINGS_OF_A_TRACE", 0)
+    few = nicmm_kernels.trace_between(**{**arguments_between(40), "most_faces": 30})
+    for one, other in zip(whole, few, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_contacts_that_do_not_fit_get_more_room(monkeypatch):
+    whole = nicmm_kernels.relax_curves(**arguments_relax())
+    monkeypatch.setattr(nicmm_kernels.energy, "PAIRS_OF_A_NODE", 0)
+    pauses = []
+    given = {**arguments_relax(), "meanwhile": lambda: pauses.append(None)}
+    few = nicmm_kernels.relax_curves(**given)
+    assert pauses
+    for one, other in zip(whole, few, strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", ["relax_curves", "even_arcs"])
+def test_curves_without_a_fixed_start_or_without_nodes_are_refused(name):
+    function, arguments = CALLS[name]
+    given = arguments()
+    fixed = given["fixed"].copy()
+    fixed[2, 0] = False
+    with pytest.raises(KernelError, match="first node"):
+        function(**{**given, "fixed": fixed})
+    key = "faces" if "faces" in given else "fixed"
+    with pytest.raises(KernelError, match="one row per curve"):
+        function(**{**given, key: given[key][:, :0]})
+
+
+@pytest.mark.parametrize("name", ["relax_curves", "even_arcs"])
+def test_a_curve_does_not_depend_on_the_others(name):
+    function, arguments = CALLS[name]
+    given = arguments()
+    together = function(**given)
+    for curve in range(4):
+        own = {k: v[[curve]] if isinstance(v, np.ndarray) else v for k, v in given.items()}
+        for one, other in zip(function(**own), together, strict=True):
+            assert np.array_equal(one[0], other[curve])
+
+
+@given(BAD_INDICES, st.integers(31, 59))
+def test_pieces_outside_the_former_polyline_are_refused(index, node):
+    given = arguments_polyline()
+    given["former_index"][node] = index
+    with pytest.raises(KernelError, match="index is out of range"):
+        nicmm_kernels.trace_polyline(**given)
+
+
+def test_a_traced_polyline_has_the_traces_of_its_steps():
+    """Steps from control points are traced backward, and the others forward."""
+    given = arguments_polyline(60)
+    faces, barycentric, node_index, lost = nicmm_kernels.trace_polyline(**given)
+    assert not lost.any() and len(faces) > 120
+    step = np.arange(60)
+    ahead = (step, (step + 1) % 60)
+    common = {name: given[name] for name in ("surface", "nodes", "places", "limits", "meanwhile")}
+    for is_backward in (False, True):
+        start, end = reversed(ahead) if is_backward else ahead
+        _, counts, crossed, _ = nicmm_kernels.trace_steps(**common, start=start, end=end)
+        pieces = np.split(crossed, np.cumsum(counts)[:-1])
+        for i in np.flatnonzero(given["is_control"] == is_backward):
+            last = node_index[i + 1] if i < 59 else len(faces)
+            piece = faces[node_index[i] : last]
+            # Each point belongs to the face of the segment after it.
+            first = given["places"][0][start[i]]
+            expected = np.append(first, pieces[i])
+            np.testing.assert_array_equal(piece, expected[::-1] if is_backward else expected)
+    sums = barycentric.sum(axis=1)
+    np.testing.assert_allclose(sums[np.delete(np.arange(len(faces)), node_index)], 1.0)
+
+
+def test_segments_that_meet_are_those_of_brute_force(monkeypatch):
+    """Two segments meet if each one's ends lie on both sides of the other one."""
+    given = arguments_segments()
+    start, end = given["starts"], given["ends"]
+
+    def side(a, b, c):
+        return np.sign(np.cross(b - a, c - a))
+
+    expected = {
+        (i, j)
+        for i in range(40)
+        for j in range(i + 1, 40)
+        if given["groups"][i] == given["groups"][j]
+        and side(start[i], end[i], start[j]) != side(start[i], end[i], end[j])
+        and side(start[j], end[j], start[i]) != side(start[j], end[j], end[i])
+    }
+    for room in (4, 0):  # in one call or in many
+        monkeypatch.setattr(nicmm_kernels.crossings, "PAIRS_OF_A_SEGMENT", room)
+        found = nicmm_kernels.meeting_segments(**given)
+        assert {tuple(sorted(pair)) for pair in found.tolist()} == expected
+        assert len(found) == len(expected) > 50
+
+
+def test_an_exception_between_two_calls_ends_the_function(monkeypatch):
+    monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 1)
+
+    def cancel():
+        raise InterruptedError
+
+    for name in [*RESUMED, "trace_polyline"]:
+        function, arguments = CALLS[name]
+        with pytest.raises(InterruptedError):
+            function(**{**arguments(), "meanwhile": cancel})
+
+
+@pytest.mark.parametrize("name", [*RESUMED, "even_arcs"])
+def test_no_points_or_curves_give_no_result(name):
+    function, arguments = CALLS[name]
+    for part in function(**arguments(0)):
+        assert isinstance(part, int) or len(part) == 0
+
+
+def test_a_library_of_another_version_says_what_to_do():
+    """The extension reports ImportErrors in a message of its own."""
+    for kind in (KernelError, ImportError):
+        with pytest.raises(kind, match="have no future_kernel: they are those of another version"):
+            nicmm_kernels.library.Kernel("future_kernel")()
+
+
+@pytest.mark.slow
+def test_missing_library_says_what_to_do(tmp_path):
+    script = (
+        "import nicmm_core as n, nicmm_core.shapes as s; n.design_curve(s.sphere(2), [0, 9, 50])"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=build.ROOT,
+        env={"PYTHONPATH": "kernels", "NICMM_KERNELS_LIBRARY": str(tmp_path / "none.so")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "MissingLibraryError: The compiled kernels of NICMM Curves for" in ran.stderr
+    assert "cannot be loaded" in ran.stderr and "Install the package" in ran.stderr
+
+
+def test_the_library_is_that_of_the_present_sources():
+    stamp = build.KERNELS / "nicmm_kernels" / "compiled.sha256"
+    ran = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import compile_library as c; print(c.fingerprint(c.this_platform()))",
+        ],
+        cwd=build.KERNELS,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert stamp.read_text() == ran.stdout.strip(), "run python3 build.py test to compile it"
