@@ -358,7 +358,9 @@ class TestProgress:
         (curve,) = design.curves
         assert_valid_curve(body, curve, visited(body, CHOSEN, curve))
 
-    def test_errors_of_the_progress_function_reach_the_caller(self, small_ball):
+    def test_errors_of_the_progress_function_reach_the_caller(self, small_ball, monkeypatch):
+        monkeypatch.setattr(progress, "INTERVAL", 0.0)
+
         class OwnError(Exception):
             pass
 
