@@ -109,14 +109,23 @@ class Attempts:
         return [each.noded_curve for each in self.relaxed]
 
     @property
+    def energies(self) -> list[float]:
+        """Energies of the curves.
+
+        The length of the first curve is the scale of all of them. So the order of two curves does
+        not depend on later ones, and a further attempt never leads to a worse result.
+        """
+        scale = self.curves[0].length
+        return energies_of(self.surface, self.curves, self.smoothness, scale)
+
+    @property
     def best(self) -> int:
         """Index of the curve of least energy."""
-        energies = energies_of(self.surface, self.curves, self.smoothness)
-        return energies.index(min(energies))
+        return self.energies.index(min(self.energies))
 
     def by_energy(self) -> list[int]:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
-        return distinct_by_energy(self.surface, self.curves, self.smoothness)
+        return distinct_by_energy(self.surface, self.curves, self.energies)
 
     def end_search(self, of_part: bool = False) -> None:
         """Record that the courses found by a search, of the whole curve or a part, are relaxed."""
@@ -125,12 +134,13 @@ class Attempts:
         if not before or before == len(self.relaxed):
             self.searches_without_gain += bool(before)
             return
-        energies = energies_of(self.surface, self.curves, self.smoothness)
+        energies = self.energies
         least, found = min(energies[:before]), min(energies[before:])
         earlier = self.curves[energies.index(least)]
         # With lanes energies may be negative, so decreases are relative to the elastic energy.
         unpainted = replace(self.surface, feature_map=None)
-        (elastic,) = energies_of(unpainted, [earlier], self.smoothness)
+        scale = self.curves[0].length
+        (elastic,) = energies_of(unpainted, [earlier], self.smoothness, scale)
         gained = least - found > LEAST_GAIN * elastic
         self.searches_without_gain = 0 if gained else self.searches_without_gain + 1
         if gained or not of_part:

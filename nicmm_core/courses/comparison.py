@@ -12,7 +12,6 @@ from ..geometry.curve import SurfaceCurve, resample
 from ..geometry.mesh import Mesh
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
-from ..relaxation.noded_energies import energies_of
 
 SAME_COURSE = 0.02
 """Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
@@ -22,11 +21,11 @@ SAMPLES = 500
 
 
 def distinct_by_energy(
-    surface: CurveSurface, curves: Sequence[NodedCurve], smoothness: float
+    surface: CurveSurface, curves: Sequence[NodedCurve], energies: Sequence[float]
 ) -> list[int]:
     """Indices of curves by ascending energy, without those that equal a curve of less energy."""
     chosen: list[int] = []
-    for number in np.argsort(energies_of(surface, curves, smoothness), kind="stable").tolist():
+    for number in np.argsort(energies, kind="stable").tolist():
         if is_apart(surface, curves[number], [curves[each] for each in chosen]):
             chosen.append(number)
     return chosen

@@ -10,10 +10,13 @@ from .noded_curve import NodedCurve
 
 
 def energies_of(
-    surface: CurveSurface, curves: Sequence[NodedCurve], smoothness: float
+    surface: CurveSurface,
+    curves: Sequence[NodedCurve],
+    smoothness: float,
+    length_scale: float | None = None,
 ) -> list[float]:
-    """Energies of curves, with the least length among them as the common length scale."""
-    scale = min(curve.length for curve in curves)
+    """Energies of curves on a common length scale, by default the least length among them."""
+    scale = min(curve.length for curve in curves) if length_scale is None else length_scale
     return [
         float(comparable_energies(surface, curve.nodes, smoothness, scale)[0]) for curve in curves
     ]
