@@ -99,7 +99,7 @@ def _across_gaps(mesh: Mesh, edges: IntArray) -> IntArray:
     shortest = np.full(len(rim), np.inf)
     np.minimum.at(shortest, ends.reshape(-1, 2), lengths[:, None])
     checkpoint()
-    tree = cKDTree(mesh.vertices[rim])
+    tree = cKDTree(mesh.vertices[rim], balanced_tree=False, compact_nodes=False)
     checkpoint()
     pairs = tree.query_pairs(tolerances.GAP * mesh.diagonal, output_type="ndarray")
     checkpoint()

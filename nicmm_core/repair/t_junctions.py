@@ -12,13 +12,18 @@ from scipy.spatial import cKDTree
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import grouped
-from ..geometry.mesh import Mesh, edge_keys, side_keys
+from ..geometry.mesh import Mesh, blocks, edge_keys, side_keys
 from ..progress import checkpoint
 from .coincident_vertices import open_edges
 from .face_parts import FaceParts
 
 ROUNDS = 64
 """Greatest number of rounds. In each, every open edge is divided once, near its middle."""
+
+
+MOST_OPEN_EDGES = 300_000
+"""Number of open edges above which T-junctions are not sought. Such a mesh is a heap of separate
+faces rather than a few patches, and the search would take seconds."""
 
 
 def without_t_junctions(
@@ -77,15 +82,14 @@ def _vertices_on_edges(
         Its position, as a fraction from the first end to the second.
     """
     none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
-    if len(edges) < 3:
+    if not 3 <= len(edges) <= MOST_OPEN_EDGES:
         return none
     rim = np.unique(edges)
     start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
     middle, radius = 0.5 * (start + end), 0.5 * np.linalg.norm(end - start, axis=1)
-    tree = cKDTree(vertices[rim])
-    checkpoint()
+    tree = cKDTree(vertices[rim], balanced_tree=False, compact_nodes=False)
     # The ends of an edge are as far from its middle as the radius, so any vertex on it is nearer.
-    nearest, _ = tree.query(middle, k=1)
+    nearest = np.concatenate([tree.query(middle[block], k=1)[0] for block in blocks(len(middle))])
     crossed = np.flatnonzero(nearest < radius - tolerance)
     if not len(crossed):
         return none
