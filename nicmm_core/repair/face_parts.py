@@ -42,6 +42,17 @@ class FaceParts:
         corners = None if self.corners is None else self.corners[which]
         return FaceParts(self.faces[which], self.parent[which], corners)
 
+    def joined(self, others: FaceParts) -> FaceParts:
+        """These triangles, followed by others."""
+        corners = None
+        if self.corners is not None or others.corners is not None:
+            corners = np.concatenate([self.all_corners, others.all_corners])
+        return FaceParts(
+            np.concatenate([self.faces, others.faces]),
+            np.concatenate([self.parent, others.parent]),
+            corners,
+        )
+
     def renumbered(self, number: IntArray) -> FaceParts:
         """The triangles with other vertices, given the new index of each vertex."""
         return FaceParts(number[self.faces], self.parent, self.corners)

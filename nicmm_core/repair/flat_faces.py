@@ -16,7 +16,7 @@ from ..progress import checkpoint
 from .degenerate_faces import degenerate_faces
 from .face_parts import FaceParts
 
-ROUNDS = 100
+ROUNDS = 1_000
 """Greatest number of rounds. In each, faces that do not affect one another are removed, so faces
 that lie over one another, such as a fan without area, need several."""
 
@@ -45,24 +45,37 @@ def without_flat_faces(
     (d, 3) int array
         Vertices at which sides of faces were divided, and the two ends of the side of each.
     """
+    flat = degenerate_faces(vertices, parts.faces, short)
+    if not flat.any():
+        return parts, np.arange(len(vertices)), np.zeros((0, 3), dtype=np.int64)
+    # Nothing changes but these faces and those that share a vertex with them.
+    touched = np.zeros(len(vertices), dtype=bool)
+    touched[parts.faces[flat]] = True
+    near = touched[parts.faces].any(axis=1)
+    changed, place, divisions = _without_flat_faces(vertices, parts.taken(near), short)
+    return parts.taken(~near).joined(changed), place, divisions
+
+
+def _without_flat_faces(
+    vertices: FloatArray, parts: FaceParts, short: float
+) -> tuple[FaceParts, IntArray, IntArray]:
+    """`without_flat_faces`, with work in proportion to the faces and the rounds."""
     divisions = [np.zeros((0, 3), dtype=np.int64)]
     place = np.arange(len(vertices))
-    flat = degenerate_faces(vertices, parts.faces, short)
     for _ in range(ROUNDS):
+        checkpoint()
+        flat = degenerate_faces(vertices, parts.faces, short)
         if not flat.any():
             break
-        checkpoint()
         merged = _merged(vertices, parts.faces[flat], short)
         if merged is not None:
             place = merged[place]
-            parts = parts.renumbered(merged).distinct()
             divisions = [merged[each] for each in divisions]
-            flat = degenerate_faces(vertices, parts.faces, short)
-            continue
-        parts, divided = _without_caps(vertices, parts, flat)
+            parts = parts.renumbered(merged)
+        else:
+            parts, divided = _without_caps(vertices, parts, flat)
+            divisions.append(divided)
         parts = parts.distinct()
-        divisions.append(divided)
-        flat = degenerate_faces(vertices, parts.faces, short)
     return parts, place, np.concatenate(divisions)
 
 
@@ -83,7 +96,8 @@ def _without_caps(
 ) -> tuple[FaceParts, IntArray]:
     """Remove flat faces with a corner on the opposite side, and divide the faces beyond it.
 
-    Of flat faces that concern the same face, only the first is removed.
+    Of flat faces that concern the same face, only one is removed. Those beyond which there is
+    another flat face wait until that one has been removed.
 
     Returns
     -------
@@ -93,10 +107,13 @@ def _without_caps(
         Vertices at which sides were divided, and the two ends of the side of each.
     """
     caps = np.flatnonzero(flat)
-    corners = vertices[parts.faces[caps]]
-    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-    tip = np.einsum("fcd,fcd->fc", sides, sides).argmax(axis=1)
+    tip = _opposite_longest_side(vertices, parts.faces[caps])
     rank, beyond = _faces_beyond(parts.faces, caps, tip)
+    waits = np.zeros(len(caps), dtype=bool)
+    waits[rank[flat[beyond]]] = True
+    if not waits.all():
+        caps, tip = caps[~waits], tip[~waits]
+        rank, beyond = _faces_beyond(parts.faces, caps, tip)
     claims = np.full(len(flat), len(caps))
     np.minimum.at(claims, caps, np.arange(len(caps)))
     np.minimum.at(claims, beyond, rank)
@@ -104,11 +121,9 @@ def _without_caps(
     removed[rank[claims[beyond] != rank]] = False
     kept = removed[rank]
     rank, beyond = rank[kept], beyond[kept]
-    row = np.arange(len(caps))
     middle = parts.faces[caps, tip][rank]
     start, end = parts.faces[caps, tip - 2][rank], parts.faces[caps, tip - 1][rank]
-    along = sides[row, tip][rank]
-    offset = vertices[middle] - vertices[start]
+    along, offset = vertices[end] - vertices[start], vertices[middle] - vertices[start]
     share = np.einsum("kd,kd->k", offset, along) / np.einsum("kd,kd->k", along, along)
     # A face beyond that has the tip as its corner has the same corners, and takes the place.
     apart = ~(parts.faces[beyond] == middle[:, None]).any(axis=1)
@@ -118,6 +133,13 @@ def _without_caps(
     left = np.ones(len(divided.faces), dtype=bool)
     left[caps[removed]] = False
     return divided.taken(left), np.stack([middle, start, end], axis=1)[apart]
+
+
+def _opposite_longest_side(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """The corner opposite the longest side of each face, (f,)."""
+    corners = vertices[faces]
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    return np.einsum("fcd,fcd->fc", sides, sides).argmax(axis=1)
 
 
 def _faces_beyond(faces: IntArray, chosen: IntArray, corner: IntArray) -> tuple[IntArray, IntArray]:

@@ -28,7 +28,7 @@ def defective_meshes() -> Iterator[tuple[str, Mesh]]:
     yield "collapsed edges", Mesh(_collapsed(vertices, faces, 20), faces)
     yield "collapsed faces", Mesh(_collapsed_faces(vertices, faces, 20), faces)
     yield "caps", Mesh(*_with_caps(vertices, faces, faces[::9]))
-    yield "fans without area", Mesh(*_with_fans(vertices, faces, 12))
+    yield "fans without area", Mesh(*with_fans(vertices, faces, 12))
     yield "soup", Mesh(vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3))
     yield "seam", _seam(ball)
     yield "touching boxes", _touching_boxes()
@@ -94,7 +94,7 @@ def _with_needles(
     return np.concatenate([vertices, added]), np.concatenate([faces[~same], *around])
 
 
-def _with_fans(vertices: FloatArray, faces: IntArray, size: int) -> tuple[FloatArray, IntArray]:
+def with_fans(vertices: FloatArray, faces: IntArray, size: int) -> tuple[FloatArray, IntArray]:
     """Mesh with an edge subdivided on one side only; a fan of faces without area closes the gap."""
     a, b, c = faces[0]
     along = np.linspace(0.0, 1.0, size + 2)[1:-1, None]

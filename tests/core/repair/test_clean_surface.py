@@ -14,7 +14,7 @@ from nicmm_core.repair.nonmanifold import manifold
 from nicmm_core.repair.straight_edges import straightened
 from tests.core.checks import grid, joined, random_surface_points
 from tests.oracles import same_surface
-from tests.oracles.defects import defective_meshes
+from tests.oracles.defects import defective_meshes, with_fans
 
 HEIGHT = shapes.sphere(2).vertices[:, 2:]
 EGG = shapes.sphere(2).vertices * [1.0, 0.8, 1.4] * (1.0 + 0.2 * HEIGHT)
@@ -150,3 +150,15 @@ def test_every_point_of_the_mesh_has_a_place_on_the_manifold(name):
             assert len(found)
             there = found.positions(mapped.mesh) + mapped.origin
             np.testing.assert_allclose(there, np.tile(point, (len(found), 1)), atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [12, 300])
+def test_a_fan_without_area_is_removed_whole(size):
+    """Its faces lie over one another, so one can be removed only after another."""
+    ball = shapes.sphere(2)
+    mesh = nicmm.Mesh(*with_fans(ball.vertices, ball.faces, size))
+    mapped = repaired(mesh)
+    assert mapped.repairs == {"faces without area removed": size}
+    assert not mapped.moved
+    straight = straightened(mapped.mesh, mapped.divisions)
+    assert len(straight.mesh.faces) == len(ball.faces)
