@@ -315,6 +315,8 @@ def command_test(arguments: argparse.Namespace) -> int:
     ensure_environment()
     if arguments.sanitize:
         return test_sanitized(arguments.pytest_arguments)
+    if arguments.platforms:
+        return run([VENV_PYTHON, "-m", "tests.kernels.platforms.compare"], ONE_THREAD)
     checks = {
         "ruff check": ["ruff", "check"],
         "ruff format": ["ruff", "format", "--check"],
@@ -386,6 +388,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--sanitize",
         action="store_true",
         help="run the quick tests of the core with memory checks of the kernels (Linux, gcc)",
+    )
+    test.add_argument(
+        "--platforms",
+        action="store_true",
+        help="compare the results of the kernels of all platforms, bit by bit (qemu-user, wine)",
     )
     test.add_argument(
         "pytest_arguments", nargs=argparse.REMAINDER, help="passed to pytest, such as tests/blender"
