@@ -7,6 +7,12 @@ Python. While it computes, other threads of Python run.
 """
 
 from .crossings import meeting_segments
+from .edge_paths import (
+    EdgeGraphArrays,
+    distances_along_edges,
+    nearest_cells,
+    points_on_edge_paths,
+)
 from .energy import (
     ContactRules,
     EnergyRules,
@@ -22,12 +28,14 @@ from .energy import (
 )
 from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
-from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
+from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
+from .traced_places import TraceArrays, places_on_traces, segment_ends
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
 
 __all__ = [
     "ContactRules",
+    "EdgeGraphArrays",
     "EnergyRules",
     "KernelError",
     "MeshArrays",
@@ -38,20 +46,26 @@ __all__ = [
     "StepLimits",
     "StepRules",
     "SurfaceArrays",
+    "TraceArrays",
     "TraceLimits",
     "Weights",
     "balance",
     "close_pairs",
     "conormal_derivatives",
     "damped_step",
+    "distances_along_edges",
     "elastic_energy",
     "elastic_system",
-    "even_arcs",
+    "even_places",
     "find_contacts",
     "meeting_segments",
+    "nearest_cells",
     "place_nodes",
+    "places_on_traces",
+    "points_on_edge_paths",
     "predicted_decrease",
     "relax_curves",
+    "segment_ends",
     "trace_between",
     "trace_from",
     "trace_polyline",

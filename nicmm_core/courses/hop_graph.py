@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -132,18 +133,17 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
             mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
         )
     checkpoint()
-    along = csgraph.dijkstra(
-        surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
-    )[:, vertex]
-    np.fill_diagonal(along, np.inf)
-    start, end = _nearest(along, HOPS)
+    start, end, along = nicmm_kernels.nearest_cells(
+        mesh.edge_graph, vertex, HOPS, REACH * spacing, checkpoint
+    )
     size = len(vertex)
-    key = np.unique(np.concatenate([start * size + end, end * size + start]))
-    start, end = key // size, key % size
+    key = np.concatenate([start * size + end, end * size + start])
+    key, first = np.unique(key, return_index=True)
+    start, end, along = key // size, key % size, np.tile(along, 2)[first]
     positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
-    hops = _hops(start, end, along[start, end], positions, normals)
+    hops = _hops(start, end, along, positions, normals)
     in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
-    same_sheet = along[start, end] <= SAME_SHEET * in_space
+    same_sheet = along <= SAME_SHEET * in_space
     hops, key = select_hops(hops, same_sheet), key[same_sheet]
     reverse = np.searchsorted(key, hops.end * size + hops.start)
     return HopGraph(surface, vertex, spacing, hops, reverse)
@@ -401,18 +401,13 @@ def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
 
 def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> FloatArray:
     """Distances along edges from k points to the vertices and the points, (k, V + k)."""
-    mesh, k = surface.mesh, len(points)
+    mesh = surface.mesh
     corners = mesh.faces[points.faces]
-    size = len(mesh.vertices)
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
-    # A sparse graph has no arc where the length is zero.
-    away = np.maximum(away, tolerances.SAME_POSITION * mesh.diagonal)
-    edges = surface.edge_graph
-    values = np.concatenate([edges.data, away.ravel()])
-    columns = np.concatenate([edges.indices, corners.ravel()])
-    rows = np.concatenate([edges.indptr, edges.indptr[-1] + 3 * np.arange(1, k + 1)])
-    matrix = sparse.csr_array((values, columns, rows), shape=(size + k, size + k))
-    return csgraph.dijkstra(matrix, directed=False, indices=size + np.arange(k))
+    to_vertices = nicmm_kernels.distances_along_edges(mesh.edge_graph, corners, away, checkpoint)
+    to_points = (to_vertices[:, corners] + away).min(axis=2)
+    np.fill_diagonal(to_points, 0.0)
+    return np.concatenate([to_vertices, to_points], axis=1)
 
 
 def _at_points(surface: CurveSurface, points: SurfacePoints, values: FloatArray) -> FloatArray:

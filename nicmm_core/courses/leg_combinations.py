@@ -185,7 +185,7 @@ def crossing_legs(curves: LegCurves) -> BoolArray:
 
     Curves that share a control point may touch there.
     """
-    segments = traced_segments(curves.surface.mesh, curves.traces)
+    segments = traced_segments(curves.traces)
     count, leg, legs = curves.nodes.per_curve, curves.leg, curves.ends
     curve = segments.node // count
     group = (leg[curve] // curves.n_legs) * len(curves.surface.mesh.faces) + segments.face
