@@ -7,6 +7,7 @@ Python. While it computes, other threads of Python run.
 """
 
 from .crossings import meeting_segments
+from .distinct_curves import distinct_curves
 from .edge_paths import (
     EdgeGraphArrays,
     distances_along_edges,
@@ -26,12 +27,15 @@ from .energy import (
     find_contacts,
     predicted_decrease,
 )
+from .least_sums import least_sums
+from .legs import PathArrays, best_legs, cell_sets, distinct_routes
 from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
 from .traced_places import TraceArrays, places_on_traces, segment_ends
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
+from .turning_paths import turning_paths
 
 __all__ = [
     "ContactRules",
@@ -41,6 +45,7 @@ __all__ = [
     "MeshArrays",
     "MissingLibraryError",
     "NodeArrays",
+    "PathArrays",
     "RelaxationRules",
     "SpacingRules",
     "StepLimits",
@@ -50,15 +55,20 @@ __all__ = [
     "TraceLimits",
     "Weights",
     "balance",
+    "best_legs",
+    "cell_sets",
     "close_pairs",
     "conormal_derivatives",
     "damped_step",
     "distances_along_edges",
+    "distinct_curves",
+    "distinct_routes",
     "elastic_energy",
     "elastic_system",
     "even_places",
     "find_contacts",
     "meeting_segments",
+    "least_sums",
     "nearest_cells",
     "place_nodes",
     "places_on_traces",
@@ -70,4 +80,5 @@ __all__ = [
     "trace_from",
     "trace_polyline",
     "trace_steps",
+    "turning_paths",
 ]

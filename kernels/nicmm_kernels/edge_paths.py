@@ -9,8 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from . import library
-from .library import COUNT, FLOAT, INT, NUMBER, POINTER, FloatArray, IntArray, Kernel, address, rows
+from .library import (
+    COUNT,
+    FLOAT,
+    INT,
+    NUMBER,
+    POINTER,
+    FloatArray,
+    IntArray,
+    Kernel,
+    address,
+    in_several_calls,
+    rows,
+)
 from .traces import MeshArrays, MeshPointers
 
 
@@ -92,18 +103,6 @@ class EdgeGraphArrays:
         return np.empty(_SEARCH_ITEMS.result(self.vertex_count))
 
 
-def _in_several_calls(
-    kernel: Kernel, count: int, before: tuple[Any, ...], scratch: FloatArray,
-    meanwhile: Callable[[], object], after: tuple[Any, ...] = (),
-) -> None:  # fmt: skip
-    """Call a kernel until it has done `count` items."""
-    done = COUNT(0)
-    while done.value < count:
-        if done.value:
-            meanwhile()
-        kernel(*before, scratch.ctypes.data, len(scratch), library.MOST_WORK, done, *after)
-
-
 def distances_along_edges(
     graph: EdgeGraphArrays, corners: IntArray, away: FloatArray, meanwhile: Callable[[], object]
 ) -> FloatArray:
@@ -126,7 +125,7 @@ def distances_along_edges(
         address("away", away, FLOAT, k, 3),
     )  # fmt: skip
     after = (distances.ctypes.data,)
-    _in_several_calls(_DISTANCES, k, before, graph.scratch(), meanwhile, after)
+    in_several_calls(_DISTANCES, k, before, graph.scratch(), meanwhile, after)
     return distances
 
 
@@ -168,7 +167,7 @@ def nearest_cells(
         cells.ctypes.data, distances.ctypes.data,
     )  # fmt: skip
     scratch = np.empty(len(graph.scratch()) + graph.vertex_count)
-    _in_several_calls(_NEAREST_CELLS, n, (graph.pointers, nearest), scratch, meanwhile)
+    in_several_calls(_NEAREST_CELLS, n, (graph.pointers, nearest), scratch, meanwhile)
     found = np.arange(most) < counts[:, None]
     return np.arange(n).repeat(counts), cells[found], distances[found]
 
@@ -207,5 +206,5 @@ def points_on_edge_paths(
         address("shares", shares, FLOAT, q), longest, faces.ctypes.data, barycentric.ctypes.data,
     )  # fmt: skip
     before = (graph.mesh.pointers, graph.pointers, points)
-    _in_several_calls(_POINTS_ON_PATHS, q, before, graph.scratch(), meanwhile)
+    in_several_calls(_POINTS_ON_PATHS, q, before, graph.scratch(), meanwhile)
     return faces, barycentric

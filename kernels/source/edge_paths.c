@@ -84,7 +84,7 @@ typedef struct {
 /* Number of items of scratch of the functions below, for V vertices. */
 EXPORTED int64_t edge_search_items(int64_t v)
 {
-    return 7 * v;
+    return 4 * v + items_of_queue(v);
 }
 
 static int take_search(Scratch *scratch, int64_t v, Search *search)
@@ -93,7 +93,7 @@ static int take_search(Scratch *scratch, int64_t v, Search *search)
     TRY(take_integers(scratch, v, &search->previous));
     TRY(take_integers(scratch, v, &search->arcs));
     TRY(take_integers(scratch, v, &search->reached));
-    TRY(take_queue(scratch, v, search->distances, &search->queue));
+    TRY(take_queue(scratch, v, &search->queue));
     search->reached_count = 0;
     for (int64_t i = 0; i < v; i++) search->distances[i] = INFINITY;
     return OK;
@@ -111,7 +111,7 @@ static int reach(Search *search, int64_t vertex, double distance, int64_t previo
     search->distances[vertex] = distance;
     search->previous[vertex] = previous;
     search->arcs[vertex] = arc;
-    return enqueue(&search->queue, vertex);
+    return enqueue(&search->queue, vertex, distance);
 }
 
 /* Finds the next vertex by distance, or -1 if there is none; goes on from it up to a distance. */

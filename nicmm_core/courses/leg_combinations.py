@@ -249,8 +249,10 @@ def cheapest_combinations(
         total = total + junctions[number - 1][choice[:, -1] - offset[number - 1]]
         if closed and number == count - 1:
             total = total + junctions[number][:, choice[:, 0]].T
+        crossed = np.zeros(total.shape, dtype=np.uint8)  # number of crossings with earlier legs
         for earlier in range(number):
-            total += price * crosses[:, here].take(choice[:, earlier], axis=0)
+            crossed += crosses[:, here].take(choice[:, earlier], axis=0)
+        total += price * crossed
         best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
         row, curve = np.divmod(best, total.shape[1])

@@ -273,7 +273,93 @@ def arguments_paths(q=12):
     }
 
 
+def arguments_turning(k=2, n=8):
+    """Arguments of `turning_paths` with k control points among n cells, all joined, by name."""
+    generator = np.random.default_rng(7)
+    start, end = np.nonzero(~np.eye(n, dtype=bool))
+    cell = generator.integers(0, n, (k, 4)).ravel()
+    m, d = len(start), len(cell)
+
+    def pairs(begins, states):
+        counts = [len(of_one) for of_one in states]
+        states = np.concatenate([begins[:0], *states])
+        return (
+            np.append(0, np.cumsum(counts)).astype(np.int64),
+            states,
+            generator.random(len(states)),
+        )
+
+    none = np.zeros(0, dtype=np.int64)
+    return {
+        "begins": np.arange(0, d + 1, 4),
+        "weights": generator.random(m + 2 * d),
+        "onward": pairs(none, [np.flatnonzero(start == of_hop) for of_hop in end]),
+        "leaving": pairs(none, [np.flatnonzero(start == at) for at in cell]),
+        "arriving": pairs(none, [np.flatnonzero(np.append(end, cell) == at) for at in cell]),
+        "meanwhile": nothing,
+    }
+
+
+def path_arrays(n=8):
+    """The states and paths of the graph of `arguments_turning`; cells are followed by points."""
+    given = arguments_turning(2, n)
+    costs, previous, first = nicmm_kernels.turning_paths(**given)
+    start, end = np.nonzero(~np.eye(n, dtype=bool))
+    cell = np.random.default_rng(7).integers(0, n, 8)
+    point, m, d = n + np.arange(8) // 4, len(start), 8
+    reverse = np.searchsorted(start * n + end, end * n + start)
+    return nicmm_kernels.PathArrays(
+        n + 2,
+        np.concatenate([start, point, cell]),
+        np.concatenate([end, cell, point]),
+        np.concatenate([reverse, np.arange(m + d, m + 2 * d), np.arange(m, m + d)]),
+        costs,
+        previous,
+        first,
+    )
+
+
+def arguments_legs():
+    """Arguments of `best_legs`, by name."""
+    weights = arguments_turning()["weights"]
+    return {"graph": path_arrays(), "leg": (0, 1), "weights": weights, "rounding": 1e-9}
+
+
+def arguments_routes():
+    """Arguments of `distinct_routes`, by name."""
+    beside = np.eye(10, dtype=bool)
+    beside[[0, 1, 2, 3], [1, 0, 3, 2]] = True
+    return {
+        "graph": path_arrays(),
+        "leg": (0, 1),
+        "beside": nicmm_kernels.cell_sets(beside),
+        "via": np.arange(0, 72, 2),
+        "first_count": 20,
+        "aligned": 40,
+        "different": 40,
+    }
+
+
+def arguments_distinct(c=4):
+    """Arguments of `distinct_curves` for c circles, every second one like the one before."""
+    angle = np.arange(30) * 2.0 * np.pi / 30
+    radius = 1.0 + np.arange(c)[:, None] // 2 + 0.01 * np.arange(c)[:, None]
+    positions = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * radius * angle], -1)
+    return {"positions": positions, "order": np.arange(c), "limit": 0.1, "meanwhile": nothing}
+
+
+def arguments_sums():
+    """Arguments of `least_sums`, by name."""
+    generator = np.random.default_rng(3)
+    return {"one": generator.random((4, 5)), "other": generator.random((5, 3))}
+
+
 CALLS = {
+    "least_sums": (nicmm_kernels.least_sums, arguments_sums),
+    "distinct_curves": (nicmm_kernels.distinct_curves, arguments_distinct),
+    "turning_paths": (nicmm_kernels.turning_paths, arguments_turning),
+    "best_legs": (nicmm_kernels.best_legs, arguments_legs),
+    "distinct_routes": (nicmm_kernels.distinct_routes, arguments_routes),
     "TraceArrays": (nicmm_kernels.TraceArrays, arguments_traces),
     "places_on_traces": (nicmm_kernels.places_on_traces, arguments_on_traces),
     "segment_ends": (nicmm_kernels.segment_ends, arguments_ends),
@@ -324,6 +410,10 @@ INDICES = {
     "distances_along_edges": [("corners", None)],
     "nearest_cells": [("vertices", None)],
     "points_on_edge_paths": [("starts", None), ("ends", None)],
+    "turning_paths": [("onward", 1), ("leaving", 1), ("arriving", 1)],
+    "best_legs": [("graph", 2), ("graph", 3)],
+    "distinct_curves": [("order", None)],
+    "distinct_routes": [("via", None)],
 }
 """Arrays of indices."""
 
@@ -331,8 +421,11 @@ OF_ANY_LENGTH = [
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
     ("nearest_cells", "vertices"),
+    ("turning_paths", "begins"),
+    ("distinct_routes", "via"),
+    ("least_sums", "other"),
 ]
-"""Arrays whose length no other array has."""
+"""Arrays whose last axis has a length that no other array has."""
 
 ON_MESHES = [
     "EdgeGraphArrays",
@@ -346,6 +439,7 @@ ON_MESHES = [
 """Kernels that read a mesh."""
 
 RESUMED = [
+    "distinct_curves",
     "distances_along_edges",
     "meeting_segments",
     "nearest_cells",
@@ -354,6 +448,7 @@ RESUMED = [
     "trace_between",
     "trace_from",
     "trace_steps",
+    "turning_paths",
 ]
 """Kernels whose work has no small bound."""
 
@@ -383,7 +478,8 @@ def replaced(given, place, change):
     if number is not None:
         changed = list(value)
         changed[number] = change(changed[number])
-        return {**given, name: tuple(changed)}
+        kept = type(value)(*changed) if hasattr(value, "_fields") else tuple(changed)
+        return {**given, name: kept}
     return {**given, name: change(value)}
 
 
@@ -417,7 +513,7 @@ def test_arrays_that_do_not_fit_are_refused(name, place):
         (array[::-1], "strides .*; pass"),
         (array.tolist(), "is list; pass an array"),
     ):
-        if (name, place[0]) in OF_ANY_LENGTH and len(changed) < len(array):
+        if (name, place[0]) in OF_ANY_LENGTH and np.size(changed) < array.size:
             continue
         with pytest.raises(KernelError, match=message):
             function(**replaced(given, place, lambda array, changed=changed: changed))
@@ -656,6 +752,15 @@ def test_no_points_or_curves_give_no_result(name):
     function, arguments = CALLS[name]
     for part in function(**arguments(0)):
         assert isinstance(part, int) or len(part) == 0
+
+
+def test_least_sums_are_those_of_all_sums():
+    one, other = arguments_sums().values()
+    one[1, 2] = np.inf
+    expected = (one[:, :, None] + other).min(axis=1)
+    np.testing.assert_array_equal(nicmm_kernels.least_sums(one, other), expected)
+    nothing_between = nicmm_kernels.least_sums(np.zeros((2, 0)), np.zeros((0, 3)))
+    np.testing.assert_array_equal(nothing_between, np.full((2, 3), np.inf))
 
 
 def test_a_library_of_another_version_says_what_to_do():
