@@ -400,6 +400,8 @@ def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> Float
     mesh = surface.mesh
     corners = mesh.faces[points.faces]
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
+    # The bending at a hop without length would be infinite.
+    away = np.maximum(away, tolerances.SAME_POSITION * mesh.diagonal)
     to_vertices = nicmm_kernels.distances_along_edges(mesh.edge_graph, corners, away, checkpoint)
     to_points = (to_vertices[:, corners] + away).min(axis=2)
     np.fill_diagonal(to_points, 0.0)
