@@ -7,6 +7,13 @@ Python. While it computes, other threads of Python run.
 """
 
 from .crossings import meeting_segments
+from .distinct_curves import distinct_curves
+from .edge_paths import (
+    EdgeGraphArrays,
+    distances_along_edges,
+    nearest_cells,
+    points_on_edge_paths,
+)
 from .energy import (
     ContactRules,
     EnergyRules,
@@ -20,40 +27,58 @@ from .energy import (
     find_contacts,
     predicted_decrease,
 )
+from .least_sums import least_sums
+from .legs import PathArrays, best_legs, cell_sets, distinct_routes
 from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
-from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_arcs, place_nodes
+from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
 from .relaxation import RelaxationRules, StepRules, relax_curves
+from .traced_places import TraceArrays, places_on_traces, segment_ends
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
+from .turning_paths import turning_paths
 
 __all__ = [
     "ContactRules",
+    "EdgeGraphArrays",
     "EnergyRules",
     "KernelError",
     "MeshArrays",
     "MissingLibraryError",
     "NodeArrays",
+    "PathArrays",
     "RelaxationRules",
     "SpacingRules",
     "StepLimits",
     "StepRules",
     "SurfaceArrays",
+    "TraceArrays",
     "TraceLimits",
     "Weights",
     "balance",
+    "best_legs",
+    "cell_sets",
     "close_pairs",
     "conormal_derivatives",
     "damped_step",
+    "distances_along_edges",
+    "distinct_curves",
+    "distinct_routes",
     "elastic_energy",
     "elastic_system",
-    "even_arcs",
+    "even_places",
     "find_contacts",
     "meeting_segments",
+    "least_sums",
+    "nearest_cells",
     "place_nodes",
+    "places_on_traces",
+    "points_on_edge_paths",
     "predicted_decrease",
     "relax_curves",
+    "segment_ends",
     "trace_between",
     "trace_from",
     "trace_polyline",
     "trace_steps",
+    "turning_paths",
 ]

@@ -32,6 +32,8 @@ class _PairSearch(ctypes.Structure):
     ]
 
 
+_ORDER_ITEMS = Kernel("order_items", COUNT)
+_ORDER_OF_GROUPS = Kernel("order_of_groups", COUNT, POINTER, POINTER, COUNT, POINTER)
 _MEETING_SEGMENTS = Kernel("meeting_segments", _Segments, NUMBER, COUNT, _PairSearch)
 
 PAIRS_OF_A_SEGMENT = 4
@@ -60,7 +62,8 @@ def meeting_segments(
     """
     s = rows("groups", groups)
     of_groups = address("groups", groups, INT, s)
-    order = np.argsort(groups, kind="stable").astype(np.int64, copy=False)
+    order, scratch = np.empty(s, dtype=np.int64), np.empty(_ORDER_ITEMS.result(s))
+    _ORDER_OF_GROUPS(s, of_groups, scratch.ctypes.data, len(scratch), order.ctypes.data)
     segments = _Segments(
         s, order.ctypes.data, of_groups, address("starts", starts, FLOAT, s, 2),
         address("ends", ends, FLOAT, s, 2),

@@ -16,6 +16,7 @@ import ctypes
 import os
 import platform
 import sys
+from collections.abc import Callable
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,35 @@ class Kernel:
         """Raise KernelError unless a code tells that all is well."""
         if code:
             raise KernelError(f"{self._name}: {_ERRORS.get(code, f'unknown error {code}')}")
+
+
+def in_several_calls(
+    kernel: Kernel,
+    count: int,
+    before: tuple[Any, ...],
+    scratch: FloatArray,
+    meanwhile: Callable[[], object],
+    after: tuple[Any, ...] = (),
+) -> None:
+    """Call a kernel that finishes items in turn until it has finished `count` of them.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Takes scratch and its size, `MOST_WORK` and the number of finished items, after some and
+        before other arguments.
+    count : int
+    before, after : tuples
+        These other arguments.
+    scratch : (q,) float array
+    meanwhile : callable
+        Called between two calls.
+    """
+    done = COUNT(0)
+    while done.value < count:
+        if done.value:
+            meanwhile()
+        kernel(*before, scratch.ctypes.data, len(scratch), MOST_WORK, done, *after)
 
 
 def address(name: str, array: Any, dtype: np.dtype[Any], *shape: int) -> int:

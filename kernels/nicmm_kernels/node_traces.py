@@ -44,7 +44,7 @@ class _StepTraces(ctypes.Structure):
         ("from", POINTER),
         ("to", POINTER),
         ("reached", POINTER),
-        ("crossing_counts", POINTER),
+        ("point_counts", POINTER),
     ]
 
 
@@ -108,7 +108,7 @@ def trace_steps(
     end: IntArray,
     limits: StepLimits,
     meanwhile: Callable[[], object],
-) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+) -> tuple[IntArray, IntArray, FloatArray]:
     """Trace from m nodes to the next or the previous nodes.
 
     The plane of a trace contains the mean normal of both nodes. Where the trace fails, the plane
@@ -128,10 +128,13 @@ def trace_steps(
 
     Returns
     -------
-    The same as `trace_between`.
+    (m,) int array
+        Number of points of each trace, including both ends; 0 if it did not reach its end.
+    (q,) int array, (q, 3) float array
+        The points in order: the face of the segment after each, and coordinates in it.
     """
     m = rows("start", start)
-    found = FoundTraces(m, limits.most_faces)
+    found = FoundTraces(m, limits.most_faces + 2)
     steps = _StepTraces(
         m, address("start", start, INT, m), address("end", end, INT, m),
         found.reached.ctypes.data, found.counts.ctypes.data,
@@ -142,7 +145,7 @@ def trace_steps(
             surface.pointers, placed, nodes.pointers, nodes.curves, steps, found.crossings,
             library.MOST_WORK, found.done,
         )  # fmt: skip
-    return found.result()
+    return found.counts, *found.crossings_in_order()
 
 
 def trace_polyline(

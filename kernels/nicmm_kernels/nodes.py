@@ -207,10 +207,10 @@ class SpacingRules(ctypes.Structure):
     _fields_ = [("nodes_per_radian", NUMBER), ("short_move", NUMBER)]
 
 
-_EVEN_ARCS = Kernel("even_arcs", SpacingRules, *[COUNT] * 4, *[POINTER] * 6)
+_EVEN_PLACES = Kernel("even_places", SpacingRules, *[COUNT] * 4, *[POINTER] * 7)
 
 
-def even_arcs(
+def even_places(
     normals: FloatArray,
     step_lengths: FloatArray,
     lengths: FloatArray,
@@ -218,8 +218,8 @@ def even_arcs(
     closed: bool,
     times: int,
     rules: SpacingRules,
-) -> tuple[FloatArray, FloatArray]:
-    """Arc lengths of c curves of n nodes each, and those at which new nodes are even.
+) -> tuple[IntArray, FloatArray]:
+    """Where new nodes of c curves of n nodes each are even.
 
     Parameters
     ----------
@@ -239,21 +239,21 @@ def even_arcs(
 
     Returns
     -------
-    (c, n + 1) float array
-        Weighted arc lengths at the nodes and at the end of each curve.
+    (c, m) int array
+        The node before each new node, by its index in its curve. There are m = times n new nodes of
+        a closed curve, and times (n - 1) + 1 of an open one.
     (c, m) float array
-        Those of the new nodes. There are m = times n of a closed curve, and times (n - 1) + 1 of an
-        open one.
+        Share of the way from there to the next node.
     """
     c, n = rows_of_curves("fixed", fixed)
     if times < 1:
         raise KernelError(f"times is {times}; pass a positive number")
-    arcs = np.zeros((c, n + 1))
-    wanted = np.zeros((c, times * n if closed else times * (n - 1) + 1))
-    _EVEN_ARCS(
+    m = times * n if closed else times * (n - 1) + 1
+    arcs, at, shares = np.empty(n + 1), np.zeros((c, m), dtype=np.int64), np.zeros((c, m))
+    _EVEN_PLACES(
         rules, c, n, int(closed), times, address("normals", normals, FLOAT, c, n, 3),
         address("step_lengths", step_lengths, FLOAT, c, n),
         address("lengths", lengths, FLOAT, c, n), first_fixed(fixed, c, n),
-        arcs.ctypes.data, wanted.ctypes.data,
+        arcs.ctypes.data, at.ctypes.data, shares.ctypes.data,
     )  # fmt: skip
-    return arcs, wanted
+    return at, shares

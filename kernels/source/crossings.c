@@ -1,6 +1,56 @@
 /* Finds segments that have a common point, face by face. */
-#include "errors.h"
+#include "scratch.h"
 #include "vectors.h"
+
+enum { DIGIT = 11, DIGITS = 1 << DIGIT }; /* number of bits, and of values, of a digit */
+
+/* Number of items of scratch that `order_of_groups` takes. */
+EXPORTED int64_t order_items(int64_t s)
+{
+    return s + DIGITS;
+}
+
+/* Sorts s segments by one digit of their groups; equal ones keep their order. */
+static int sort_by_digit(int64_t s, const int64_t *groups, int shift, const int64_t *from,
+                         int64_t *counts, int64_t *to)
+{
+    for (int64_t digit = 0; digit < DIGITS; digit++) counts[digit] = 0;
+    for (int64_t i = 0; i < s; i++) counts[((uint64_t)groups[i] >> shift) % DIGITS]++;
+    int64_t before = 0;
+    for (int64_t digit = 0; digit < DIGITS; digit++) {
+        int64_t count = counts[digit];
+        counts[digit] = before;
+        before += count;
+    }
+    for (int64_t i = 0; i < s; i++) {
+        CHECK(from[i], s);
+        int64_t place = counts[((uint64_t)groups[from[i]] >> shift) % DIGITS]++;
+        CHECK(place, s);
+        to[place] = from[i];
+    }
+    return OK;
+}
+
+/* Finds the order, (s), in which segments are sorted by their groups, (s), digit by digit. Segments
+   of the same group keep their order. */
+EXPORTED int order_of_groups(int64_t s, const int64_t *groups, double *scratch,
+                             int64_t scratch_items, int64_t *order)
+{
+    Scratch memory = {scratch, scratch_items};
+    int64_t *counts, *sorted;
+    uint64_t used = 0;
+    TRY(take_integers(&memory, DIGITS, &counts));
+    TRY(take_integers(&memory, s, &sorted));
+    for (int64_t i = 0; i < s; i++) {
+        order[i] = i;
+        used |= (uint64_t)groups[i];
+    }
+    for (int shift = 0; shift < 64 && used >> shift; shift += DIGIT) {
+        TRY(sort_by_digit(s, groups, shift, order, counts, sorted));
+        for (int64_t i = 0; i < s; i++) order[i] = sorted[i];
+    }
+    return OK;
+}
 
 /* s segments, each in a group whose segments all lie in one face. */
 typedef struct {

@@ -40,15 +40,18 @@ static void find_even_arcs(const Nodes *nodes, const uint8_t *fixed, int64_t tim
     }
 }
 
-/* Finds the arc lengths of c curves of n nodes, and those at which new nodes are even.
+/* Finds where new nodes of c curves of n nodes are even: the node before each, and the share of the
+   way from there to the next node.
 
    lengths : (c, n) of the ways from each node to the next
    fixed : (c, n) nodes that stay; the first of each curve is one of them
-   arcs : (c, n + 1) become the weighted arc lengths at the nodes and at the end of each curve
-   wanted : (c, m) become the arc lengths of the new nodes, see `find_even_arcs` */
-EXPORTED int even_arcs(const SpacingRules *rules, int64_t c, int64_t n, int64_t closed,
-                       int64_t times, double *normals, double *step_lengths, const double *lengths,
-                       const uint8_t *fixed, double *arcs, double *wanted)
+   arcs : (n + 1) scratch
+   at, shares : (c, m) become the nodes, by their index in their curve, and the shares, see
+       `find_even_arcs` */
+EXPORTED int even_places(const SpacingRules *rules, int64_t c, int64_t n, int64_t closed,
+                         int64_t times, double *normals, double *step_lengths,
+                         const double *lengths, const uint8_t *fixed, double *arcs, int64_t *at,
+                         double *shares)
 {
     int64_t m = closed ? times * n : times * (n - 1) + 1;
     if (times < 1) return INDEX_OUT_OF_RANGE;
@@ -57,9 +60,15 @@ EXPORTED int even_arcs(const SpacingRules *rules, int64_t c, int64_t n, int64_t 
                        .closed = closed,
                        .normals = normals + 3 * curve * n,
                        .step_lengths = step_lengths + curve * n};
-        double *of_nodes = arcs + curve * (n + 1);
-        find_arcs(&nodes, rules, lengths + curve * n, of_nodes);
-        find_even_arcs(&nodes, fixed + curve * n, times, of_nodes, wanted + curve * m);
+        double *wanted = shares + curve * m;
+        find_arcs(&nodes, rules, lengths + curve * n, arcs);
+        find_even_arcs(&nodes, fixed + curve * n, times, arcs, wanted);
+        for (int64_t k = 0, i = 0; k < m; k++) {
+            while (i < n - 1 && arcs[i + 1] <= wanted[k]) i++;
+            double share = (wanted[k] - arcs[i]) / greater(arcs[i + 1] - arcs[i], TINY);
+            at[curve * m + k] = i;
+            wanted[k] = lesser(greater(share, 0.0), 1.0);
+        }
     }
     return OK;
 }

@@ -47,4 +47,19 @@ static inline int ends_of(const Mesh *mesh, int64_t side, int64_t *first, int64_
     return OK;
 }
 
+/* Expresses a point of one face in another face that contains it. */
+static inline int change_face(const Mesh *mesh, int64_t from, const double barycentric[3],
+                              int64_t to, double changed[3])
+{
+    CHECK(from, mesh->face_count);
+    CHECK(to, mesh->face_count);
+    const int64_t *vertices = mesh->faces + 3 * from, *corners = mesh->faces + 3 * to;
+    for (int j = 0; j < 3; j++) {
+        changed[j] = 0.0;
+        for (int k = 0; k < 3; k++)
+            if (vertices[k] == corners[j]) changed[j] += barycentric[k];
+    }
+    return OK;
+}
+
 #endif

@@ -56,8 +56,6 @@ static int trace_step(const Surface *surface, const NodePlaces *places, const No
                       int64_t per_curve, int64_t from, int64_t to, Crossings *crossings,
                       uint8_t *reached, int64_t *work)
 {
-    CHECK(from, nodes->n);
-    CHECK(to, nodes->n);
     double distance = distance_between(nodes->positions + 3 * to, nodes->positions + 3 * from);
     TraceRequest request = {.start_face = places->faces[from],
                             .start = places->barycentric + 3 * from,
@@ -72,13 +70,22 @@ static int trace_step(const Surface *surface, const NodePlaces *places, const No
                              reached, work);
 }
 
+static int add_point(int64_t face, const double *barycentric, Crossings *points)
+{
+    CHECK(points->count, points->room);
+    points->faces[points->count] = face;
+    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
+    points->count++;
+    return OK;
+}
+
 /* The steps of which traces are asked for, and what was found. */
 typedef struct {
     int64_t m;
     const int64_t *from;      /* (m) nodes at which the traces start */
     const int64_t *to;        /* (m) nodes at which they end: the next ones or the previous ones */
     uint8_t *reached;         /* (m) becomes whether each trace reached its end */
-    int64_t *crossing_counts; /* (m) becomes the number of crossings of each trace */
+    int64_t *point_counts;    /* (m) becomes the number of points of each trace, with both ends */
 } StepTraces;
 
 /* Traces from m nodes of c curves to the next or previous nodes, from the step of index `done` on.
@@ -86,19 +93,26 @@ typedef struct {
    It returns early when the traces have passed `most_work` faces, or when the room that is left may
    not suffice for another trace; `done` is raised to the number of steps that have been traced. */
 EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                         int64_t c, const StepTraces *steps, Crossings *crossings,
+                         int64_t c, const StepTraces *steps, Crossings *points,
                          int64_t most_work, int64_t *done)
 {
-    if (crossings->room < places->most_faces) return ARRAY_TOO_SMALL;
+    int64_t needed = places->most_faces + 2, work = 0;
+    if (points->room < needed) return ARRAY_TOO_SMALL;
     if (c < 1 || nodes->n < c) return INDEX_OUT_OF_RANGE;
-    int64_t work = 0;
     for (; *done < steps->m && work < most_work; ++*done) {
-        if (crossings->room - crossings->count < places->most_faces) return OK;
+        if (points->room - points->count < needed) return OK;
         CHECK(*done, steps->m);
-        int64_t first = crossings->count;
-        TRY(trace_step(surface, places, nodes, nodes->n / c, steps->from[*done], steps->to[*done],
-                       crossings, steps->reached + *done, &work));
-        steps->crossing_counts[*done] = crossings->count - first;
+        int64_t first = points->count, from = steps->from[*done], to = steps->to[*done];
+        uint8_t *reached = steps->reached + *done;
+        CHECK(from, nodes->n);
+        CHECK(to, nodes->n);
+        TRY(add_point(places->faces[from], places->barycentric + 3 * from, points));
+        TRY(trace_step(surface, places, nodes, nodes->n / c, from, to, points, reached, &work));
+        if (*reached)
+            TRY(add_point(places->faces[to], places->barycentric + 3 * to, points));
+        else
+            points->count = first;
+        steps->point_counts[*done] = points->count - first;
     }
     return OK;
 }
@@ -116,29 +130,13 @@ typedef struct {
     uint8_t *lost;               /* (n) becomes whether the trace to the next node failed */
 } TracedPolyline;
 
-static int add_point(int64_t face, const double *barycentric, Crossings *points)
+/* Expresses a point of a polyline in another face that contains it. */
+static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, Crossings *points)
 {
-    CHECK(points->count, points->room);
-    points->faces[points->count] = face;
-    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
-    points->count++;
-    return OK;
-}
-
-/* Expresses a point in another face that contains it. */
-static int change_face(const Mesh *mesh, int64_t face, int64_t *own_face, double barycentric[3])
-{
-    double changed[3] = {0.0, 0.0, 0.0};
-    for (int j = 0; j < 3; j++) {
-        int64_t corner, vertex;
-        TRY(vertex_at(mesh, 3 * face + j, &corner));
-        for (int k = 0; k < 3; k++) {
-            TRY(vertex_at(mesh, 3 * *own_face + k, &vertex));
-            if (vertex == corner) changed[j] = barycentric[k];
-        }
-    }
-    memcpy(barycentric, changed, sizeof changed);
-    *own_face = face;
+    double changed[3], *place = points->barycentric + 3 * k;
+    TRY(change_face(mesh, points->faces[k], place, face, changed));
+    memcpy(place, changed, sizeof changed);
+    points->faces[k] = face;
     return OK;
 }
 
@@ -150,10 +148,10 @@ static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Cr
     int64_t *faces = points->faces;
     double *places = points->barycentric;
     int64_t last = points->count - 1, end_face = last > first ? faces[last] : start_face;
-    TRY(change_face(mesh, end_face, faces + first, places + 3 * first));
+    TRY(move_to_face(mesh, end_face, first, points));
     for (int64_t k = last; k > first; k--) {
         int64_t left = k > first + 1 ? faces[k - 1] : start_face;
-        TRY(change_face(mesh, left, faces + k, places + 3 * k));
+        TRY(move_to_face(mesh, left, k, points));
     }
     for (int64_t low = first + 1, high = last; low < high; low++, high--) {
         int64_t face = faces[low];

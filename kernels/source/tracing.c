@@ -28,13 +28,6 @@ typedef struct {
     double length;   /* of the trace in the face that it leaves */
 } Crossing;
 
-static void move_inside(double barycentric[3], double least)
-{
-    for (int j = 0; j < 3; j++) barycentric[j] = greater(barycentric[j], least);
-    double sum = barycentric[0] + barycentric[1] + barycentric[2];
-    for (int j = 0; j < 3; j++) barycentric[j] /= sum;
-}
-
 /* Finds the side through which a trace leaves its first face: of the two sides that the plane
    crosses, the one farther along `ahead`. `crosses` is 0 if the plane crosses none. */
 static void leave_first_face(Trace *trace, int64_t face, const double offsets[3][3],

@@ -54,6 +54,14 @@ static inline double lesser(double one, double other)
     return one < other ? one : other;
 }
 
+/* Moves a point off the sides and corners of its face. */
+static inline void move_inside(double barycentric[3], double least)
+{
+    for (int j = 0; j < 3; j++) barycentric[j] = greater(barycentric[j], least);
+    double sum = barycentric[0] + barycentric[1] + barycentric[2];
+    for (int j = 0; j < 3; j++) barycentric[j] /= sum;
+}
+
 static inline int are_finite(const double *values, int64_t count)
 {
     for (int64_t i = 0; i < count; i++)

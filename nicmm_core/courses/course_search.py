@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import nicmm_kernels
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
@@ -38,9 +38,6 @@ little. The first one is greater than 1 because hops overestimate bending: they 
 RECOMBINED, FINALISTS = 16, 6
 """Number of courses combined from their legs, and number of the best of all courses that are
 relaxed with twice as many nodes, unless they have had enough doublings."""
-
-FIRST_STRIDE = 8
-"""Stride of the nodes in a first comparison of two courses, which rules out most pairs."""
 
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
@@ -241,30 +238,11 @@ def _best(
 ) -> tuple[IntArray, IntArray]:
     """Distinct courses by ascending energy: the simple ones, and those that cross themselves."""
     energy = _energies(surface, nodes, smoothness)
-    positions = nodes.positions.reshape(nodes.curves, -1, 3)
-    limit = SAME_COURSE * surface.mesh.diagonal
-    # Only courses with about the same bounding boxes can be near each other.
-    boxes = np.concatenate([positions.min(axis=1), positions.max(axis=1)], axis=1)
-    may_be_near = (np.abs(boxes[:, None] - boxes) <= limit).all(axis=2)
-    trees: dict[int, cKDTree] = {}
-
-    def near(one: int, other: int) -> bool:
-        for number in (one, other):
-            if number not in trees:
-                trees[number] = cKDTree(positions[number])
-        return _near(positions[one], trees[other], limit) and _near(
-            positions[other], trees[one], limit
-        )
-
-    chosen: list[int] = []
-    for number in np.argsort(energy, kind="stable").tolist():
-        if not any(near(number, other) for other in chosen if may_be_near[number, other]):
-            chosen.append(number)
-    order, simple = np.array(chosen), simple[chosen]
+    order = nicmm_kernels.distinct_curves(
+        np.ascontiguousarray(nodes.positions).reshape(nodes.curves, -1, 3),
+        np.argsort(energy, kind="stable"),
+        SAME_COURSE * surface.mesh.diagonal,
+        checkpoint,
+    )
+    simple = simple[order]
     return order[simple], order[~simple]
-
-
-def _near(points: FloatArray, tree: cKDTree, limit: float) -> bool:
-    """Whether every point is within a limit of the points in a tree."""
-    few = tree.query(points[::FIRST_STRIDE])[0].max() <= limit
-    return bool(few and tree.query(points)[0].max() <= limit)

@@ -21,9 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import nicmm_kernels
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
@@ -105,15 +104,20 @@ class HopGraph:
     reverse: IntArray
 
     @cached_property
+    def first(self) -> IntArray:
+        """Index of the first hop from each cell, and m at the end, (n + 1,)."""
+        return np.searchsorted(self.hops.start, np.arange(len(self.vertex) + 1))
+
+    @cached_property
     def arcs(self) -> tuple[IntArray, IntArray, FloatArray]:
         """Arcs from each hop to its continuations: `indptr`, `indices` and the bending θ² / h."""
         hops = self.hops
-        first = np.searchsorted(hops.start, np.arange(len(self.vertex) + 1))
-        before, after = continuations(hops.end, first)
-        kept = np.flatnonzero(turning(hops, before, hops, after) <= SHARPEST_TURN)
-        before, after = before[kept], after[kept]
+        before, after = continuations(hops.end, self.first)
+        turn = turning(hops, before, hops, after)
+        kept = np.flatnonzero(turn <= SHARPEST_TURN)
+        before, after, turn = before[kept], after[kept], turn[kept]
         indptr = np.searchsorted(before, np.arange(len(hops.start) + 1))
-        return indptr, after, bending(hops, before, hops, after)
+        return indptr, after, turn**2 / mean_length(hops, before, hops, after)
 
 
 def build_hop_graph(surface: CurveSurface) -> HopGraph:
@@ -132,18 +136,17 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
             mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
         )
     checkpoint()
-    along = csgraph.dijkstra(
-        surface.edge_graph, directed=False, indices=vertex, limit=REACH * spacing
-    )[:, vertex]
-    np.fill_diagonal(along, np.inf)
-    start, end = _nearest(along, HOPS)
+    start, end, along = nicmm_kernels.nearest_cells(
+        mesh.edge_graph, vertex, HOPS, REACH * spacing, checkpoint
+    )
     size = len(vertex)
-    key = np.unique(np.concatenate([start * size + end, end * size + start]))
-    start, end = key // size, key % size
+    key = np.concatenate([start * size + end, end * size + start])
+    key, first = np.unique(key, return_index=True)
+    start, end, along = key // size, key % size, np.tile(along, 2)[first]
     positions, normals = mesh.vertices[vertex], surface.vertex_normals[vertex]
-    hops = _hops(start, end, along[start, end], positions, normals)
+    hops = _hops(start, end, along, positions, normals)
     in_space = np.linalg.norm(positions[start] - positions[end], axis=1)
-    same_sheet = along[start, end] <= SAME_SHEET * in_space
+    same_sheet = along <= SAME_SHEET * in_space
     hops, key = select_hops(hops, same_sheet), key[same_sheet]
     reverse = np.searchsorted(key, hops.end * size + hops.start)
     return HopGraph(surface, vertex, spacing, hops, reverse)
@@ -176,6 +179,8 @@ class CourseGraph:
         no such path.
     previous : (k, m + 2 d) int array
         The state before each state on this path, -1 if it is the first.
+    first : (k, m + 2 d) int array
+        The first state on this path; the state itself if there is no path.
     """
 
     graph: HopGraph
@@ -188,21 +193,24 @@ class CourseGraph:
     tension: float
     cost: FloatArray
     previous: IntArray
+    first: IntArray
 
     @cached_property
-    def first(self) -> IntArray:
-        """The first state on the best path to each state, (k, m + 2 d)."""
-        states = np.arange(self.cost.shape[1])
-        found = np.where(self.previous < 0, states, self.previous)
-        while True:
-            further = np.take_along_axis(found, found, axis=1)
-            if np.array_equal(further, found):
-                return found
-            found = further
+    def weights(self) -> FloatArray:
+        """Costs of the states without bending, (m + 2 d,)."""
+        return self.tension * self.weighted_length
 
-    def by_state(self, start: int, end: int) -> FloatArray:
-        """Least cost of a leg between two control points through each state, (m + 2 d,)."""
-        return self.cost[start] + self.cost[end][self.reverse] - self.tension * self.weighted_length
+    @cached_property
+    def for_kernels(self) -> nicmm_kernels.PathArrays:
+        """The states and paths as compiled kernels read them."""
+        return nicmm_kernels.PathArrays(
+            len(self.positions), self.hops.start, self.hops.end, self.reverse, self.cost,
+            self.previous, self.first,
+        )  # fmt: skip
+
+    def last(self, end: int) -> IntArray:
+        """The last state on the best path through each state to a control point, (m + 2 d,)."""
+        return self.reverse[self.first[end][self.reverse]]
 
 
 def with_control_points(
@@ -253,70 +261,52 @@ def with_control_points(
         at_cells = np.concatenate([factor[graph.vertex], _at_points(surface, points, factor)])
         weighted = weighted * 0.5 * (at_cells[hops.start] + at_cells[hops.end])
     tension = tension / max(float(length), tolerances.TINY) ** 2
-    cost, previous = _least_costs(graph, hops, departures, control, weighted, tension, k)
-    return CourseGraph(
-        graph, points, positions, normals, hops, reverse, weighted, tension, cost, previous
-    )
+    paths = _best_paths(graph, hops, departures, control, tension * weighted, k)
+    return CourseGraph(graph, points, positions, normals, hops, reverse, weighted, tension, *paths)
 
 
-def _least_costs(
+def _best_paths(
     graph: HopGraph,
     hops: Hops,
     departures: Hops,
     control: IntArray,
-    length: FloatArray,
-    tension: float,
+    weights: FloatArray,
     k: int,
-) -> tuple[FloatArray, IntArray]:
-    """Least costs from k control points to all states, and the state before each on its path.
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Least costs from k control points to all states, and two states on the path to each of them.
 
-    Both have the shape (k, m + 2 d).
+    The results are `cost`, `previous` and `first` of `CourseGraph`. The weights are the costs of
+    the lengths of all states.
     """
     m, d, n = len(graph.reverse), len(departures.start), len(graph.vertex)
-    indptr, after, bent = graph.arcs
-    first = np.searchsorted(graph.hops.start, np.arange(n + 1))
-    first = np.concatenate([first, np.full(k, first[-1])])  # no hop goes on from a control point
+    first = np.append(graph.first, np.full(k, m))  # no hop goes on from a control point
     before, onward = continuations(departures.end, first)
-    leaving = bending(departures, before, graph.hops, onward) + tension * length[onward]
-    rows = np.concatenate(
-        [
-            indptr,
-            indptr[-1] + np.searchsorted(before, np.arange(1, d + 1)),
-            indptr[-1] + len(before) + np.searchsorted(control, np.arange(1, k + 1)),
-        ]
-    )
-    columns = np.concatenate([after, onward, m + np.arange(d)])
-    values = np.concatenate([bent + tension * length[after], leaving, tension * length[m : m + d]])
-    size = m + d + k
-    matrix = sparse.csr_array((values, columns, rows), shape=(size, size))
-    checkpoint()
-    cost, previous = csgraph.dijkstra(
-        matrix, indices=m + d + np.arange(k), return_predecessors=True
-    )
-    cost, previous = cost[:, : m + d], previous[:, : m + d]
-    previous[(previous >= m + d) | (previous < 0)] = -1
-    # An arrival continues the states that end at the cell where it starts.
-    order = np.argsort(hops.end[: m + d], kind="stable")
-    ends = np.searchsorted(hops.end[: m + d][order], np.arange(n + k + 1))
-    arrival, place = continuations(departures.end, ends)
-    state = order[place]
-    backward = m + d + arrival
+    leaving = bending(departures, before, graph.hops, onward)
+    # An arrival continues the states that end at the cell where it starts: the reverses of the hops
+    # that start there, and departures.
+    by_departure, departure = np.nonzero(departures.end[:, None] == departures.end)
+    arrival = np.append(before, by_departure)
+    state = np.append(graph.reverse[onward], m + departure)
     kept = departures.start[arrival] != hops.start[state]
-    arrival, state, backward = arrival[kept], state[kept], backward[kept]
-    added = bending(hops, state, hops, backward) + tension * length[backward]
-    arriving, came = np.full((k, d), np.inf), np.full((k, d), -1)
-    for number in range(k):
-        total = cost[number, state] + added
-        best = np.lexsort((total, arrival))
-        best = best[np.unique(arrival[best], return_index=True)[1]]
-        best = best[np.isfinite(total[best])]
-        arriving[number, arrival[best]] = total[best]
-        came[number, arrival[best]] = state[best]
+    arrival, state = arrival[kept], state[kept]
+    ascending = np.lexsort((state, arrival))
+    arrival, state = arrival[ascending], state[ascending]
+    arriving = bending(hops, state, hops, m + d + arrival)
+    each = np.arange(d + 1)
+    cost, previous, begins = nicmm_kernels.turning_paths(
+        np.searchsorted(control, np.arange(k + 1)),
+        weights,
+        graph.arcs,
+        (np.searchsorted(before, each), onward, leaving),
+        (np.searchsorted(arrival, each), state, arriving),
+        checkpoint,
+    )
     # The reverse of a direct hop between two control points is a whole path in itself.
     direct = np.flatnonzero(departures.end >= n)
-    arriving[:, direct], came[:, direct] = np.inf, -1
-    arriving[departures.end[direct] - n, direct] = tension * length[m + direct]
-    return np.concatenate([cost, arriving], axis=1), np.concatenate([previous, came], axis=1)
+    reverse = m + d + direct
+    cost[:, reverse], previous[:, reverse], begins[:, reverse] = np.inf, -1, reverse
+    cost[departures.end[direct] - n, reverse] = weights[m + direct]
+    return cost, previous, begins
 
 
 def continuations(ends: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
@@ -342,10 +332,16 @@ def turning(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatA
     return np.arccos(dot(arriving.T, leaving.T).clip(-1.0, 1.0))
 
 
+def mean_length(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
+    """h, the mean lengths of hops and their continuations; never zero."""
+    step = 0.5 * (one.length[before] + other.length[after])
+    return np.maximum(step, tolerances.TINY)
+
+
 def bending(one: Hops, before: IntArray, other: Hops, after: IntArray) -> FloatArray:
     """θ² / h from hops to their continuations."""
-    step = 0.5 * (one.length[before] + other.length[after])
-    return turning(one, before, other, after) ** 2 / np.maximum(step, tolerances.TINY)
+    turn = turning(one, before, other, after)
+    return turn**2 / mean_length(one, before, other, after)
 
 
 def select_hops(hops: Hops, which: IntArray | BoolArray) -> Hops:
@@ -401,18 +397,15 @@ def tangents(vectors: FloatArray, normals: FloatArray) -> FloatArray:
 
 def distances_along_edges(surface: CurveSurface, points: SurfacePoints) -> FloatArray:
     """Distances along edges from k points to the vertices and the points, (k, V + k)."""
-    mesh, k = surface.mesh, len(points)
+    mesh = surface.mesh
     corners = mesh.faces[points.faces]
-    size = len(mesh.vertices)
     away = np.linalg.norm(mesh.vertices[corners] - points.positions(mesh)[:, None], axis=2)
-    # A sparse graph has no arc where the length is zero.
+    # The bending at a hop without length would be infinite.
     away = np.maximum(away, tolerances.SAME_POSITION * mesh.diagonal)
-    edges = surface.edge_graph
-    values = np.concatenate([edges.data, away.ravel()])
-    columns = np.concatenate([edges.indices, corners.ravel()])
-    rows = np.concatenate([edges.indptr, edges.indptr[-1] + 3 * np.arange(1, k + 1)])
-    matrix = sparse.csr_array((values, columns, rows), shape=(size + k, size + k))
-    return csgraph.dijkstra(matrix, directed=False, indices=size + np.arange(k))
+    to_vertices = nicmm_kernels.distances_along_edges(mesh.edge_graph, corners, away, checkpoint)
+    to_points = (to_vertices[:, corners] + away).min(axis=2)
+    np.fill_diagonal(to_points, 0.0)
+    return np.concatenate([to_vertices, to_points], axis=1)
 
 
 def _at_points(surface: CurveSurface, points: SurfacePoints, values: FloatArray) -> FloatArray:

@@ -185,7 +185,7 @@ def crossing_legs(curves: LegCurves) -> BoolArray:
 
     Curves that share a control point may touch there.
     """
-    segments = traced_segments(curves.surface.mesh, curves.traces)
+    segments = traced_segments(curves.traces)
     count, leg, legs = curves.nodes.per_curve, curves.leg, curves.ends
     curve = segments.node // count
     group = (leg[curve] // curves.n_legs) * len(curves.surface.mesh.faces) + segments.face
@@ -249,8 +249,10 @@ def cheapest_combinations(
         total = total + junctions[number - 1][choice[:, -1] - offset[number - 1]]
         if closed and number == count - 1:
             total = total + junctions[number][:, choice[:, 0]].T
+        crossed = np.zeros(total.shape, dtype=np.uint8)  # number of crossings with earlier legs
         for earlier in range(number):
-            total += price * crosses[:, here].take(choice[:, earlier], axis=0)
+            crossed += crosses[:, here].take(choice[:, earlier], axis=0)
+        total += price * crossed
         best = _least(without_rounding_errors(total).ravel(), BEAM_WIDTH)
         best = best[np.isfinite(total.ravel()[best])]
         row, curve = np.divmod(best, total.shape[1])

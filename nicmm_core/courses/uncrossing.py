@@ -137,6 +137,8 @@ def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
     before : (n + 1,) int array
         Number of control points before each position.
     """
+    if len(steps) < 2:
+        return None
     places = np.array(steps)  # (p, 2)
     begin, first_end = places[:, :1], places[:, 1:]  # (p, 1), of the first crossing
     end, second_end = places[:, 0], places[:, 1]  # (p,), of the second crossing

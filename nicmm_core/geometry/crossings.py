@@ -10,7 +10,7 @@ import nicmm_kernels
 import numpy as np
 
 from .array_types import FloatArray, IntArray
-from .surface_points import SurfacePoints, weights_at
+from .surface_points import SurfacePoints
 
 TOUCHING = 1e-12
 """Distance in barycentric coordinates up to which strands touch. If strands cross on an edge,
@@ -32,13 +32,9 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     n = len(polyline)
     n_segments = n if closed else n - 1
     segment = np.arange(n_segments)
-    following = (segment + 1) % n
-    faces = polyline.faces[:n_segments]
+    end = nicmm_kernels.segment_ends(all_faces, *polyline.for_kernels, segment)
     start = polyline.barycentric[:n_segments, :2]
-    theirs = all_faces[polyline.faces[following]]
-    end = weights_at(theirs, polyline.barycentric[following], all_faces[faces][:, :2])
-
-    first, second = meeting_segments(faces, start, end).T
+    first, second = meeting_segments(polyline.faces[:n_segments], start, end).T
     apart = np.abs(first - second)
     neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
     inside = np.stack([first[~neighbours], second[~neighbours]], axis=1)

@@ -174,6 +174,11 @@ class Mesh:
         )
 
     @cached_property
+    def edge_graph(self) -> nicmm_kernels.EdgeGraphArrays:
+        """The edges as a graph, for shortest paths."""
+        return nicmm_kernels.EdgeGraphArrays(self.for_kernels)
+
+    @cached_property
     def face_trees(self) -> list[tuple[slice, igl.AABB]]:
         """Bounding-box trees over parts of the faces, each with the range of its faces."""
         trees = []

@@ -96,17 +96,13 @@ def trace_between(
         MOST_FACES,
         checkpoint,
     )
-    return traces_found(reached, counts, SurfacePoints(faces, barycentric))
+    pair = np.arange(len(counts)).repeat(counts)
+    return Traces(reached, pair, SurfacePoints(faces, barycentric))
 
 
 def fold_margin(mesh: Mesh, folded: BoolArray | None) -> float:
     """Extra length of traces before backward parts over folded faces are subtracted."""
     return 0.0 if folded is None else FOLDS * mesh.mean_edge_length
-
-
-def traces_found(reached: BoolArray, counts: IntArray, crossings: SurfacePoints) -> Traces:
-    """Traces from the number of crossings of each, (m,), and all crossings in order."""
-    return Traces(reached, np.arange(len(counts)).repeat(counts), crossings)
 
 
 def trace_from(

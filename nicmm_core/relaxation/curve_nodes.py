@@ -9,11 +9,10 @@ from typing import Any
 import nicmm_kernels
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, edge_lengths
+from ..geometry.mesh import Mesh
 from ..geometry.normals import normals_and_folds
 from ..geometry.surface_points import SurfacePoints
 from ..maps.guidance import feature_map
@@ -62,14 +61,6 @@ class CurveSurface:
             None if feature_map is None else np.ascontiguousarray(feature_map),
             self.feature_weight,
         )
-
-    @cached_property
-    def edge_graph(self) -> sparse.csr_array:
-        """Sparse matrix of edge lengths, (V, V); each edge is stored once."""
-        mesh = self.mesh
-        length = edge_lengths(mesh.vertices, mesh.edges)
-        size = len(mesh.vertices)
-        return sparse.csr_array((length, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
 
 
 def curve_surface(mesh: Mesh) -> CurveSurface:

@@ -8,10 +8,8 @@ from __future__ import annotations
 import nicmm_kernels
 import numpy as np
 
-from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
-from ..geometry.vectors import lengths
 from .curve_nodes import CurveSurface, Nodes, nodes_at
 from .node_traces import NodeTraces, places_along, traces_between_nodes
 
@@ -76,42 +74,20 @@ def _even_places(
     surface: CurveSurface, nodes: Nodes, traces: NodeTraces, fixed: BoolArray, times: int
 ) -> tuple[IntArray, FloatArray]:
     """Where m new nodes lie: the node before each, (m,), and its share of the trace from there."""
-    size = nodes.per_curve
     if surface.folded is not None:
         # Inside a fold a trace runs backward, and nodes spaced along it would change places.
         faces = traces.points.faces
         folded = np.bincount(traces.node[surface.folded[faces]], minlength=len(fixed)) > 0
         fixed = fixed | folded | nodes.before_each(folded)
-    parts = np.append(lengths(np.diff(traces.points.positions(surface.mesh).T)), 0.0)
-    parts[traces.is_last] = 0.0
-    length = np.bincount(traces.node, parts, len(nodes.positions)).astype(np.float64)
+    length = traces.lengths
     length = np.where(length > 0.0, length, LENGTH_WITHOUT_TRACE * nodes.step_lengths)
-    arc, along = _even_arcs(nodes, length, fixed, times)
-    curve = np.repeat(np.arange(nodes.curves), len(along) // nodes.curves)
-    first = curve * (size + 1)  # in `arc`, which has an additional entry for each curve
-    step = (np.searchsorted(arc, along, side="right") - 1).clip(first, first + size - 1)
-    share = (along - arc[step]) / np.maximum(arc[step + 1] - arc[step], tolerances.TINY)
-    return step - curve, share.clip(0.0, 1.0)
-
-
-def _even_arcs(
-    nodes: Nodes, step_lengths: FloatArray, fixed: BoolArray, times: int
-) -> tuple[FloatArray, FloatArray]:
-    """Weighted arc lengths of the nodes, and those at which new nodes are evenly spaced.
-
-    All curves are in a row. Each one is extended by a node at its end: the first node again if it
-    is closed, the last one if it is open. The first array, (c (n / c + 1),), includes these nodes,
-    the second one does not.
-    """
-    arcs, wanted = nicmm_kernels.even_arcs(
+    at, share = nicmm_kernels.even_places(
         np.ascontiguousarray(nodes.normals).reshape(nodes.curves, -1, 3),
         nodes.by_curve(nodes.step_lengths),
-        nodes.by_curve(step_lengths),
+        nodes.by_curve(length),
         nodes.by_curve(fixed),
         nodes.closed,
         times,
         RULES,
     )
-    total = arcs[:, -1:]
-    before = total.cumsum(axis=0) - total
-    return (arcs + before).ravel(), (wanted + before).ravel()
+    return (nodes.first[:, None] + at).ravel(), share.ravel()

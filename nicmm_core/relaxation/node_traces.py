@@ -11,21 +11,13 @@ from functools import cached_property
 
 import nicmm_kernels
 import numpy as np
-from scipy.sparse import csgraph
 
 from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.crossings import meeting_segments
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
-from ..geometry.tracing import (
-    MOST_FACES,
-    Traces,
-    fold_margin,
-    strictly_inside,
-    traces_found,
-)
-from ..geometry.vectors import lengths
+from ..geometry.surface_points import SurfacePoints
+from ..geometry.tracing import MOST_FACES, fold_margin, strictly_inside
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
 
@@ -38,32 +30,44 @@ LONGEST_BYPASS = 6.0
 It is relative to the greatest distance between two nodes without a trace.
 """
 
-BYPASS_RADII = (0.1, 0.3, 1.0)
-"""Radii, relative to the longest bypass, within which paths are searched for, in turn.
-
-Most paths are far shorter than the longest one.
-"""
-
 
 @dataclass(frozen=True)
 class NodeTraces:
-    """Straight traces between the nodes of curves, where they succeed.
+    """Straight traces from n nodes of curves to the next ones, where they succeed.
 
     Attributes
     ----------
-    node : (p,) int array
-        Index of the node at which the trace of each point begins, ascending.
+    mesh : Mesh
+    begins : (n + 1,) int array
+        Index of the first point of the trace from each node, and the number p of points. A trace
+        that failed has no points.
     points : SurfacePoints
-        Points of the traces, including both ends, each in the face of the segment after it.
+        The p points of the traces, including both ends, each in the face of the segment after it.
     """
 
-    node: IntArray
+    mesh: Mesh
+    begins: IntArray
     points: SurfacePoints
 
     @cached_property
-    def is_last(self) -> BoolArray:
-        """Whether each point is the end of its trace, (p,)."""
-        return np.append(np.diff(self.node) > 0, True)
+    def for_kernels(self) -> nicmm_kernels.TraceArrays:
+        """The traces as compiled kernels read them, with what they compute from the points."""
+        return nicmm_kernels.TraceArrays(
+            self.mesh.for_kernels, self.begins, *self.points.for_kernels
+        )
+
+    @cached_property
+    def node(self) -> IntArray:
+        """Index of the node at which the trace of each point begins, (p,), ascending."""
+        return np.arange(len(self.begins) - 1).repeat(np.diff(self.begins))
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Lengths of the traces, (n,); zero where they failed."""
+        found = self.begins[1:] > self.begins[:-1]
+        result = np.zeros(len(found))
+        result[found] = self.for_kernels.arcs[self.begins[1:][found] - 1]
+        return result
 
 
 @dataclass(frozen=True)
@@ -86,19 +90,22 @@ class TracedSegments:
     end: FloatArray
 
 
-def traced_segments(mesh: Mesh, traces: NodeTraces) -> TracedSegments:
+def traced_segments(traces: NodeTraces) -> TracedSegments:
     """Divide traces into their segments."""
-    corners, points = mesh.faces, traces.points
-    begins = np.flatnonzero(~traces.is_last)
-    face, following = points.faces[begins], points[begins + 1]
-    end = weights_at(corners[following.faces], following.barycentric, corners[face][:, :2])
-    return TracedSegments(traces.node[begins], face, points.barycentric[begins, :2], end)
+    points, node = traces.points, traces.node
+    first = np.flatnonzero(node[1:] == node[:-1])
+    return TracedSegments(
+        node[first],
+        points.faces[first],
+        points.barycentric[first, :2],
+        nicmm_kernels.segment_ends(traces.mesh.faces, *points.for_kernels, first),
+    )
 
 
 def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     """Pairs of nodes of a curve, (p, 2), ascending, whose traces to the next nodes cross."""
-    segments = traced_segments(surface.mesh, traces_between_nodes(surface, nodes))
-    size = nodes.per_curve
+    segments = traced_segments(traces_between_nodes(surface, nodes))
+    size, count = nodes.per_curve, len(nodes.positions)
     curve = segments.node // size
     group = curve * len(surface.mesh.faces) + segments.face
     one, other = meeting_segments(group, segments.start, segments.end).T
@@ -106,9 +113,9 @@ def crossing_steps(surface: CurveSurface, nodes: Nodes) -> IntArray:
     if nodes.closed:
         first = np.searchsorted(curve, np.arange(nodes.curves + 1))
         apart = np.minimum(apart, np.diff(first)[curve[one]] - apart)
-    one, other = one[apart > 1], other[apart > 1]
-    pairs = np.stack([segments.node[one], segments.node[other]], axis=1)
-    return np.unique(np.sort(pairs, axis=1), axis=0)
+    one, other = segments.node[one[apart > 1]], segments.node[other[apart > 1]]
+    pairs = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
+    return np.stack(np.divmod(pairs, count), axis=1)
 
 
 def places_along(
@@ -118,76 +125,37 @@ def places_along(
 
     Where a trace fails, as around a thin part, the point lies on the shortest path along edges.
     """
-    faces, barycentric = np.zeros(len(node), dtype=np.int64), np.zeros((len(node), 3))
-    owner, points = traces.node, traces.points
-    positions = points.positions(surface.mesh).T
-    step = np.append(lengths(np.diff(positions)), 0.0)
-    step[traces.is_last] = 0.0
-    arc = np.append(0.0, np.cumsum(step))
-    first = np.searchsorted(owner, node)
-    last = np.searchsorted(owner, node, side="right") - 1
-    traced = np.flatnonzero(last > first)
-    lost = np.flatnonzero(last <= first)
-    on_edges = _along_edges(surface, nodes, node[lost], share[lost])
-    faces[lost], barycentric[lost] = on_edges.faces, on_edges.barycentric
-    first, last = first[traced], last[traced]
-    at = arc[first] + share[traced] * (arc[last] - arc[first])
-    segment = (np.searchsorted(arc, at, side="right") - 1).clip(first, last - 1)
-    along = (at - arc[segment]) / np.maximum(step[segment], tolerances.TINY)
-    along = along.clip(0.0, 1.0)[:, None]
-    faces[traced] = points.faces[segment]
-    end = in_faces(surface.mesh, points[segment + 1], faces[traced]).barycentric
-    barycentric[traced] = (1.0 - along) * points.barycentric[segment] + along * end
-    return SurfacePoints(faces, strictly_inside(barycentric))
+    faces, barycentric, is_lost = nicmm_kernels.places_on_traces(
+        traces.for_kernels, node, share, tolerances.INSIDE
+    )
+    lost = np.flatnonzero(is_lost)
+    if len(lost):
+        on_edges = _along_edges(surface, nodes, node[lost], share[lost])
+        faces[lost], barycentric[lost] = on_edges.faces, strictly_inside(on_edges.barycentric)
+    return SurfacePoints(faces, barycentric)
 
 
 def traces_between_nodes(surface: CurveSurface, nodes: Nodes) -> NodeTraces:
-    """Trace from every node to the next one."""
-    node, following = nodes.with_step, nodes.following
-    places = SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric))
-    start, end = places[node], places[following[node]]
-    traces = traces_of_steps(surface, nodes, places, node, following[node])
-    reached = np.flatnonzero(traces.reached)
-    owner = np.concatenate([reached, traces.pair, reached])
-    rank = np.repeat([0, 1, 2], [len(reached), len(traces.pair), len(reached)])
-    order = np.lexsort((rank, owner))  # stable, so crossings stay in order
-    points = joined([start[reached], traces.crossings, end[reached]])[order]
-    return NodeTraces(node[owner[order]], points)
-
-
-def traces_of_steps(
-    surface: CurveSurface,
-    nodes: Nodes,
-    places: SurfacePoints,
-    start: IntArray,
-    end: IntArray,
-) -> Traces:
-    """Trace from m nodes to the next or the previous nodes.
+    """Trace from every node to the next one.
 
     The plane of a trace contains the mean normal of both nodes. Around the edge of a thin part
     these normals may be opposite, and no such plane contains a trace. Where the trace fails, the
     plane contains the mean direction of the curve before and after it instead.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-    places : SurfacePoints
-        Places of all n nodes. Those of the nodes in `start` are strictly inside faces.
-    start, end : (m,) int array
-        Indices of the nodes at which the traces start and end.
     """
     checkpoint()
-    reached, counts, faces, barycentric = nicmm_kernels.trace_steps(
+    start = nodes.with_step
+    counts, faces, barycentric = nicmm_kernels.trace_steps(
         surface.for_kernels,
         nodes.for_kernels,
-        places.for_kernels,
-        np.ascontiguousarray(start, np.int64),
-        np.ascontiguousarray(end, np.int64),
+        SurfacePoints(nodes.places.faces, strictly_inside(nodes.places.barycentric)).for_kernels,
+        start,
+        nodes.following[start],
         step_limits(surface),
         checkpoint,
     )
-    return traces_found(reached, counts, SurfacePoints(faces, barycentric))
+    begins = np.zeros(len(nodes.positions) + 1, dtype=np.int64)
+    begins[start + 1] = counts
+    return NodeTraces(surface.mesh, begins.cumsum(), SurfacePoints(faces, barycentric))
 
 
 def step_limits(surface: CurveSurface) -> nicmm_kernels.StepLimits:
@@ -204,38 +172,13 @@ def _along_edges(
     A path joins the corners with the greatest barycentric coordinates of both nodes. If there is no
     path, the point stays at the first corner.
     """
-    mesh = surface.mesh
-    corner = mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]
-    start, end = corner[node], corner[nodes.following[node]]
-    low, high, weight = start.copy(), start.copy(), np.zeros(len(node))
-    left = np.arange(len(node))
-    for radius in BYPASS_RADII:
-        if not len(left):
-            break
-        sources, source = np.unique(start[left], return_inverse=True)
-        length, previous = csgraph.dijkstra(
-            surface.edge_graph,
-            directed=False,
-            indices=sources,
-            limit=radius * LONGEST_BYPASS * float(nodes.step_lengths[node].max()),
-            return_predecessors=True,
-        )
-        found = np.isfinite(length[source, end[left]])
-        for number, row in zip(left[found].tolist(), source[found].tolist(), strict=True):
-            here, arc = int(end[number]), length[row]
-            wanted = share[number] * arc[here]
-            high[number] = here
-            while arc[here] > wanted:
-                high[number], here = here, int(previous[row, here])
-            low[number] = here
-            step = arc[high[number]] - arc[here]
-            weight[number] = (wanted - arc[here]) / step if step > 0.0 else 0.0
-        left = left[~found]
-    around = [
-        mesh.faces_with(np.array([one, other]))[0]
-        for one, other in zip(low.tolist(), high.tolist(), strict=True)
-    ]
-    face = np.array(around, dtype=np.int64)
-    corners, weight = mesh.faces[face], weight[:, None]
-    at_high = weight * (corners == high[:, None])
-    return SurfacePoints(face, (1.0 - weight) * (corners == low[:, None]) + at_high)
+    corner = surface.mesh.faces[nodes.places.faces, nodes.places.barycentric.argmax(axis=1)]
+    faces, barycentric = nicmm_kernels.points_on_edge_paths(
+        surface.mesh.edge_graph,
+        corner[node],
+        corner[nodes.following[node]],
+        share,
+        LONGEST_BYPASS * float(nodes.step_lengths[node].max()),
+        checkpoint,
+    )
+    return SurfacePoints(faces, barycentric)

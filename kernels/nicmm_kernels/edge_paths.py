@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shortest paths along the edges of a mesh."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .library import (
+    COUNT,
+    FLOAT,
+    INT,
+    NUMBER,
+    POINTER,
+    FloatArray,
+    IntArray,
+    Kernel,
+    address,
+    in_several_calls,
+    rows,
+)
+from .traces import MeshArrays, MeshPointers
+
+
+class _EdgeGraph(ctypes.Structure):
+    _fields_ = [
+        ("vertex_count", COUNT),
+        ("arc_count", COUNT),
+        ("begins", POINTER),
+        ("ends", POINTER),
+        ("faces", POINTER),
+        ("lengths", POINTER),
+    ]
+
+
+class _NearestCells(ctypes.Structure):
+    _fields_ = [
+        ("n", COUNT),
+        ("most", COUNT),
+        ("longest", NUMBER),
+        ("vertices", POINTER),
+        ("counts", POINTER),
+        ("cells", POINTER),
+        ("distances", POINTER),
+    ]
+
+
+class _EdgePoints(ctypes.Structure):
+    _fields_ = [
+        ("q", COUNT),
+        ("starts", POINTER),
+        ("ends", POINTER),
+        ("shares", POINTER),
+        ("longest", NUMBER),
+        ("faces", POINTER),
+        ("barycentric", POINTER),
+    ]
+
+
+_RESUMED = (POINTER, COUNT, COUNT, ctypes.POINTER(COUNT))
+_EDGE_GRAPH = Kernel("edge_graph", MeshPointers, _EdgeGraph, POINTER)
+_SEARCH_ITEMS = Kernel("edge_search_items", COUNT)
+_DISTANCES = Kernel(
+    "distances_along_edges", _EdgeGraph, COUNT, POINTER, POINTER, *_RESUMED, POINTER
+)
+_NEAREST_CELLS = Kernel("nearest_cells", _EdgeGraph, _NearestCells, *_RESUMED)
+_POINTS_ON_PATHS = Kernel("points_on_edge_paths", MeshPointers, _EdgeGraph, _EdgePoints, *_RESUMED)
+
+
+class EdgeGraphArrays:
+    """The edges of a mesh as a graph, in which shortest paths are searched for.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+    """
+
+    def __init__(self, mesh: MeshArrays) -> None:
+        self.mesh = mesh
+        v, room = mesh.vertex_count, 6 * mesh.face_count
+        begins, ends, faces = (np.empty(size, dtype=np.int64) for size in (v + 1, room, room))
+        lengths, last_seen = np.empty(room), np.empty(v, dtype=np.int64)
+        self.pointers = _EdgeGraph(
+            v, room, begins.ctypes.data, ends.ctypes.data, faces.ctypes.data, lengths.ctypes.data
+        )
+        self._arrays = (begins, ends, faces, lengths)
+        _EDGE_GRAPH(mesh.pointers, self.pointers, last_seen.ctypes.data)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies have pointers of their own."""
+        return EdgeGraphArrays, (self.mesh,)
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+        return self.mesh.vertex_count
+
+    def scratch(self) -> FloatArray:
+        """Memory for a search."""
+        return np.empty(_SEARCH_ITEMS.result(self.vertex_count))
+
+
+def distances_along_edges(
+    graph: EdgeGraphArrays, corners: IntArray, away: FloatArray, meanwhile: Callable[[], object]
+) -> FloatArray:
+    """Distances along edges from k points to all vertices, (k, V); infinite if there is no path.
+
+    Parameters
+    ----------
+    graph : EdgeGraphArrays
+    corners : (k, 3) int array
+        Vertices to which each point is joined.
+    away : (k, 3) float array
+        Its distances to them.
+    meanwhile : callable
+        Called between two calls of the kernel, at least after every `MOST_WORK` arcs.
+    """
+    k = rows("corners", corners)
+    distances = np.zeros((k, graph.vertex_count))
+    before = (
+        graph.pointers, k, address("corners", corners, INT, k, 3),
+        address("away", away, FLOAT, k, 3),
+    )  # fmt: skip
+    after = (distances.ctypes.data,)
+    in_several_calls(_DISTANCES, k, before, graph.scratch(), meanwhile, after)
+    return distances
+
+
+def nearest_cells(
+    graph: EdgeGraphArrays,
+    vertices: IntArray,
+    most: int,
+    longest: float,
+    meanwhile: Callable[[], object],
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """The nearest cells of n cells along edges.
+
+    Of several cells at the same distance, that of the lowest index is nearer.
+
+    Parameters
+    ----------
+    graph : EdgeGraphArrays
+    vertices : (n,) int array
+        Vertices that are the cells, ascending.
+    most : int
+        Number of cells that are wanted around each cell.
+    longest : float
+        Distance up to which they are searched for, in mesh units.
+    meanwhile : callable
+        Called between two calls of the kernel, at least after every `MOST_WORK` arcs.
+
+    Returns
+    -------
+    one, other : (p,) int arrays
+        Each cell, ascending, and its nearest cells by distance.
+    (p,) float array
+        Their distances.
+    """
+    n = rows("vertices", vertices)
+    counts, cells = np.zeros(n, dtype=np.int64), np.zeros((n, most), dtype=np.int64)
+    distances = np.zeros((n, most))
+    nearest = _NearestCells(
+        n, most, longest, address("vertices", vertices, INT, n), counts.ctypes.data,
+        cells.ctypes.data, distances.ctypes.data,
+    )  # fmt: skip
+    scratch = np.empty(len(graph.scratch()) + graph.vertex_count)
+    in_several_calls(_NEAREST_CELLS, n, (graph.pointers, nearest), scratch, meanwhile)
+    found = np.arange(most) < counts[:, None]
+    return np.arange(n).repeat(counts), cells[found], distances[found]
+
+
+def points_on_edge_paths(
+    graph: EdgeGraphArrays,
+    starts: IntArray,
+    ends: IntArray,
+    shares: FloatArray,
+    longest: float,
+    meanwhile: Callable[[], object],
+) -> tuple[IntArray, FloatArray]:
+    """Points at given shares of q shortest paths along edges.
+
+    Parameters
+    ----------
+    graph : EdgeGraphArrays
+    starts, ends : (q,) int array
+        Vertices that the paths join.
+    shares : (q,) float array
+        Shares of the lengths of the paths. A point stays at the start if there is no path.
+    longest : float
+        Length up to which paths are searched for, in mesh units.
+    meanwhile : callable
+        Called between two calls of the kernel, at least after every `MOST_WORK` arcs.
+
+    Returns
+    -------
+    (q,) int array, (q, 3) float array
+        The first faces that contain the points, and coordinates in them.
+    """
+    q = rows("starts", starts)
+    faces, barycentric = np.zeros(q, dtype=np.int64), np.zeros((q, 3))
+    points = _EdgePoints(
+        q, address("starts", starts, INT, q), address("ends", ends, INT, q),
+        address("shares", shares, FLOAT, q), longest, faces.ctypes.data, barycentric.ctypes.data,
+    )  # fmt: skip
+    before = (graph.mesh.pointers, graph.pointers, points)
+    in_several_calls(_POINTS_ON_PATHS, q, before, graph.scratch(), meanwhile)
+    return faces, barycentric
