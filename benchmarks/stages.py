@@ -40,17 +40,19 @@ DRAGS = 5
 POINTS = 4
 
 STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
-    "checks, manifold": [
+    "checks, clean surface, manifold": [
         (design, "checked_options"),
         (design, "locate_control_points"),
-        (repaired_surface, "repaired"),
+        (repaired_surface, "clean_surface"),
+        (repaired_surface, "manifold"),
         (repaired_surface, "request_on"),
     ],
     "canonical copy": [
+        (repaired_surface, "straightened"),
         (repaired_surface, "renumbered"),
-        (repaired_surface, "renumbered_request"),
         (coarse_start, "renumbered"),
-        (design, "design_on_original"),
+        (repaired_surface.Manifold, "request"),
+        (repaired_surface.Manifold, "design_on_original"),
     ],
     "normals": [(start_search, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
