@@ -36,13 +36,10 @@ class RemovedFaces:
 
     def __init__(self, mesh: Mesh, faces: IntArray, removed: BoolArray) -> None:
         self._mesh, self._faces = mesh, faces
-        self._at: dict[frozenset[int], list[int]] = {}  # removed faces by vertex and by edge
-        for face in np.flatnonzero(removed).tolist():
-            corners = faces[face].tolist()
-            for side in range(3):
-                edge = frozenset((corners[side - 2], corners[side - 1]))
-                for simplex in {edge, frozenset((corners[side],))}:
-                    self._at.setdefault(simplex, []).append(face)
+        self._removed = np.flatnonzero(removed)
+        corners = faces[self._removed].ravel()
+        self._by_vertex = np.argsort(corners, kind="stable")
+        self._vertices = corners[self._by_vertex]
 
     def led_across(
         self, polyline: SurfacePoints, closed: bool, exact: Mapping[int, SurfacePoints]
@@ -114,13 +111,20 @@ class RemovedFaces:
                 if weights is None:
                     continue
                 place = SurfacePoints(np.array([face]), weights[None])
-                simplex = frozenset(self._faces[face][weights > 0.0].tolist())
-                for beyond in self._at.get(simplex, ()):
+                for beyond in self._removed_at(self._faces[face][weights > 0.0].tolist()):
                     if beyond not in previous:
                         previous[beyond] = face
                         places[beyond] = place, self._in_face(place, beyond)
                         queue.append(beyond)
         return []
+
+    def _removed_at(self, vertices: list[int]) -> list[int]:
+        """The removed faces with all of one or two vertices, ascending."""
+        found: list[set[int]] = []
+        for vertex in vertices:
+            first, last = np.searchsorted(self._vertices, [vertex, vertex + 1])
+            found.append(set(self._removed[self._by_vertex[first:last] // 3].tolist()))
+        return sorted(set.intersection(*found))
 
     def _weights_on_side(self, face: int, side: int, position: FloatArray) -> FloatArray | None:
         """Barycentric coordinates of a position on a side, (3,); None if it does not lie there."""

@@ -73,10 +73,16 @@ class StraightenedMesh:
             self.mesh.faces[curve.faces[following]], curve.barycentric[following], faces
         )
         order, begin = self._by_parent
+        count = begin[curve.faces + 1] - begin[curve.faces]
+        first = order[begin[curve.faces]]
+        whole = np.einsum("nd,ndc->nc", curve.barycentric, np.linalg.inv(self.corners[first]))
         parts: list[tuple[int, FloatArray]] = []
         index = np.empty(n, dtype=np.int64)
         for point, face in enumerate(curve.faces.tolist()):
             index[point] = len(parts)
+            if count[point] == 1:
+                parts.append((int(first[point]), whole[point]))
+                continue
             within = order[begin[face] : begin[face + 1]]
             parts += self._through_parts(within, curve.barycentric[point], ends[point])
         weights = np.array([weights for _, weights in parts])
@@ -102,9 +108,8 @@ class StraightenedMesh:
         list of (int, (3,) float array)
             The start and each crossing, in the part in which the segment continues there.
         """
-        if len(parts) == 1:
-            return [(int(parts[0]), start @ self._inverse[parts[0]])]
-        first, last = start @ self._inverse[parts], end @ self._inverse[parts]  # (k, 3)
+        inverse = np.linalg.inv(self.corners[parts])
+        first, last = start @ inverse, end @ inverse  # (k, 3)
         change = last - first
         with np.errstate(divide="ignore", invalid="ignore"):
             zero = -first / change
@@ -120,11 +125,6 @@ class StraightenedMesh:
             if leaves[part] >= 1.0 - margin or leaves[part] <= here:
                 return result
             here = float(leaves[part])
-
-    @cached_property
-    def _inverse(self) -> FloatArray:
-        """Matrices that map coordinates in faces of the new mesh to their parts, (F, 3, 3)."""
-        return np.linalg.inv(self.corners)
 
     @cached_property
     def _by_parent(self) -> tuple[IntArray, IntArray]:
