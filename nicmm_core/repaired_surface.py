@@ -52,7 +52,7 @@ class Manifold:
     repaired : MappedMesh
         A manifold made from the faces of the given mesh.
     straight : StraightenedMesh or None
-        The manifold without vertices that divide straight edges; None if there are none.
+        The manifold without vertices that divide straight edges, or None if it has no such vertex.
     copy : Renumbered or None
         Canonical copy of the component of the request; None if the component is large.
     designer : SurfaceDesigner

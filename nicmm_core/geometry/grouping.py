@@ -129,6 +129,43 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     return int(number), label.astype(np.int64)
 
 
+def first_of_components(size: int, one: IntArray, other: IntArray) -> IntArray:
+    """For each node of an undirected graph the first node of its component, (size,).
+
+    The parameters are those of `components`.
+    """
+    number, label = components(size, one, other)
+    first = np.full(number, size)
+    np.minimum.at(first, label, np.arange(size))
+    return first[label]
+
+
+def occurrences(keys: IntArray, wanted: IntArray) -> tuple[IntArray, IntArray]:
+    """Find every occurrence of some keys among others.
+
+    Parameters
+    ----------
+    keys : (n,) int array
+        Keys, which may occur several times.
+    wanted : (m,) int array
+        Keys to find.
+
+    Returns
+    -------
+    (p,) int array
+        Index of the wanted key of each occurrence, ascending.
+    (p,) int array
+        Index of the occurrence among the keys.
+    """
+    order = stable_order(keys)
+    in_order = keys[order]
+    begin = np.searchsorted(in_order, wanted, side="left")
+    count = np.searchsorted(in_order, wanted, side="right") - begin
+    which = np.repeat(np.arange(len(wanted)), count)
+    place = np.arange(len(which)) + np.repeat(begin - (np.cumsum(count) - count), count)
+    return which, order[place]
+
+
 def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -> list[int]:
     """Nodes of a shortest path, from the predecessors that a search from ``start`` has found."""
     path = [end]

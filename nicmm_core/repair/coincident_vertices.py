@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import components, distinct_rows
+from ..geometry.grouping import distinct_rows, first_of_components
 from ..geometry.mesh import Mesh, edge_lengths, unique_edges
 from ..progress import checkpoint
 from .face_parts import FaceParts
@@ -40,16 +40,14 @@ def joined_vertices(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     pairs = _across_gaps(mesh, edges)
     if not len(pairs):
         return place, mesh.vertices
-    _, group = components(len(place), *pairs.T)
-    first = np.full(group.max() + 1, len(place))
-    np.minimum.at(first, group, np.arange(len(group)))
+    first = first_of_components(len(place), *pairs.T)
     moved = np.unique(pairs)
-    total = np.zeros((len(first), 3))
-    np.add.at(total, group[moved], mesh.vertices[moved])
-    count = np.bincount(group[moved], minlength=len(first))
+    total = np.zeros((len(place), 3))
+    np.add.at(total, first[moved], mesh.vertices[moved])
+    count = np.bincount(first[moved], minlength=len(place))
     vertices = mesh.vertices.copy()
-    vertices[moved] = (total / np.maximum(count, 1)[:, None])[group[moved]]
-    return first[group[place]], vertices
+    vertices[moved] = total[first[moved]] / count[first[moved], None]
+    return first[place], vertices
 
 
 def distinct_faces(mesh: Mesh) -> FaceParts:

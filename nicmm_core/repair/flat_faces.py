@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.grouping import components
+from ..geometry.grouping import first_of_components, occurrences
 from ..geometry.mesh import side_keys
 from ..progress import checkpoint
 from .degenerate_faces import degenerate_faces
@@ -85,10 +85,7 @@ def _merged(vertices: FloatArray, faces: IntArray, short: float) -> IntArray | N
     none = np.linalg.norm(vertices[end] - vertices[start], axis=1) <= short
     if not none.any():
         return None
-    count, group = components(len(vertices), start[none], end[none])
-    first = np.full(count, len(vertices))
-    np.minimum.at(first, group, np.arange(len(vertices)))
-    return first[group]
+    return first_of_components(len(vertices), start[none], end[none])
 
 
 def _without_caps(
@@ -158,11 +155,7 @@ def _faces_beyond(faces: IntArray, chosen: IntArray, corner: IntArray) -> tuple[
     size = len(at_ends)
     keys = side_keys(faces[near], size)
     own = side_keys(faces[chosen], size).reshape(-1, 3)[np.arange(len(chosen)), corner]
-    order = np.argsort(keys, kind="stable")
-    first = np.searchsorted(keys[order], own, side="left")
-    count = np.searchsorted(keys[order], own, side="right") - first
-    rank = np.repeat(np.arange(len(chosen)), count)
-    place = np.arange(len(rank)) - np.repeat(np.cumsum(count) - count, count) + first[rank]
-    found = near[order[place] // 3]
+    rank, side = occurrences(keys, own)
+    found = near[side // 3]
     others = found != chosen[rank]
     return rank[others], found[others]

@@ -96,7 +96,7 @@ class MappedMesh:
     def _at_position(self, point: FloatArray) -> SurfacePoints:
         """The point of the mesh nearest to a position, (1, 3), in every face that contains it.
 
-        There is none if it is farther away than a face without area is wide.
+        The result is empty if that point is farther away than a face without area is wide.
         """
         nearest, distance = nearest_points(self.mesh, point - self.origin)
         if not distance[0] <= tolerances.ON_SURFACE * self.original.diagonal:
@@ -262,7 +262,7 @@ class MappedMesh:
 
     @cached_property
     def _removed(self) -> RemovedFaces | None:
-        """The removed faces, which curves on the original have to cross; None if there are none."""
+        """The removed faces, which curves on the original have to cross, or None."""
         if not self.removed.any():
             return None
         return RemovedFaces(self.original, self.joined[self.original.faces], self.removed)

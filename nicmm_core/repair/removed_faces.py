@@ -96,8 +96,8 @@ class RemovedFaces:
         """Places of a point in the removed faces between a face and one that holds the point.
 
         Consecutive faces have a vertex or an edge at the position of the point in common. Each
-        place on it is given in both of them, first in the face that is left. There are none if the
-        first face holds the point, or if no such chain of faces leads to the point.
+        place on it is given in both of them, first in the face that is left. The list is empty if
+        the first face holds the point, or if no such chain of faces leads to the point.
         """
         position = point.positions(self._mesh)[0]
         previous = {first: first}

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.grouping import grouped
+from ..geometry.grouping import grouped, occurrences
 from ..geometry.mesh import Mesh, blocks, edge_keys, side_keys
 from ..progress import checkpoint
 from .coincident_vertices import open_edges
@@ -55,9 +55,8 @@ def without_t_junctions(
         if not len(edge):
             break
         size = int(parts.faces.max()) + 1
-        order = np.argsort(keys := side_keys(parts.faces, size), kind="stable")
         own = edge_keys(edges[edge, 0], edges[edge, 1], size)
-        face = order[np.searchsorted(keys[order], own)] // 3
+        face = occurrences(side_keys(parts.faces, size), own)[1] // 3  # one, as the edge is open
         # One division for each face; its other sides are divided in the next rounds.
         first = grouped(face)
         chosen = first[0][first[1]]
@@ -125,12 +124,7 @@ def _has_edge_along(
     vertices: FloatArray, edges: IntArray, edge: IntArray, vertex: IntArray, tolerance: float
 ) -> BoolArray:
     """Whether an open edge begins at each vertex, (k,), that overlaps the edge it lies on, (k,)."""
-    ends = edges.ravel()
-    order = np.argsort(ends, kind="stable")
-    first = np.searchsorted(ends[order], vertex, side="left")
-    count = np.searchsorted(ends[order], vertex, side="right") - first
-    rank = np.repeat(np.arange(len(vertex)), count)
-    place = order[np.arange(len(rank)) - np.repeat(np.cumsum(count) - count, count) + first[rank]]
+    rank, place = occurrences(edges.ravel(), vertex)
     other_end = edges[place // 2, 1 - place % 2]
     own = place // 2 == edge[rank]
     # Either end of one edge lies on the other edge.
