@@ -110,11 +110,13 @@ def section(results: Results) -> str:
         "manifolds and bodies), each with one set of 3–5 random vertices (shortest order, seed "
         f"{results['seed']}), asked for as a closed and as an open curve.\n\n"
         + report.table(header, rows)
-        + "\n\nThe first nine rows and their chains must not change the curve. The others change "
-        "the triangulation. Divided edges become whole again, so their curves are the same too. "
-        "Other diagonals, and gaps as wide as a rounding error in single precision, change the "
-        "search graph, and the search may find another course. The paper has no corresponding "
-        "measurement."
+        + "\n\nThe first nine changes keep the faces up to order, orientation, repetition and "
+        "vertices in common, so the curve is the same unless a coordinate is rounded otherwise, or "
+        "parts of the surface touch at vertices, which a soup cannot tell apart. The others change "
+        "the triangulation. Divided edges become whole again, except beside needles. Other "
+        "diagonals, and gaps as wide as a rounding error in single precision, change the search "
+        "graph, and the search may find another course. Times are processor times of single runs, "
+        "two at once. The paper has no corresponding measurement."
     )
 
 

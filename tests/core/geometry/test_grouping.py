@@ -11,7 +11,14 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_mesh
 from nicmm_core.geometry import grouping, mesh
-from nicmm_core.geometry.grouping import components, distinct_rows, grouped, stable_order
+from nicmm_core.geometry.grouping import (
+    components,
+    distinct_rows,
+    first_of_components,
+    grouped,
+    occurrences,
+    stable_order,
+)
 from nicmm_core.geometry.surface_points import first_hits, nearest_points
 
 SEEDS = st.integers(0, 10_000)
@@ -136,3 +143,17 @@ def test_trees_of_some_faces_find_the_same_as_one_of_all(bumpy, monkeypatch):
     for whole, split in zip(*found, strict=True):
         np.testing.assert_allclose(split, whole, atol=1e-12)
     assert 0 < (hits.faces >= 0).sum() < 50
+
+
+def test_occurrences_are_those_of_a_direct_comparison():
+    generator = np.random.default_rng(3)
+    keys, wanted = generator.integers(0, 20, 50), generator.integers(0, 25, 12)
+    which, place = occurrences(keys, wanted)
+    expected = [(w, k) for w, key in enumerate(wanted) for k in np.flatnonzero(keys == key)]
+    assert list(zip(which.tolist(), place.tolist(), strict=True)) == expected
+    assert [len(each) for each in occurrences(keys, np.zeros(0, dtype=np.int64))] == [0, 0]
+
+
+def test_first_nodes_of_components():
+    first = first_of_components(6, np.array([4, 5, 2]), np.array([2, 3, 4]))
+    assert first.tolist() == [0, 1, 2, 3, 2, 3]
