@@ -16,13 +16,13 @@ from .operators import (
     curve_settings,
     design_curve,
     live_update,
-    long_solves,
     maps,
     next_course,
+    sliced_operator,
     time_slices,
     update_curves,
 )
-from .scene import designers, surface_cache
+from .scene import surface_cache
 from .tool import (
     draw_operator,
     edit_operator,
@@ -30,7 +30,6 @@ from .tool import (
     overlay,
     picking,
     point_operators,
-    read_ahead,
     toolbar,
 )
 
@@ -38,7 +37,6 @@ MODULES = (
     preferences,
     settings,
     surface_cache,
-    designers,
     time_slices,
     design_curve,
     convert_curve,
@@ -51,7 +49,6 @@ MODULES = (
     point_operators,
     draw_operator,
     picking,
-    read_ahead,
     overlay,
     hover,
     toolbar,
@@ -69,6 +66,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    long_solves.stop_all()
+    sliced_operator.stop_all()
     for module in reversed(MODULES):
         module.unregister()

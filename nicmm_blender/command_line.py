@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from . import settings
-from .scene.membership import is_in
+from .scene.lookup import is_in
 from .scene.messages import InputError
 
 COMMAND = "nicmm"

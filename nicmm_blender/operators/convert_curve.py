@@ -9,7 +9,7 @@ from ..outputs import curve_object, tube_radius, writing
 from ..scene import curve_record, mesh_data
 from ..scene.messages import InputError
 from . import polls
-from .long_solves import with_error_reports
+from .error_reports import with_error_reports
 
 _OUTPUT = settings.OutputProperties.__annotations__
 

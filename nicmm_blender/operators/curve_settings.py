@@ -16,7 +16,7 @@ from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
-from .long_solves import answer_all, pointer_progress
+from .long_solves import answer_now
 from .message_labels import draw_message
 
 COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
@@ -131,8 +131,7 @@ def _change(curve, name: str, value) -> None:
         _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
     opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)
-    with pointer_progress(context) as progress:
-        curves = edited_curve.curves_of(answer_all(requests, progress))
+    curves = edited_curve.curves_of(answer_now(context, requests))
     edited_curve.write(context, opened, opened.points, curves, None)
 
 

@@ -21,9 +21,10 @@ from ..outputs import writing
 from ..scene import curve_record, design_request
 from ..scene.messages import InputError
 from ..scene.surface import read
+from ..scene.viewports import redraw
 from . import time_slices
-from .long_solves import TIME_SLICE, answer_all
-from .viewports import redraw
+from .long_solves import answer_all
+from .sliced_operator import TIME_SLICE
 
 PAUSE = 0.01
 """Seconds between two time slices, in which Blender handles events."""
@@ -85,8 +86,8 @@ class _Updates:
 _updates = _Updates()
 
 
-def tick() -> float | None:
-    """Work for one time slice; return the seconds until the next, or None if nothing is left."""
+def tick(seconds: float = TIME_SLICE) -> float | None:
+    """Work for about so many seconds; return those until the next call, or None if all is done."""
     if not _live_scenes():
         _updates.stop()
         return None
@@ -100,7 +101,7 @@ def tick() -> float | None:
         return None
     if _has_to_wait():
         return WAIT
-    if _updates.work.run_slice(TIME_SLICE):
+    if _updates.work.run_slice(seconds):
         _write()
         return PAUSE if _updates.changed else None
     return PAUSE

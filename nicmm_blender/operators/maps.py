@@ -11,7 +11,7 @@ from ..scene.messages import InputError, counted
 from ..scene.selection import selected_vertices
 from ..scene.surface import read, vertex_group
 from . import curve_settings, polls
-from .long_solves import with_error_reports
+from .error_reports import with_error_reports
 
 ROLES = (
     ("OBSTACLES", "Obstacles", "Weights that keep curves away"),

@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 from bpy.props import IntProperty
 
 from ..outputs import edited_curve
-from ..scene import curve_record, designers
+from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError
 from ..settings import CURVE
 from . import polls
@@ -97,8 +97,7 @@ def _current(opened, courses: list) -> int | None:
 
     if opened.curve is None:
         return None
-    mesh = designers.mesh_for(opened.surface.core_positions, opened.surface.faces)
-    return current_course(mesh, opened.curve, courses)
+    return current_course(surface_cache.core_mesh(opened.surface), opened.curve, courses)
 
 
 @persistent

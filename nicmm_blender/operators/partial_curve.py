@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import viewports
+from ..scene import viewports
 
 COLOUR = (1.0, 0.6, 0.1, 1.0)
 WIDTH = 2.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene import designers
+from ..scene import surface_cache
 
 EVEN, EXACT, BEZIER = "EVEN", "EXACT", "BEZIER"
 
@@ -64,7 +64,7 @@ def on_surface(surface, curves, drawing: Drawing) -> list:
         return curves
     from ...nicmm_core.splines.even_spacing import even_curve
 
-    mesh = _core_mesh(surface)
+    mesh = surface_cache.core_mesh(surface)
     return [even_curve(mesh, curve, _tolerance(surface, mesh, drawing)) for curve in curves]
 
 
@@ -76,7 +76,7 @@ def automatic_radius(surface, radius: float, thickness: float) -> float:
 def _knots(surface, curve, drawing: Drawing) -> Knots:
     from ...nicmm_core.splines.bezier import fit_bezier
 
-    mesh = _core_mesh(surface)
+    mesh = surface_cache.core_mesh(surface)
     points = _offset_points(surface, curve, drawing.offset) @ surface.local_to_core.T
     tolerance = _tolerance(surface, mesh, drawing)
     fitted = fit_bezier(points, curve.closed, curve.control_index, tolerance)
@@ -96,7 +96,7 @@ def _offset_points(surface, curve, offset: float) -> np.ndarray:
 
     # A reflection turns the normals of the core's mesh inwards.
     height = np.sign(np.linalg.det(surface.local_to_core)) * offset / surface.unit
-    points = offset_points(_core_mesh(surface), curve.faces, curve.barycentric, height)
+    points = offset_points(surface_cache.core_mesh(surface), curve.faces, curve.barycentric, height)
     return points @ np.linalg.inv(surface.local_to_core).T
 
 
@@ -104,7 +104,3 @@ def _tolerance(surface, mesh, drawing: Drawing) -> float:
     from ...nicmm_core.geometry.tolerances import of_clean_curve
 
     return of_clean_curve(mesh.diagonal, drawing.radius / surface.unit)
-
-
-def _core_mesh(surface):
-    return designers.mesh_for(surface.core_positions, surface.faces)

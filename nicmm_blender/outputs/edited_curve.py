@@ -12,6 +12,7 @@ import numpy as np
 from ...nicmm_core.options import FEWEST_OPEN
 from ..scene import curve_record, design_request, mesh_data, surface_cache
 from ..scene.curve_record import CurveSettings
+from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
 from . import curve_object, writing
@@ -66,11 +67,6 @@ class Opened:
     def polyline(self) -> np.ndarray:
         """Points of the curve in the object's local space, (n, 3); see `polyline_of`."""
         return polyline_of(self.surface, self.curve)
-
-
-def by_uid(uid: int):
-    """The object with this session_uid, or None."""
-    return next((found for found in bpy.data.objects if found.session_uid == uid), None)
 
 
 def polyline_of(surface, curve) -> np.ndarray:
@@ -217,20 +213,18 @@ def surface_points_at(edited: Opened, positions: np.ndarray, name: str):
     `name` is the name of the argument in error messages.
     """
     from ...nicmm_core.geometry.surface_points import locate_points
-    from ..scene import designers
 
     surface = edited.surface
-    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    mesh = surface_cache.core_mesh(surface)
     return locate_points(mesh, positions @ surface.local_to_core.T, name)
 
 
 def nearest_surface_points(edited: Opened, positions: np.ndarray):
     """SurfacePoints of the core nearest to positions (k, 3) in the object's local space."""
     from ...nicmm_core.geometry.surface_points import nearest_points
-    from ..scene import designers
 
     surface = edited.surface
-    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    mesh = surface_cache.core_mesh(surface)
     return nearest_points(mesh, positions @ surface.local_to_core.T)[0]
 
 

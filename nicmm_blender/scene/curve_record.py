@@ -15,9 +15,9 @@ import bpy
 import numpy as np
 
 from ...nicmm_core.options import OPTIONS, Kind
-from . import designers, mesh_data, record_check, surface_cache
+from . import mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, to_cage_points, to_surface_points, with_identity_trace
-from .membership import is_in
+from .lookup import is_in
 from .messages import InputError, check_finite
 from .surface import group_weights, read
 
@@ -469,7 +469,7 @@ def current_control_points(curve_object, mesh_object, surface) -> tuple[object, 
             faces[lost], barycentric[lost] = there[lost], weights[lost]
     lost = faces < 0
     if lost.any():
-        mesh = designers.mesh_for(surface.core_positions, surface.faces)
+        mesh = surface_cache.core_mesh(surface)
         nearest, _ = nearest_points(mesh, positions[lost] @ surface.local_to_core.T)
         faces[lost], barycentric[lost] = nearest.faces, nearest.barycentric
     return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
@@ -544,7 +544,7 @@ def _is_elsewhere(record, surface) -> bool:
     moved = np.linalg.norm(found - former[there], axis=1) > SAME_PLACE * surface.diagonal
     if not moved.any():
         return False
-    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    mesh = surface_cache.core_mesh(surface)
     _, away = nearest_points(mesh, former[there][moved] @ surface.local_to_core.T)
     return bool((away <= SAME_PLACE * mesh.diagonal).any())
 

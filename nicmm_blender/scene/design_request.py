@@ -8,12 +8,12 @@ slices (`operators.time_slices`).
 import contextlib
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
-from . import curve_record, designers, surface_cache
+from . import curve_record, surface_cache
 from .curve_record import CurveSettings
+from .lookup import by_uid
 from .messages import InputError, user_message
 from .surface import Surface, group_weights, read
 
@@ -37,11 +37,8 @@ class DesignRequest:
     moved: int = 0
 
     def mesh_object(self):
-        """The mesh object, looked up again: undo replaces Blender's Python objects."""
-        for candidate in bpy.data.objects:
-            if candidate.session_uid == self.mesh_uid:
-                return candidate
-        return None
+        """The mesh object, or None if it has been removed."""
+        return by_uid(self.mesh_uid)
 
     def check_unchanged(self) -> None:
         """Raise an error if the mesh has changed since it was read."""
@@ -113,8 +110,7 @@ def for_curve(curve_object, mesh_object, surface, settings: CurveSettings) -> De
     if settings.method == "NICMM" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
         if len(curves) == 1:
-            arrays = surface.core_positions, surface.faces
-            start = designers.design_of(*arrays, curves[0]) or curves[0]
+            start = surface_cache.design_of(surface, curves[0]) or curves[0]
     return replace(request, start=start, moved=moved)
 
 
@@ -123,7 +119,7 @@ def answer(request: DesignRequest, progress):
     from ... import nicmm_core as nicmm
 
     settings = request.settings
-    with designers.exclusive(request.surface.core_positions, request.surface.faces) as designer:
+    with surface_cache.designer_of(request.surface) as designer:
         arguments = {"order": request.order, "progress": progress, **request.options}
         try:
             design = None
@@ -133,7 +129,7 @@ def answer(request: DesignRequest, progress):
                     design = designer.design(request.points, start=request.start, **arguments)
             if design is None:
                 design = designer.design(request.points, **arguments)
-            designers.keep_design(designer, design)
+            surface_cache.store_design(request.surface, design)
             return design
         except nicmm.MissingPackageError:
             raise

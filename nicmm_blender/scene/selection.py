@@ -5,7 +5,7 @@ import numpy as np
 
 import bmesh
 
-from . import designers
+from . import surface_cache
 from .messages import InputError
 from .surface import Surface, group_weights
 
@@ -127,7 +127,7 @@ def _nearest(surface: Surface, vertices: np.ndarray):
     found = surface.cage.vertices[vertices]
     before = surface.cage.positions[vertices] @ surface.local_to_core.T
     wanted = np.where(found[:, None] >= 0, surface.core_positions[found], before)
-    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    mesh = surface_cache.core_mesh(surface)
     return nearest_points(mesh, wanted)[0]
 
 

@@ -17,7 +17,7 @@ import bmesh
 
 from . import mesh_arrays
 from .cage_trace import CageTrace, trace
-from .membership import is_in
+from .lookup import is_in
 from .messages import InputError
 from .vertex_weights import weights_on
 
@@ -73,6 +73,13 @@ class Surface:
     def points(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions in local space of points given by triangle and barycentric coordinates."""
         return np.einsum("nj,njk->nk", barycentric, self.local_positions[self.faces[faces]])
+
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """A hash of the arrays that the core works on."""
+        digest = hashlib.blake2b(self.core_positions.tobytes())
+        digest.update(self.faces.tobytes())
+        return digest.digest()
 
     @cached_property
     def faces_digest(self) -> str:

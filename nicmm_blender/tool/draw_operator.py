@@ -3,17 +3,16 @@
 
 import bpy
 
-from ..operators import long_solves, time_slices
-from ..operators.long_solves import LONGEST_TIME_SLICE, PASSED_ON, with_error_reports
-from ..operators.viewports import redraw
-from ..scene import designers
+from ..operators.error_reports import with_error_reports
+from ..operators.sliced_operator import SlicedOperator
+from ..scene import surface_cache
 from . import modes, picking
 from .picking import Kind
 
 PASS = {"PASS_THROUGH"}
 
 
-class NICMM_OT_draw_on_surface(bpy.types.Operator):
+class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
     """Add a point to the designed curve, move or insert one, or activate the curve under the mouse
 
     The first click on a large mesh prepares the mesh in time slices before it acts.
@@ -44,75 +43,34 @@ class NICMM_OT_draw_on_surface(bpy.types.Operator):
         if mesh_object is None:
             return PASS
         self._pixel, self._is_down = picking.pixel_of(event), True
-        if picking.is_ready(context, mesh_object, curve):
+        self._view = context.region_data.perspective_matrix.copy()
+        context.window.cursor_modal_set("WAIT")
+        try:
+            surface = picking.surface_for(context, mesh_object, curve)
+        finally:
+            context.window.cursor_modal_restore()
+        if surface_cache.is_prepared(surface):
             return self._act(context)
-        self._work, self._surface = None, None
-        self._slices, self._view = 0, context.region_data.perspective_matrix.copy()
-        self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        long_solves.note_running(self)
-        self._show(context)
-        return {"RUNNING_MODAL"}
+        return self.work_on(context, lambda progress: surface_cache.prepare(surface, progress))
 
     def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            self.cancel(context)
-            return {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
-        if event.type == "TIMER":
-            try:
-                result = with_error_reports(self, lambda: self._prepare(context))
-            except Exception:
-                self.cancel(context)
-                raise
-            if result & {"FINISHED", "CANCELLED"}:
-                self.cancel(context)
-            return result
-        return PASS if event.type in PASSED_ON else {"RUNNING_MODAL"}
+        return super().modal(context, event)
 
-    def cancel(self, context):
-        """Stop the preparation; also called by Blender when it opens another file or quits."""
-        if self._work is not None:
-            self._work.cancel()
-        self._tidy(context)
-
-    def _prepare(self, context):
-        """Work for one time slice; after the last one, do what the click was for."""
-        mesh_object, curve = picking.mesh_and_curve(context)
-        if mesh_object is None:
+    def done(self, context, _result):
+        """Do what the click was for."""
+        if not self.is_sliced:
+            return self._act(context)
+        view = context.region_data
+        if view is None or view.perspective_matrix != self._view:
+            self.report({"INFO"}, "The view has changed since the click. Click again")
             return {"CANCELLED"}
-        self._slices += 1
-        if self._slices == 1:
-            return PASS  # so that the message is drawn before the mesh is read
-        if self._surface is None:
-            self._surface = surface = picking.surface_for(context, mesh_object, curve)
-            self._work = time_slices.Work(
-                lambda progress: designers.prepare(surface.core_positions, surface.faces, progress)
-            )
-        elif self._work.run_slice(LONGEST_TIME_SLICE):
-            self._work.result()
-            self._tidy(context)
-            view = context.region_data
-            if view is None or view.perspective_matrix != self._view:
-                self.report({"INFO"}, "The view has changed since the click. Click again")
-                return {"CANCELLED"}
-            result = self._act(context)
-            return {"CANCELLED"} if result == PASS else result  # the event has not been passed on
-        self._show(context)
-        return PASS
+        result = self._act(context)
+        return {"CANCELLED"} if result == PASS else result  # the event has not been passed on
 
-    def _show(self, context) -> None:
-        what = "Reading the mesh" if self._surface is None else "Preparing the mesh"
-        context.workspace.status_text_set(f"{self.bl_label}: {what}   |   Esc: Cancel")
-        redraw()
-
-    def _tidy(self, context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-            long_solves.note_ended(self)
-            context.workspace.status_text_set(None)
+    def progress_text(self) -> str:
+        return "Preparing the mesh"
 
     def _act(self, context):
         hit = picking.under_mouse(context, self._pixel)

@@ -8,7 +8,8 @@ import numpy as np
 
 from .. import settings
 from ..operators import polls
-from ..operators.long_solves import answer_all, pointer_progress, with_error_reports
+from ..operators.error_reports import with_error_reports
+from ..operators.long_solves import answer_now
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record
@@ -160,8 +161,7 @@ def _design_curves(context, opened: Opened, points) -> list:
     requests = edited_curve.request(opened, points)
     if not requests:
         raise InputError(TOO_FEW_POINTS)
-    with pointer_progress(context) as progress:
-        return edited_curve.curves_of(answer_all(requests, progress))
+    return edited_curve.curves_of(answer_now(context, requests))
 
 
 def register() -> None:

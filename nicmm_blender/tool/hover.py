@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..scene.messages import InputError
-from . import modes, overlay, picking, read_ahead
+from . import modes, overlay, picking
 
 
 class NICMM_GT_hover(bpy.types.Gizmo):
@@ -30,7 +30,7 @@ def _under(context, location):
         return None
     try:
         mesh_object, curve = picking.mesh_and_curve(context)
-        if mesh_object is None or not read_ahead.is_read(context, mesh_object, curve):
+        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
             return None
         return picking.under_mouse(context, np.array(location, dtype=np.float64))
     except (InputError, NicmmError):

@@ -7,7 +7,7 @@ to be designed from scratch, which takes longer; `waiting` is then set.
 
 from dataclasses import replace
 
-from ..scene import designers
+from ..scene import surface_cache
 from ..scene.design_request import DesignRequest
 from ..scene.messages import user_message
 
@@ -70,11 +70,11 @@ class LiveCurve:
             return
         self.steps_left -= 1
         request, surface = self.request, self.request.surface
-        designer = designers.designer_for(surface.core_positions, surface.faces)
         iterations = min(max(POINTS // len(self.curve.faces), 1), ITERATIONS)
         bounds = {"order": "given", "max_iterations": iterations, "start": request.start}
         try:
-            design = designer.design(request.points, **bounds, **request.options)
+            with surface_cache.designer_of(surface) as designer:
+                design = designer.design(request.points, **bounds, **request.options)
         except nicmm.CurveError:
             self.waiting, self.steps_left = True, 0
         except nicmm.NicmmError as error:

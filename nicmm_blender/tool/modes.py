@@ -7,7 +7,7 @@ click could not be undone. There, control points are selected vertices.
 
 from ..outputs import curve_object
 from ..scene import curve_record
-from ..scene.membership import is_in
+from ..scene.lookup import is_in
 
 TOOLS = {
     "OBJECT": "nicmm.surface_curve",

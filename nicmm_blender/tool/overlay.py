@@ -13,10 +13,11 @@ from gpu_extras.batch import batch_for_shader
 
 from mathutils import Matrix
 
-from ..operators.viewports import redraw
 from ..outputs import edited_curve
+from ..scene.lookup import by_uid
 from ..scene.messages import InputError
-from . import modes, picking, read_ahead
+from ..scene.viewports import redraw
+from . import modes, picking
 from .picking import Kind
 from .view import OFFSET
 
@@ -98,7 +99,7 @@ def _drawn_now(context) -> _Drawn | None:
         return None
     try:
         mesh_object, curve = picking.mesh_and_curve(context)
-        if mesh_object is None or not read_ahead.is_read(context, mesh_object, curve):
+        if mesh_object is None or not picking.is_ready(context, mesh_object, curve):
             return None
         opened = picking.opened_now(context)
     except (InputError, NicmmError):
@@ -122,7 +123,7 @@ def _radius_of(opened) -> float:
 def _draw_lines() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    mesh_object = None if drawn is None else edited_curve.by_uid(drawn.mesh_uid)
+    mesh_object = None if drawn is None else by_uid(drawn.mesh_uid)
     if mesh_object is None:
         return
     colours = _Colours(context)
@@ -175,7 +176,7 @@ def _batch(line: np.ndarray):
 def _draw_points() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    mesh_object = None if drawn is None else edited_curve.by_uid(drawn.mesh_uid)
+    mesh_object = None if drawn is None else by_uid(drawn.mesh_uid)
     if mesh_object is None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)

@@ -13,8 +13,8 @@ from mathutils import Vector
 
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
-from ..scene import curve_record, designers, surface_cache
-from ..scene.membership import is_in
+from ..scene import curve_record, surface_cache
+from ..scene.lookup import is_in
 from ..scene.messages import InputError
 from .view import View, view_of
 
@@ -104,20 +104,23 @@ def mesh_and_curve(context) -> tuple:
 def is_ready(context, mesh_object, curve) -> bool:
     """Whether what is under the mouse is known without a long computation.
 
-    During a render the surface must not be read, because that makes temporary objects.
+    If a surface has not been read, it is read soon; but not during a render, because reading makes
+    temporary objects.
     """
     if bpy.app.is_job_running("RENDER"):
         return False
-    surface = surface_cache.cached(mesh_object, uses_modifiers(context, curve))
-    if surface is None:
-        return surface_cache.has_few_faces(mesh_object)
+    needed = _modifier_uses(context, mesh_object, curve)
+    found = {uses: surface_cache.cached_or_soon(mesh_object, uses) for uses in needed}
+    surface = found[_uses_modifiers(context, curve)]
+    if surface is None or None in found.values():
+        return False
     few = len(surface.faces) <= 2 * surface_cache.FEW_FACES
-    return few or designers.is_prepared(surface.core_positions, surface.faces)
+    return few or surface_cache.is_prepared(surface)
 
 
 def surface_for(context, mesh_object, curve):
     """The surface that a click draws on."""
-    return surface_cache.get(mesh_object, uses_modifiers(context, curve))
+    return surface_cache.get(mesh_object, _uses_modifiers(context, curve))
 
 
 def opened_now(context) -> Opened:
@@ -140,7 +143,7 @@ def pixel_of(event) -> np.ndarray:
 
 def view_on(context, mesh_object, surface) -> View:
     """The view of the context's region on a mesh."""
-    mesh = designers.mesh_for(surface.core_positions, surface.faces)
+    mesh = surface_cache.core_mesh(surface)
     region = context.region
     return view_of(region, region.data, mesh_object, surface, mesh, is_xray(context.space_data))
 
@@ -226,7 +229,7 @@ def _other_lines(context, mesh_object, active, surface) -> list:
             settings = curve_record.settings_of(curve)
             if settings.use_modifiers != surface.with_modifiers:
                 on = surface_cache.cached(mesh_object, settings.use_modifiers)
-                if on is None:  # read later, see `read_ahead`
+                if on is None:  # read later, see `is_ready`
                     continue
             _, line = curve_record.positions_of(curve, on)
         except (InputError, NicmmError):
@@ -235,14 +238,14 @@ def _other_lines(context, mesh_object, active, surface) -> list:
     return lines
 
 
-def uses_modifiers(context, curve) -> bool:
+def _uses_modifiers(context, curve) -> bool:
     """Whether a curve, or a new one, lies on the surface with modifiers."""
     if curve is None:
         return context.scene.nicmm_curves.use_modifiers
     return curve_record.settings_of(curve).use_modifiers
 
 
-def modifier_uses(context, mesh_object, curve) -> frozenset:
+def _modifier_uses(context, mesh_object, curve) -> frozenset:
     """On which surfaces of a mesh, with modifiers or without, the tool shows curves."""
     key = surface_cache.changes(), mesh_object.session_uid
     if key != _visible_curves.uses_key:
@@ -251,7 +254,7 @@ def modifier_uses(context, mesh_object, curve) -> frozenset:
             with contextlib.suppress(InputError):  # such a curve is not drawn
                 uses.add(curve_record.settings_of(other).use_modifiers)
         _visible_curves.uses_key, _visible_curves.uses = key, uses
-    return frozenset(_visible_curves.uses | {uses_modifiers(context, curve)})
+    return frozenset(_visible_curves.uses | {_uses_modifiers(context, curve)})
 
 
 def radius_of(curve, surface) -> float:

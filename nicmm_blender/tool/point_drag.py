@@ -11,9 +11,11 @@ import bpy
 import numpy as np
 
 from ..operators import time_slices
-from ..operators.long_solves import TIME_SLICE, answer_all, with_error_reports
-from ..operators.viewports import NAVIGATION, redraw
+from ..operators.error_reports import with_error_reports
+from ..operators.long_solves import answer_all
+from ..operators.sliced_operator import TIME_SLICE
 from ..outputs import edited_curve, writing
+from ..scene.viewports import NAVIGATION, redraw
 from . import overlay, picking
 from .live_curve import LiveCurve
 
@@ -191,9 +193,9 @@ class PointDrag:
                 overlay.show_dragged(None)
         return result
 
-    def _tidy(self, context):
+    def tidy(self, context):
         overlay.show_dragged(None)
-        super()._tidy(context)
+        super().tidy(context)
 
     def _stop_scratch(self) -> None:
         if self._scratch is not None:

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 
 from ..operators import polls
-from ..operators.long_solves import LongSolves, with_error_reports
+from ..operators.error_reports import with_error_reports
+from ..operators.long_solves import LongSolves
 from ..outputs import edited_curve
 from ..outputs.writing import SEPARATE
 from ..scene import curve_record

@@ -397,7 +397,7 @@ def test_open_curve_is_not_cyclic(empty_scene):
     [("igl", "NICMM", "Install the zip"), ("torch", "NICMM_PAPER", "built with --with-torch")],
 )
 def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, remedy):
-    import_module(f"{empty_scene.name}.nicmm_blender.scene.designers").forget()
+    scenes.module(empty_scene, "scene.surface_cache").forget()
     sphere = scenes.sphere()
     scenes.select(sphere, scenes.ring(sphere, 4))
     # Simulate a new session, in which the core has not been loaded yet.
@@ -412,17 +412,20 @@ def test_missing_library_is_reported(empty_scene, monkeypatch, library, method, 
 
 
 def test_the_same_mesh_is_factorised_once(empty_scene):
-    designers = import_module(f"{empty_scene.name}.nicmm_blender.scene.designers")
-    designers.forget()
-    sphere = scenes.sphere()
-    kept = []
+    surface_cache = scenes.module(empty_scene, "scene.surface_cache")
+    read = scenes.module(empty_scene, "scene.surface").read
+    name = scenes.sphere().name
+    bpy.ops.ed.undo_push(message="Add")
+    designers = []
     for smoothness in (1.0, 2.0):
+        sphere = bpy.data.objects[name]
         bpy.context.view_layer.objects.active = sphere
         scenes.select(sphere, scenes.ring(sphere, 4))
         bpy.ops.nicmm.design_curve(spline="EXACT", smoothness=smoothness)
-        kept.append(dict(designers._designers))
-    assert kept[0] == kept[1]
-    assert len(kept[0]) == 1
+        with surface_cache.designer_of(read(sphere, True)) as designer:
+            designers.append(designer)
+        bpy.ops.ed.undo()  # as the redo panel does
+    assert designers[0] is designers[1]
 
 
 @pytest.mark.slow

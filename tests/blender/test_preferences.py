@@ -1,7 +1,9 @@
 """Preferences, and rules that all operators and panels follow."""
 
+import gc
 import importlib.metadata
 import importlib.util
+import weakref
 from importlib import import_module
 
 import bpy
@@ -56,10 +58,14 @@ def test_labels_and_tooltips_follow_blender(extension, name):
     assert "UNDO" in options or "INTERNAL" in options
 
 
-def test_preferences_have_the_usual_values(empty_scene, preferences):
+def test_preferences_take_effect_and_are_described(empty_scene, preferences):
     found = bpy.context.preferences.addons[empty_scene.name].preferences
-    assert found.patience == pytest.approx(preferences.PATIENCE) == preferences.patience()
-    assert found.kept_meshes == preferences.KEPT_MESHES
+    for name, value in (("patience", 1.5), ("kept_meshes", 5), ("live_delay", 2.5)):
+        try:
+            setattr(found, name, value)
+            assert getattr(preferences, name)() == value
+        finally:
+            found.property_unset(name)
     for name, described in found.bl_rna.properties.items():
         if name not in ("rna_type", "bl_idname"):
             assert described.description and not described.description.endswith(".")
@@ -67,22 +73,24 @@ def test_preferences_have_the_usual_values(empty_scene, preferences):
 
 @pytest.mark.slow
 def test_number_of_meshes_in_memory(empty_scene, preferences):
-    designers = import_module(f"{empty_scene.name}.nicmm_blender.scene.designers")
+    surface_cache = scenes.module(empty_scene, "scene.surface_cache")
+    read = scenes.module(empty_scene, "scene.surface").read
     found = bpy.context.preferences.addons[empty_scene.name].preferences
-    designers.forget()
     try:
         for wanted, left in ((3, 3), (1, 1), (0, 1)):  # the tool needs one
             found.kept_meshes = wanted
+            meshes = []
             for _ in range(4):
                 sphere = scenes.sphere()
                 place = scenes.positions(sphere) * (1, 1, 1 + np.random.default_rng().random())
                 sphere.data.vertices.foreach_set("co", place.astype(np.float32).ravel())
                 scenes.select(sphere, scenes.ring(sphere, 3))
                 bpy.ops.nicmm.design_curve()
-            assert len(designers._designers) == left
+                meshes.append(weakref.ref(surface_cache.core_mesh(read(sphere, True))))
+            gc.collect()
+            assert [mesh() is not None for mesh in meshes] == [False] * (4 - left) + [True] * left
     finally:
-        found.kept_meshes = preferences.KEPT_MESHES
-        designers.forget()
+        found.property_unset("kept_meshes")
 
 
 def test_torch_is_reported_and_not_loaded(preferences, monkeypatch):

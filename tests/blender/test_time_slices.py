@@ -1,6 +1,8 @@
 """Long work in time slices, and the operators that use it, without a window."""
 
+import re
 import threading
+import time
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -92,151 +94,178 @@ def test_disabling_ends_what_is_parked(empty_scene, time_slices):
 
 
 class Window:
-    """Stands in for the parts of Blender's context that an operator in a window uses."""
+    """Stands in for a window, which background mode lacks, and runs an operator in it.
 
-    def __init__(self, operators, mesh_object):
-        self.events, self.texts, self.timers, self.reports = [], [], [], []
+    `reports`, `texts` and `timers` are what the operator has reported, shown in the status bar and
+    not yet removed.
+    """
+
+    def __init__(self, operator_type):
+        self.texts, self.timers, self.reports, self.handlers = [], [], [], []
         self.context = SimpleNamespace(
             window=None,
             window_manager=SimpleNamespace(
                 event_timer_add=self.add_timer,
                 event_timer_remove=self.timers.remove,
-                modal_handler_add=self.events.append,
+                modal_handler_add=self.handlers.append,
             ),
             workspace=SimpleNamespace(status_text_set=self.texts.append),
-            scene=bpy.context.scene,
-            view_layer=bpy.context.view_layer,
-            active_object=mesh_object,
-            selected_objects=[],
-            space_data=None,
             mode="OBJECT",
         )
+
+        window = self
+
+        class Operator(operator_type):
+            bl_label = "Design"
+
+            def report(self, kind, message):
+                window.reports.append((kind, message))
+
+        self.operator = Operator()
 
     def add_timer(self, _seconds, window):
         self.timers.append(object())
         return self.timers[-1]
 
+    def send(self, kind, value="NOTHING"):
+        """Send an event to the operator; return what it returns."""
+        return self.operator.modal(self.context, SimpleNamespace(type=kind, value=value))
+
+    def finish(self):
+        """Send timer events until the operator ends."""
+        result = {"PASS_THROUGH"}
+        while result == {"PASS_THROUGH"}:
+            result = self.send("TIMER")
+        return result
+
+
+def preferences(extension):
+    return bpy.context.preferences.addons[extension.name].preferences
+
 
 @pytest.fixture
-def window(empty_scene, monkeypatch):
-    """An operator as a window runs it, without waiting time: background mode sends no events."""
-    design_curve = import_module(f"{empty_scene.name}.nicmm_blender.operators.design_curve")
-    long_solves = import_module(f"{empty_scene.name}.nicmm_blender.operators.long_solves")
-    monkeypatch.setattr(long_solves.preferences, "patience", lambda: 0.0)
-    monkeypatch.setattr(long_solves, "LONGEST_TIME_SLICE", 0.0)
-    monkeypatch.setattr(long_solves, "answer_all", slow(long_solves.answer_all))
+def no_patience(empty_scene):
+    """Work continues in time slices at once."""
+    preferences(empty_scene).patience = 0.0
+    yield
+    preferences(empty_scene).property_unset("patience")
+
+
+STEPS = 4
+
+
+@pytest.fixture
+def counter(empty_scene, no_patience):
+    """A window with an operator whose work takes several time slices."""
+    base = scenes.module(empty_scene, "operators.sliced_operator").SlicedOperator
+
+    class Counter(base):
+        def begin(self, context):
+            def work(progress):
+                for step in range(STEPS):
+                    time.sleep(0.04)
+                    if not progress(step / STEPS, np.zeros((0, 3))):
+                        return None
+                return "counted"
+
+            return self.work_on(context, work)
+
+        def progress_text(self):
+            return f"{self._work.fraction}"
+
+        def done(self, _context, result):
+            self.report({"INFO"}, result)
+            return {"FINISHED"}
+
+    return Window(Counter)
+
+
+def test_long_work_shows_progress_and_ends(counter):
+    assert counter.operator.begin(counter.context) == {"RUNNING_MODAL"}
+    assert counter.handlers == [counter.operator] and len(counter.timers) == 1
+    assert counter.finish() == {"FINISHED"}
+    assert counter.reports == [({"INFO"}, "counted")]
+    assert not counter.timers
+    assert counter.texts.pop() is None
+    assert counter.texts == [f"Design: {step / STEPS}   |   Esc: Cancel" for step in range(STEPS)]
+
+
+def test_escape_stops_long_work(counter):
+    before = threading.active_count()
+    counter.operator.begin(counter.context)
+    counter.send("TIMER")
+    assert counter.send("ESC", "PRESS") == {"CANCELLED"}
+    assert threading.active_count() == before
+    assert not counter.timers and counter.texts[-1] is None
+    assert counter.reports == [({"INFO"}, "Cancelled without changes")]
+    assert not vars(counter.operator)
+
+
+def test_only_navigation_passes_long_work(counter):
+    counter.operator.begin(counter.context)
+    assert counter.send("WHEELUPMOUSE", "PRESS") == {"PASS_THROUGH"}
+    assert counter.send("X", "PRESS") == {"RUNNING_MODAL"}
+    counter.operator.cancel(counter.context)
+
+
+def test_cancelling_ends_long_work(counter):
+    """Blender cancels operators when it opens another file or quits."""
+    counter.operator.begin(counter.context)
+    before = threading.active_count()
+    counter.operator.cancel(counter.context)
+    assert threading.active_count() == before - 1
+    assert not counter.timers and not counter.reports
+
+
+def test_short_work_does_not_wait_for_a_timer(counter, empty_scene):
+    preferences(empty_scene).patience = 10.0
+    assert counter.operator.begin(counter.context) == {"FINISHED"}
+    assert not counter.handlers and not counter.texts
+
+
+@pytest.fixture
+def drawing(empty_scene, no_patience):
+    """A window with an operator that designs a curve on a sphere and shows its length."""
+    solves = scenes.module(empty_scene, "operators.long_solves").LongSolves
+    request = scenes.module(empty_scene, "scene.design_request")
+    record = scenes.module(empty_scene, "scene.curve_record")
+    surface = scenes.module(empty_scene, "scene.surface")
     sphere = scenes.sphere(5)
-    scenes.select(sphere, scenes.ring(sphere, 4, height=0.3))
-    window = Window(design_curve, sphere)
+
+    class Drawing(solves):
+        def requests(self, _context):
+            # A curve that bends so strongly that its design takes several time slices.
+            points = np.random.default_rng(1).choice(len(sphere.data.vertices), 7, replace=False)
+            read, settings = surface.read(sphere, True), record.CurveSettings()
+            return [request.for_points(sphere, read, points, "given", settings)]
+
+        def finish(self, _context, requests, answers):
+            (answer,) = answers
+            self.report({"INFO"}, f"{answer.curves[0].length:.12f}")
+            return {"FINISHED"}
+
+    window = Window(Drawing)
     window.sphere = sphere
-    defaults = {
-        name: found.default
-        for name, found in bpy.ops.nicmm.design_curve.get_rna_type().properties.items()
-        if hasattr(found, "default")
-    }
-
-    class Operator(long_solves.LongSolves):
-        bl_label = "Design"
-        points = point_group = ()
-        requests = design_curve.NICMM_OT_design_curve.requests
-        _control_points = design_curve.NICMM_OT_design_curve._control_points
-        finish = design_curve.NICMM_OT_design_curve.finish
-
-        def __init__(self):
-            for name, value in defaults.items():
-                if not hasattr(type(self), name):
-                    setattr(self, name, value)
-
-        def report(self, kind, message):
-            window.reports.append((kind, message))
-
-    window.operator = Operator()
     return window
 
 
-def slow(answer_all):
-    """Wrap `answer_all` so that it reports a partial curve first."""
-
-    def answer(requests, progress):
-        for step in range(3):
-            line = np.outer(np.arange(4.0), [1.0, 0.0, 0.0])
-            if progress(step / 10, line[: step + 1]) is False:
-                return None
-        return answer_all(requests, progress)
-
-    return answer
-
-
-def event(kind, value="NOTHING"):
-    return SimpleNamespace(type=kind, value=value)
+def test_a_curve_is_the_same_in_time_slices(drawing, empty_scene):
+    operator, context = drawing.operator, drawing.context
+    assert operator.answer(context, operator.requests(context)) == {"RUNNING_MODAL"}
+    assert drawing.finish() == {"FINISHED"}
+    assert all(
+        re.fullmatch(r"Design: \d+%   \|   Esc: Cancel", text) for text in drawing.texts[:-1]
+    )
+    preferences(empty_scene).patience = 10.0
+    assert operator.answer(context, operator.requests(context)) == {"FINISHED"}
+    assert drawing.reports[0] == drawing.reports[1]
+    assert not drawing.timers and not vars(operator)
 
 
-def test_long_solve_shows_progress_and_ends(window):
-    operator, context = window.operator, window.context
-    assert operator._begin(context) == {"RUNNING_MODAL"}
-    assert window.events == [operator] and len(window.timers) == 1
-    result = {"PASS_THROUGH"}
-    while result == {"PASS_THROUGH"}:
-        assert not scenes.curves()
-        result = operator.modal(context, event("TIMER"))
-    assert result == {"FINISHED"}, window.reports
-    assert not window.timers
-    assert window.texts[-1] is None
-    percents = [text.partition(":")[2].split()[0] for text in window.texts[:-1]]
-    assert percents[:3] == ["0%", "10%", "20%"]
-    assert all("Esc: Cancel" in text for text in window.texts[:-1])
-    (stepped,) = scenes.curves()
-    bpy.context.view_layer.objects.active = window.sphere
-    bpy.ops.nicmm.design_curve()
-    (other,) = set(scenes.curves()) - {stepped}
-    np.testing.assert_array_equal(scenes.points(stepped), scenes.points(other))
-
-
-def test_escape_stops_a_long_solve(window):
-    operator, context = window.operator, window.context
-    before = threading.active_count()
-    operator._begin(context)
-    operator.modal(context, event("TIMER"))
-    assert operator.modal(context, event("ESC", "PRESS")) == {"CANCELLED"}
-    assert threading.active_count() == before
-    assert not window.timers and window.texts[-1] is None
-    assert not scenes.curves()
-    assert window.reports == [({"INFO"}, "Cancelled without changes")]
-
-
-def test_only_navigation_passes_a_long_solve(window):
-    operator, context = window.operator, window.context
-    operator._begin(context)
-    assert operator.modal(context, event("WHEELUPMOUSE", "PRESS")) == {"PASS_THROUGH"}
-    assert operator.modal(context, event("X", "PRESS")) == {"RUNNING_MODAL"}
-    operator.cancel(context)
-
-
-def test_mesh_that_changes_meanwhile_is_reported(window):
-    operator, context = window.operator, window.context
-    operator._begin(context)
-    window.sphere.data.vertices[0].co.x += 0.1
-    result = {"PASS_THROUGH"}
-    while result == {"PASS_THROUGH"}:
-        result = operator.modal(context, event("TIMER"))
-    assert result == {"CANCELLED"}
-    ((kind, message),) = window.reports
+def test_mesh_that_changes_meanwhile_is_reported(drawing):
+    operator, context = drawing.operator, drawing.context
+    operator.answer(context, operator.requests(context))
+    drawing.sphere.data.vertices[0].co.x += 0.1
+    assert drawing.finish() == {"CANCELLED"}
+    ((kind, message),) = drawing.reports
     assert kind == {"ERROR"} and "changed while the curve was being computed" in message
-    assert not scenes.curves()
-
-
-def test_disabling_ends_a_long_solve(window, empty_scene):
-    operator, context = window.operator, window.context
-    operator._begin(context)
-    before = threading.active_count()
-    operator.cancel(context)
-    assert threading.active_count() == before - 1
-    assert not window.timers
-
-
-def test_short_solve_does_not_wait_for_a_timer(window, monkeypatch):
-    long_solves = import_module(window.operator.__class__.__mro__[1].__module__)
-    monkeypatch.setattr(long_solves.preferences, "patience", lambda: 600.0)
-    assert window.operator._begin(window.context) == {"FINISHED"}
-    assert not window.events and not window.texts
-    assert len(scenes.curves()) == 1

@@ -38,7 +38,7 @@ def drawn(extension, mesh_object):
 
 def looking(extension, opened, eye=-5.0, perspective=True, xray=False):
     surface = opened.surface
-    mesh = module(extension, "scene.designers").mesh_for(surface.core_positions, surface.faces)
+    mesh = module(extension, "scene.surface_cache").core_mesh(surface)
     view = module(extension, "tool.view").View
     size = np.array([800.0, 600.0])
     return view(matrices(eye, perspective), size, surface, mesh, xray)

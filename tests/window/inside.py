@@ -314,8 +314,8 @@ class Helper:
 
     @staticmethod
     def forget():
-        """Drop the cached designers."""
-        import_module(f"{MODULE}.scene.designers").forget()
+        """Drop what was computed for meshes."""
+        import_module(f"{MODULE}.scene.surface_cache").forget()
 
     @staticmethod
     def is_modal():

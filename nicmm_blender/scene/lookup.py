@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests whether an object is in a view layer."""
+"""Finds objects in the file and in view layers."""
+
+import bpy
+
+
+def by_uid(uid: int):
+    """The object with this session_uid, or None. Undo replaces Blender's Python objects."""
+    return next((found for found in bpy.data.objects if found.session_uid == uid), None)
 
 
 def is_in(view_layer, candidate) -> bool:

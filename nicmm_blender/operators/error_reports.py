@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Turns expected errors into reports of operators."""
+
+import sys
+
+from ..scene.messages import InputError, user_message
+
+
+def with_error_reports(operator, work):
+    """Run the work of an operator and turn expected errors into reports."""
+    from ... import nicmm_core as nicmm
+
+    try:
+        nicmm.Designer  # noqa: B018 - loads the core with its libraries
+    except ImportError as error:
+        return _cancelled(
+            operator,
+            f"A library that NICMM Curves needs cannot be loaded ({error}). "
+            "Install the zip made for this platform and this Blender version",
+        )
+    try:
+        return work()
+    except nicmm.MissingPackageError:
+        return _cancelled(
+            operator,
+            f"The method NICMM (Paper) needs PyTorch, which Blender's Python ({sys.executable}) "
+            "cannot import. Install a zip built with --with-torch, or choose the method NICMM",
+        )
+    except nicmm.NicmmError as error:
+        return _cancelled(operator, user_message(error))
+    except InputError as error:
+        return _cancelled(operator, str(error))
+
+
+def _cancelled(operator, message: str):
+    operator.report({"ERROR"}, message)
+    return {"CANCELLED"}
