@@ -140,7 +140,7 @@ class Improvement:
         return True
 
     def _try_other_courses(self, courses: Iterator[Start]) -> None:
-        """Try the next courses of a search as long as its best curve is extremely bent."""
+        """Try the next courses of a search as long as its best curve is strongly bent."""
         first = len(self.starts) - 1
         while (
             len(self.starts) - first < COURSES_OF_A_SEARCH

@@ -1,9 +1,8 @@
 """Decides whether to make another attempt at a curve, from the curves relaxed so far.
 
 The farther a curve winds around limbs, the more courses a search misses. A search with other
-lengths and another tension finds others, so it is made if the curve bends. Then the parts that bend
-most are searched for again. If even the best curve then bends more than a circle, further searches
-follow.
+lengths and another tension finds others, so it is made if the curve bends. If even the best curve
+then bends strongly, the parts that bend most are searched for again, and further searches follow.
 """
 
 from __future__ import annotations
@@ -16,33 +15,30 @@ from ..relaxation.noded_energies import energies_of, scaled_bending
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
 from .comparison import distinct_by_energy, is_apart
 
-STRONGLY_BENT = 20.0
-"""L ∮ κ_g² ds above which the search is repeated, half the value of a circle.
+SLIGHTLY_BENT = 10.0
+"""L ∮ κ_g² ds above which the search is repeated, a quarter of the value of a circle.
 
-Curves above it wind around limbs, where a search misses more courses.
+Curves above it may wind around limbs, where a search misses more courses.
 """
 
-EXTREMELY_BENT = 50.0
-"""L ∮ κ_g² ds above which searches go on even if they gain little; a circle has 4π², about 40."""
+STRONGLY_BENT = 30.0
+"""L ∮ κ_g² ds above which further courses and searches follow and the parts that bend most are
+searched for again; a circle has 4π², about 40."""
 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
 
 FURTHER_SEARCHES = 3
-"""Greatest number of repeated searches for the whole curve; extremely bent curves get all."""
+"""Greatest number of repeated searches for the whole curve; strongly bent curves get all."""
 
 COURSES_OF_A_SEARCH = 3
-"""Greatest number of courses relaxed after a search whose curves are extremely bent.
+"""Greatest number of courses relaxed after a search whose curves are strongly bent.
 
 The order of their energies with few nodes is unreliable.
 """
 
 FRUITLESS_PARTS = 2
-"""Number of consecutive searches for parts of an extremely bent curve with little gain after which
-no further one is made. Those for parts of other curves end after one."""
-
-PARTLY_BENT = 30.0
-"""L ∮ κ_g² ds above which the parts that bend most are searched for again."""
+"""Number of consecutive searches for parts with little gain after which no further one is made."""
 
 SEARCHES_FOR_PARTS, COURSES_OF_A_PART = 8, 2
 """Greatest number of such searches, and of courses relaxed after each of them."""
@@ -153,9 +149,9 @@ class Attempts:
         """Whether another search is affordable and may find a far better curve.
 
         The first repeated search is worthwhile if the best curve bends; those after it, only if it
-        is still extremely bent and two searches have not found the same curve.
+        is still strongly bent and two searches have not found the same curve.
         """
-        least = STRONGLY_BENT if self.searches == 1 else EXTREMELY_BENT
+        least = SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT
         promising = self._bending > least and not self.repeat_found_same_curve
         return promising and self._is_affordable(self._work / self.searches + RESERVED)
 
@@ -163,13 +159,12 @@ class Attempts:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
         least = min(scaled_bending(each.noded_curve) for each in self.relaxed[first:])
         mean = self._work_of_relaxations / len(self.relaxed)
-        return least > EXTREMELY_BENT and self._is_affordable(mean + RESERVED)
+        return least > STRONGLY_BENT and self._is_affordable(mean + RESERVED)
 
     def should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
-        bending = self._bending
-        allowed = FRUITLESS_PARTS if bending > EXTREMELY_BENT else 1
-        promising = bending > PARTLY_BENT and self.searches_without_gain < allowed
+        gaining = self.searches_without_gain < FRUITLESS_PARTS
+        promising = gaining and self._bending > STRONGLY_BENT
         return promising and self._is_affordable(WORK_OF_PART)
 
     def should_tighten(self) -> bool:

@@ -26,7 +26,7 @@ from .leg_combinations import (
 from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
 from .leg_routes import Routes, cells_beside, leg_choices, routes_of_legs
 
-CANDIDATES = (16, 10, 8)
+CANDIDATES = (10, 8, 8, 8, 8, 8)
 """Numbers of candidates by the rank of their order of the control points."""
 
 

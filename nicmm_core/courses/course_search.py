@@ -35,7 +35,7 @@ Searches with different seeds take them in turn, since a low tension finds long 
 little. The first one is greater than 1 because hops overestimate bending: they turn only at cells.
 """
 
-RECOMBINED, FINALISTS = 16, 6
+RECOMBINED, FINALISTS = 16, 10
 """Number of courses combined from their legs, and number of the best of all courses that are
 relaxed with twice as many nodes, unless they have had enough doublings."""
 

@@ -1,13 +1,14 @@
 """Finds orders of the control points in which a curve may bend least, by the costs of legs.
 
-The fairest curve often visits its points in another order than the shortest one. An order that
-reverses a section of the shortest one ("2-opt": Croes, "A method for solving traveling-salesman
-problems", 1958) may be better, and the hop graph tells which.
+The fairest curve often visits its points in another order than the shortest one. With few points
+all orders are compared; with more, those that reverse a section of the shortest one ("2-opt":
+Croes, "A method for solving traveling-salesman problems", 1958).
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -20,25 +21,35 @@ MOST_POINTS = 7
 """Number of points above which only the shortest order is tried; there are too many pairs of points
 then, and crossing legs are uncrossed later anyway."""
 
+MOST_ORDERS = 60
+"""Number of orders up to which all of them are tried."""
+
 DIRECTIONS_OF_A_LEG = 24
 """Number of pairs of end directions of a leg with which an order is tried."""
 
-MAX_COST_OF_ORDER = 1.6
+MAX_COST_OF_ORDER = 2.0
 """Cost of an order, relative to the cheapest, above which it is left out."""
 
 
-def reversals(count: int, closed: bool) -> list[IntArray]:
-    """The order 0 … count - 1, and every order that reverses a section of it, each once.
+def possible_orders(count: int, closed: bool) -> list[IntArray]:
+    """Orders of points 0 … count - 1 that are tried, each once, 0 … count - 1 the first.
 
-    A closed order starts at 0, and is the same in the opposite direction.
+    A closed order starts at 0. An order is the same in the opposite direction. All orders are tried
+    if they are at most `MOST_ORDERS`, else those that reverse a section of 0 … count - 1.
     """
     base = np.arange(count)
-    orders = [base]
-    for first, last in itertools.combinations(range(int(closed), count), 2):
-        if last - first < count - 1 - closed:  # not the whole order
-            section = base[first : last + 1][::-1]
-            orders.append(np.concatenate([base[:first], section, base[last + 1 :]]))
-    return orders
+    if math.factorial(count - closed) <= 2 * MOST_ORDERS:
+        ahead = base[: int(closed)]
+        rest = itertools.permutations(range(int(closed), count))
+        # Of both directions, the first in lexicographic order.
+        orders = [np.array([*ahead, *each]) for each in rest if each[0] <= each[-1]]
+        return orders if count > 1 else [base]
+    reversed_sections = [
+        np.concatenate([base[:first], base[first : last + 1][::-1], base[last + 1 :]])
+        for first, last in itertools.combinations(range(int(closed), count), 2)
+        if last - first < count - 1 - closed  # not the whole order
+    ]
+    return [base, *reversed_sections]
 
 
 def legs_of_order(order: IntArray, closed: bool) -> IntArray:
@@ -66,7 +77,7 @@ def cheapest_orders(
     closed : bool
     """
     orders, costs = [], []
-    for order in reversals(len(graph.points), closed):
+    for order in possible_orders(len(graph.points), closed):
         legs = [
             _first_choices(choices[start, end].by_direction)
             for start, end in legs_of_order(order, closed).tolist()

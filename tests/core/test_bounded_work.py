@@ -112,7 +112,7 @@ def test_forty_points_back_and_forth(monkeypatch):
 
 
 def test_repeated_searches_are_bounded(monkeypatch):
-    """Courses are searched again once if a curve bends, and more often if it is extremely bent."""
+    """Courses are searched again once if a curve bends, and more often if it is strongly bent."""
     searched = []
     seek = start_search.StartSearch.courses
 
@@ -123,14 +123,14 @@ def test_repeated_searches_are_bounded(monkeypatch):
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)
     monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
-    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
-    monkeypatch.setattr(attempts, "EXTREMELY_BENT", 1e9)
+    monkeypatch.setattr(attempts, "SLIGHTLY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "STRONGLY_BENT", 1e9)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
     assert searched == [0, 1]
     searched.clear()
-    monkeypatch.setattr(attempts, "EXTREMELY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     monkeypatch.setattr(attempts, "is_apart", lambda *curves: True)
     nicmm.design_curve(body, chosen)

@@ -126,7 +126,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
 @pytest.mark.slow
 def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
     """If a curve bends strongly, courses are searched again; here this always happens."""
-    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "SLIGHTLY_BENT", 0.0)
     body = shapes.creature(5, resolution=32, faces=1500, subdivisions=1)
     chosen = [20, 250, 600]
     nicmm.design_curve(body, chosen)  # computes what the mesh keeps, which has checkpoints too

@@ -151,8 +151,7 @@ def test_searches_for_parts_are_bounded(monkeypatch):
 
     monkeypatch.setattr(improvement, "bent_part", counted)
     monkeypatch.setattr(improvement, "FURTHER_SEEDS", ())
-    monkeypatch.setattr(attempts, "PARTLY_BENT", 0.0)
-    monkeypatch.setattr(attempts, "EXTREMELY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
