@@ -6,7 +6,7 @@ of the installed package; there is one for every platform, and it does not depen
 Python. While it computes, other threads of Python run.
 """
 
-from .crossings import meeting_segments
+from .crossings import meeting_segments, polyline_crossings
 from .distinct_curves import distinct_curves
 from .edge_paths import (
     EdgeGraphArrays,
@@ -73,6 +73,7 @@ __all__ = [
     "place_nodes",
     "places_on_traces",
     "points_on_edge_paths",
+    "polyline_crossings",
     "predicted_decrease",
     "relax_curves",
     "segment_ends",

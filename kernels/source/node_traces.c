@@ -15,7 +15,7 @@ typedef struct {
 
 /* Traces in the plane that contains the mean normal of both nodes. */
 static int trace_by_normals(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                            int64_t from, int64_t to, TraceRequest *request, Crossings *crossings,
+                            int64_t from, int64_t to, TraceRequest *request, PointList *crossings,
                             uint8_t *reached, int64_t *work)
 {
     const double *one = nodes->normals + 3 * from, *other = nodes->normals + 3 * to;
@@ -32,7 +32,7 @@ static int trace_by_normals(const Surface *surface, const NodePlaces *places, co
    contains their mean contains a trace. */
 static int trace_around_edge(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
                              int64_t per_curve, int64_t from, int64_t to, TraceRequest *request,
-                             Crossings *crossings, uint8_t *reached, int64_t *work)
+                             PointList *crossings, uint8_t *reached, int64_t *work)
 {
     int64_t from_first = from - from % per_curve, to_first = to - to % per_curve;
     int64_t before_from = from > from_first ? from - 1 : from_first + per_curve - 1;
@@ -53,7 +53,7 @@ static int trace_around_edge(const Surface *surface, const NodePlaces *places, c
 
 /* Traces from a node to the next one or the previous one, in one of these planes. */
 static int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                      int64_t per_curve, int64_t from, int64_t to, Crossings *crossings,
+                      int64_t per_curve, int64_t from, int64_t to, PointList *crossings,
                       uint8_t *reached, int64_t *work)
 {
     double distance = distance_between(nodes->positions + 3 * to, nodes->positions + 3 * from);
@@ -70,7 +70,7 @@ static int trace_step(const Surface *surface, const NodePlaces *places, const No
                              reached, work);
 }
 
-static int add_point(int64_t face, const double *barycentric, Crossings *points)
+static int add_point(int64_t face, const double *barycentric, PointList *points)
 {
     CHECK(points->count, points->room);
     points->faces[points->count] = face;
@@ -93,7 +93,7 @@ typedef struct {
    It returns early when the traces have passed `most_work` faces, or when the room that is left may
    not suffice for another trace; `done` is raised to the number of steps that have been traced. */
 EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                         int64_t c, const StepTraces *steps, Crossings *points,
+                         int64_t c, const StepTraces *steps, PointList *points,
                          int64_t most_work, int64_t *done)
 {
     int64_t needed = places->most_faces + 2, work = 0;
@@ -131,7 +131,7 @@ typedef struct {
 } TracedPolyline;
 
 /* Expresses a point of a polyline in another face that contains it. */
-static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, Crossings *points)
+static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, PointList *points)
 {
     double changed[3], *place = points->barycentric + 3 * k;
     TRY(change_face(mesh, points->faces[k], place, face, changed));
@@ -143,7 +143,7 @@ static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, Crossings *po
 /* Reverses a trace that has come from `start_face`, whose last point is that of index `first`, and
    whose crossings follow. In the reverse, a crossing belongs to the face that the trace left there,
    and the last point to the face in which the trace ended. */
-static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Crossings *points)
+static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, PointList *points)
 {
     int64_t *faces = points->faces;
     double *places = points->barycentric;
@@ -165,7 +165,7 @@ static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Cr
     return OK;
 }
 
-static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, Crossings *points)
+static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, PointList *points)
 {
     int64_t first = polyline->former_index[i];
     int64_t end = i + 1 < n ? polyline->former_index[i + 1] : polyline->former_count;
@@ -182,7 +182,7 @@ static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, Cros
    when the traces have passed `most_work` faces, or when the room that is left may not suffice for
    another piece; `done` is raised to the number of nodes that have been passed. */
 EXPORTED int trace_polyline(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                            const TracedPolyline *polyline, Crossings *points, int64_t most_work,
+                            const TracedPolyline *polyline, PointList *points, int64_t most_work,
                             int64_t *done)
 {
     int64_t n = nodes->n, work = 0;

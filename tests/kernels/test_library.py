@@ -215,6 +215,19 @@ def arguments_segments(s=40):
     }
 
 
+def arguments_crossings(n=40):
+    """Arguments of `polyline_crossings` for n random points in two faces, by name."""
+    generator = np.random.default_rng(6)
+    return {
+        "all_faces": BALL.faces,
+        "faces": generator.integers(0, 2, n),
+        "barycentric": generator.dirichlet([1.0, 1.0, 1.0], n),
+        "closed": True,
+        "touching": 1e-12,
+        "meanwhile": nothing,
+    }
+
+
 def arguments_traces():
     """Arguments of `TraceArrays` for the traces of a curve, by name; one of them failed."""
     counts, faces, barycentric = nicmm_kernels.trace_steps(**arguments_steps())
@@ -373,6 +386,7 @@ CALLS = {
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
     "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
+    "polyline_crossings": (nicmm_kernels.polyline_crossings, arguments_crossings),
     "place_nodes": (nicmm_kernels.place_nodes, arguments_place),
     "NodeArrays": (nicmm_kernels.NodeArrays, arguments_nodes),
     "find_contacts": (nicmm_kernels.find_contacts, arguments_contacts),
@@ -407,6 +421,7 @@ INDICES = {
     "TraceArrays": [("begins", None), ("faces", None)],
     "places_on_traces": [("nodes", None)],
     "segment_ends": [("segments", None)],
+    "polyline_crossings": [("faces", None)],
     "distances_along_edges": [("corners", None)],
     "nearest_cells": [("vertices", None)],
     "points_on_edge_paths": [("starts", None), ("ends", None)],
@@ -420,6 +435,7 @@ INDICES = {
 OF_ANY_LENGTH = [
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
+    ("polyline_crossings", "all_faces"),
     ("nearest_cells", "vertices"),
     ("turning_paths", "begins"),
     ("distinct_routes", "via"),
@@ -444,6 +460,7 @@ RESUMED = [
     "meeting_segments",
     "nearest_cells",
     "points_on_edge_paths",
+    "polyline_crossings",
     "relax_curves",
     "trace_between",
     "trace_from",
