@@ -20,8 +20,7 @@ from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, in_faces, joined
 from .geometry.tracing import strictly_inside, trace_between
 from .relaxation.curve_nodes import CurveSurface
-from .relaxation.node_spacing import arc_lengths
-from .relaxation.noded_curve import NodedCurve, is_simple, noded_curve
+from .relaxation.noded_curve import NodedCurve, arc_lengths, is_simple, noded_curve
 from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, with_moved_controls
 from .request import Request, same_request

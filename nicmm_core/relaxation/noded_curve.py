@@ -12,22 +12,30 @@ from dataclasses import dataclass
 
 import nicmm_kernels
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.crossings import crossing_segments
 from ..geometry.curve import SurfaceCurve, curve_on_mesh
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, in_faces, joined
-from ..geometry.tracing import strictly_inside, trace_from
+from ..geometry.surface_points import SurfacePoints
+from ..geometry.tracing import trace_from
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .node_spacing import arc_lengths, node_arcs
 from .node_traces import step_limits
 
 SAME_PLACE = 1e-5
 """Distance, relative to the curve's length, within which a new node replaces an old point."""
+
+FEWEST_OF_A_LEG = 6
+"""Least number of nodes on a leg, including the control point at its start."""
+
+REACH = 3.0
+"""Length of curve on either side over which its direction is measured at folds, in mean edge
+lengths."""
+
+SHORTEST_TURN = 1.0 / 16.0
+"""Upper limit of that length, relative to the length of the curve."""
 
 SHORT = 0.05
 """Length of a segment, relative to the mean distance between nodes, below which results omit it.
@@ -66,6 +74,19 @@ class NodedCurve:
     def length(self) -> float:
         """Sum of the distances between neighbouring nodes, in mesh units."""
         return float(self.nodes.lengths.sum())
+
+    @property
+    def for_kernels(self) -> nicmm_kernels.CurveArrays:
+        """The curve as compiled kernels read it."""
+        is_control = np.zeros(len(self.node_index), dtype=bool)
+        is_control[self.control_nodes] = True
+        return nicmm_kernels.CurveArrays(
+            self.closed,
+            *self.nodes.places.for_kernels,
+            is_control,
+            np.ascontiguousarray(self.node_index, np.int64),
+            *self.polyline.for_kernels,
+        )
 
     def surface_curve(self, mesh: Mesh) -> SurfaceCurve:
         """The polyline in the form of a result."""
@@ -107,9 +128,30 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
     """
     first = int(curve.control_index[0])
     faces, barycentric = np.roll(curve.faces, -first), np.roll(curve.barycentric, -first, axis=0)
-    control_index = (curve.control_index - first) % len(faces)
-    polyline = SurfacePoints(faces, barycentric)
-    return _with_nodes(surface, polyline, control_index, count, curve.closed)
+    placed = nicmm_kernels.place_on_polyline(
+        surface.for_kernels,
+        *SurfacePoints(faces, barycentric).for_kernels,
+        curve.closed,
+        (curve.control_index - first) % len(faces),
+        count,
+        placement_rules(surface),
+    )
+    return curve_from_kernels(surface, placed)
+
+
+def curve_from_kernels(surface: CurveSurface, given: nicmm_kernels.CurveArrays) -> NodedCurve:
+    """A curve that a compiled kernel has found."""
+    nodes = nodes_at(surface, SurfacePoints(given.faces, given.barycentric), given.closed)
+    polyline = SurfacePoints(given.polyline_faces, given.polyline_barycentric)
+    return NodedCurve(nodes, np.flatnonzero(given.is_control), polyline, given.node_index)
+
+
+def placement_rules(surface: CurveSurface) -> nicmm_kernels.PlacementRules:
+    """How nodes are placed on polylines: evenly on each leg, but not inside folds."""
+    reach = REACH * surface.mesh.mean_edge_length
+    return nicmm_kernels.PlacementRules(
+        tolerances.INSIDE, SAME_PLACE, reach, SHORTEST_TURN, FEWEST_OF_A_LEG
+    )
 
 
 def noded(
@@ -120,62 +162,10 @@ def noded(
     return NodedCurve(nodes, control_nodes, places, np.arange(len(places)))
 
 
-def respaced(surface: CurveSurface, curve: NodedCurve, count: int) -> NodedCurve:
-    """The same polyline with about `count` equally spaced nodes."""
-    at_controls = curve.node_index[curve.control_nodes]
-    return _with_nodes(surface, curve.polyline, at_controls, count, curve.closed)
-
-
-def smoothed(surface: CurveSurface, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
-    """Move fine nodes onto a smooth curve through the coarse nodes of the same polyline.
-
-    Between coarse nodes the polyline is straight. So with four times as many nodes it bends only at
-    a quarter of them, which costs four times the bending energy. A cubic spline through the coarse
-    nodes gives the moves of the fine nodes along their conormals.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    coarse : NodedCurve
-        A simple curve.
-    fine : NodedCurve
-        The same polyline with more nodes.
-
-    Returns
-    -------
-    NodedCurve
-        A simple curve. Nodes that cannot be moved stay where they are, and all nodes do if two
-        coarse nodes coincide.
-    """
-    at, total = _arc_lengths(surface.mesh, coarse)
-    through = coarse.nodes.positions
-    if coarse.closed:
-        at, through = np.append(at, total), np.concatenate([through, through[:1]])
-    if (np.diff(at) <= 0.0).any():
-        return fine  # There is no slope between nodes that coincide.
-    chord = np.diff(through, axis=0) / np.diff(at)[:, None]
-    slope = 0.5 * (np.concatenate([chord[:1], chord]) + np.concatenate([chord, chord[-1:]]))
-    if coarse.closed:
-        slope[[0, -1]] = 0.5 * (chord[0] + chord[-1])
-    along = _arc_lengths(surface.mesh, fine)[0]
-    straight = make_interp_spline(at, through, k=1)(along)
-    aside = CubicHermiteSpline(at, through, slope)(along) - straight
-    step = (aside * fine.nodes.conormals).sum(axis=1)
-    step[fine.control_nodes] = 0.0
-    return retraced(surface, fine, moved_along_conormals(surface, fine.nodes, step)[0])[0]
-
-
-def _arc_lengths(mesh: Mesh, curve: NodedCurve) -> tuple[FloatArray, float]:
-    """Arc lengths at the nodes, (n,), and the length of the whole polyline."""
-    arc = arc_lengths(curve.polyline.positions(mesh), curve.closed)
-    return arc[curve.node_index], float(arc[-1])
-
-
-def moved_along_conormals(
-    surface: CurveSurface, nodes: Nodes, step: FloatArray
-) -> tuple[Nodes, BoolArray, int]:
-    """Move nodes along `Nodes.conormals` by signed lengths, (n,); returns the same as `shifted`."""
-    return shifted(surface, nodes, nodes.conormals * np.sign(step)[:, None], np.abs(step))
+def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
+    """Arc lengths at the starts of the s segments of a polyline and at its end, shape (s + 1,)."""
+    steps = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps if closed else steps[:-1])])
 
 
 def shifted(
@@ -235,90 +225,6 @@ def straight_traces(
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline of straight traces between nodes at new places; see `_traced_polyline`."""
     return _traced_polyline(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
-
-
-def retraced(
-    surface: CurveSurface, curve: NodedCurve, nodes: Nodes
-) -> tuple[NodedCurve, BoolArray]:
-    """Retrace a curve through nodes at new places, wherever it stays simple.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    curve : NodedCurve
-        A simple curve.
-    nodes : Nodes
-        Its n nodes at new places; control points have not moved.
-
-    Returns
-    -------
-    NodedCurve
-        A simple curve.
-    (n,) bool array
-        Which nodes were put back to their old places.
-    """
-    old, new = curve.nodes.places, nodes.places
-    stays = np.zeros(len(old), dtype=bool)
-    kept = np.zeros(len(old), dtype=bool)
-    while True:
-        checkpoint()
-        if stays.any():
-            places = SurfacePoints(
-                np.where(stays, old.faces, new.faces),
-                np.where(stays[:, None], old.barycentric, new.barycentric),
-            )
-            nodes = nodes_at(surface, places, curve.closed)
-        polyline, node_index, bad = _traced_polyline(surface, curve, nodes, kept)
-        if not bad.any():
-            pairs = crossing_segments(surface.mesh.faces, polyline, curve.closed)
-            bad[np.searchsorted(node_index, pairs.ravel(), side="right") - 1] = True
-        if not bad.any():
-            return NodedCurve(nodes, curve.control_nodes, polyline, node_index), stays
-        if not (bad & ~kept).any():
-            return curve, np.ones(len(old), dtype=bool)
-        kept |= bad
-        stays |= bad | np.roll(bad, 1)
-
-
-def _with_nodes(
-    surface: CurveSurface,
-    polyline: SurfacePoints,
-    control_index: IntArray,
-    count: int,
-    closed: bool,
-) -> NodedCurve:
-    """Insert equally spaced nodes on each leg and drop old points inside faces at their places."""
-    mesh, n = surface.mesh, len(polyline)
-    arc = arc_lengths(polyline.positions(mesh), closed)
-    at, control_nodes = node_arcs(surface, polyline, arc, control_index, count, closed)
-    n_segments = len(arc) - 1
-    segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, n_segments - 1)
-    along = (at - arc[segment]) / np.maximum(np.diff(arc)[segment], tolerances.TINY)
-    along = np.clip(along, 0.0, 1.0)[:, None]
-    faces = polyline.faces[segment]
-    end = in_faces(mesh, polyline[(segment + 1) % n], faces).barycentric
-    barycentric = strictly_inside((1.0 - along) * polyline.barycentric[segment] + along * end)
-    faces[control_nodes] = polyline.faces[control_index]
-    barycentric[control_nodes] = polyline.barycentric[control_index]
-    places = SurfacePoints(faces, barycentric)
-
-    # All other old points remain, so the polyline keeps its shape.
-    inside = (polyline.barycentric > 0.0).all(axis=1)
-    nodes_along = np.append(at, arc[-1])
-    ahead = np.searchsorted(nodes_along, arc[:n]).clip(max=len(at))
-    nearest = np.minimum(nodes_along[ahead] - arc[:n], arc[:n] - nodes_along[ahead - 1])
-    nearest = np.where(ahead > 0, nearest, 0.0)
-    dropped = inside & (nearest < SAME_PLACE * arc[-1])
-    dropped[control_index] = True
-    old = np.flatnonzero(~dropped)
-    # A node is sorted after the start of its segment, even if both are at the same place.
-    segment[control_nodes] = control_index
-    before = np.concatenate([segment, old])
-    order = np.lexsort((np.concatenate([at, np.full(len(old), -np.inf)]), before))
-    merged = joined([places, polyline[old]])[order]
-    node_index = np.flatnonzero(order < len(at))
-    nodes = nodes_at(surface, places, closed)
-    return NodedCurve(nodes, control_nodes, merged, node_index)
 
 
 def _traced_polyline(

@@ -15,13 +15,13 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .levenberg_marquardt import StepConfig
 from .noded_curve import NodedCurve, is_simple, shifted, traced_through
 from .relaxing import Movable, RelaxationConfig
 
 WARM = RelaxationConfig(
     levels=(512,),
-    stepping=StepConfig(steps=1, longest_move=4.0),
+    steps=1,
+    longest_move=4.0,
     least_decrease=1e-3,
     defer_tracing=True,
 )
