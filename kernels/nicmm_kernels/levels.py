@@ -158,9 +158,9 @@ class _Curve(ctypes.Structure):
 
 class _CurveBuffers(ctypes.Structure):
     _fields_ = [
-        ("curve", ctypes.POINTER(_Curve)),
-        ("next", ctypes.POINTER(_Curve)),
-        ("spare", ctypes.POINTER(_Curve)),
+        ("curve", _Curve),
+        ("next", _Curve),
+        ("spare", _Curve),
     ]
 
 
@@ -382,18 +382,20 @@ class CurveRelaxation:
         if current.room < n or current.polyline.room < points:
             self._make_room(n, 2 * points, steps.PAIRS_OF_A_NODE * n)
         while True:
+            curves = _CurveBuffers(*(each.curve for each in self._buffers))
             code = kernel.result(
                 self._surface.pointers, rules, level,
                 *(optional_address("movable", m, BOOL, current.n) for m in movable.values()),
-                _CurveBuffers(*(ctypes.pointer(each.curve) for each in self._buffers)),
-                self._pair_room, self._scratch.ctypes.data, len(self._scratch), *after,
+                curves, self._pair_room, self._scratch.ctypes.data, len(self._scratch), *after,
             )  # fmt: skip
             if code != library.TOO_SMALL or points > n * most_faces:
                 break
             points *= 2
             self._make_room(n, 2 * points, steps.more_room(self._pair_room, n))
         kernel.check(code)
-        self._buffers.insert(0, self._buffers.pop(1))
+        found = self._buffers.pop(1)
+        found.curve = curves.next
+        self._buffers.insert(0, found)
 
     def _make_room(self, n: int, points: int, pair_room: int) -> None:
         """Make room for n nodes, for polylines of some points, and for pairs of nodes."""

@@ -50,8 +50,7 @@ typedef struct {
 
 /* Three curves in turn: the given one, the result, and scratch. */
 typedef struct {
-    const Curve *curve;
-    Curve *next, *spare;
+    Curve curve, next, spare;
 } CurveBuffers;
 
 /* Number of items of scratch for curves of n nodes and polylines of `points` points. */
@@ -178,8 +177,10 @@ static int retrace(const Surface *surface, const RelaxationRules *rules, const L
             if (stays[i]) put_back(old, i, nodes);
         TRY(locate_nodes(surface, nodes));
     }
-    memset(stays, 1, (size_t)n);
-    for (int64_t i = 0; i < n; i++) put_back(old, i, nodes);
+    for (int64_t i = 0; i < n; i++) {
+        stays[i] = 1;
+        put_back(old, i, nodes);
+    }
     TRY(locate_nodes(surface, nodes));
     return copy_curve(old, next);
 }
@@ -337,10 +338,10 @@ static int64_t controls_of(const Curve *curve)
    quarter of them, which costs four times the bending energy. A cubic spline through the former
    nodes gives the moves of the new ones. */
 static int refine(const Surface *surface, const RelaxationRules *rules, const LevelRules *level,
-                  const CurveBuffers *buffers, int64_t pair_room, Scratch scratch)
+                  CurveBuffers *buffers, int64_t pair_room, Scratch scratch)
 {
-    const Curve *coarse = buffers->curve;
-    Curve *fine = buffers->spare, *next = buffers->next;
+    const Curve *coarse = &buffers->curve;
+    Curve *fine = &buffers->spare, *next = &buffers->next;
     Workspace space;
     uint8_t *stays;
     int64_t work = 0;
@@ -361,10 +362,10 @@ static int refine(const Surface *surface, const RelaxationRules *rules, const Le
 /* Prepares a curve for a level: respaces its nodes if there are too many or too few of them, or if
    they are uneven. */
 EXPORTED int begin_level(const Surface *surface, const RelaxationRules *rules,
-                         const LevelRules *level, const CurveBuffers *buffers, int64_t pair_room,
+                         const LevelRules *level, CurveBuffers *buffers, int64_t pair_room,
                          double *scratch, int64_t scratch_items)
 {
-    const Curve *curve = buffers->curve;
+    const Curve *curve = &buffers->curve;
     const Scratch memory = {scratch, scratch_items};
     Workspace space;
     int64_t away = curve->n - level->count, controls = controls_of(curve);
@@ -373,10 +374,10 @@ EXPORTED int begin_level(const Surface *surface, const RelaxationRules *rules,
     if (away > controls || -away > controls)
         TRY(refine(surface, rules, level, buffers, pair_room, memory));
     else if (unevenness(curve, &space.now) > level->spacing_ratio)
-        TRY(respace(surface, level, curve, memory, buffers->next));
+        TRY(respace(surface, level, curve, memory, &buffers->next));
     else
-        TRY(copy_curve(curve, buffers->next));
-    return find_positions(surface, buffers->next);
+        TRY(copy_curve(curve, &buffers->next));
+    return find_positions(surface, &buffers->next);
 }
 
 /* Decides what follows after an iteration, or if no step lowers the energy. */
@@ -430,11 +431,11 @@ static int retrace_after_steps(const Surface *surface, const RelaxationRules *ru
 /* Completes an iteration after its steps. */
 static int end_iteration(const Surface *surface, const RelaxationRules *rules,
                          const LevelRules *level, const Weights *weights, const uint8_t *movable,
-                         const CurveBuffers *buffers, Workspace *space, Steps *found,
+                         CurveBuffers *buffers, Workspace *space, Steps *found,
                          LevelState *state)
 {
-    const Curve *curve = buffers->curve;
-    Curve *next = buffers->next;
+    const Curve *curve = &buffers->curve;
+    Curve *next = &buffers->next;
     int is_lost = 0;
     state->iterations += !found->is_negligible;
     state->damping = found->damping;
@@ -460,8 +461,8 @@ static int end_iteration(const Surface *surface, const RelaxationRules *rules,
         state->outcome = LOST;
         return OK;
     }
-    TRY(respace(surface, level, next, space->rest, buffers->spare));
-    return copy_curve(buffers->spare, next);
+    TRY(respace(surface, level, next, space->rest, &buffers->spare));
+    return copy_curve(&buffers->spare, next);
 }
 
 /* Makes an iteration: takes steps, retraces the curve unless that is deferred, and respaces its
@@ -474,10 +475,10 @@ static int end_iteration(const Surface *surface, const RelaxationRules *rules,
    movable : (n) nodes that may move, NULL for all */
 EXPORTED int relax_on_level(const Surface *surface, const RelaxationRules *given_rules,
                             const LevelRules *level, const uint8_t *movable,
-                            const CurveBuffers *buffers, int64_t pair_room, double *scratch,
+                            CurveBuffers *buffers, int64_t pair_room, double *scratch,
                             int64_t scratch_items, int64_t most_faces, LevelState *state)
 {
-    const Curve *curve = buffers->curve;
+    const Curve *curve = &buffers->curve;
     const Scratch memory = {scratch, scratch_items};
     RelaxationRules rules = *given_rules;
     LevelState changed = *state; /* the state changes only if nothing fails */
@@ -501,11 +502,11 @@ EXPORTED int relax_on_level(const Surface *surface, const RelaxationRules *given
         TRY(end_iteration(surface, &rules, level, &weights, movable, buffers, &space, &found,
                           &changed));
     } else {
-        TRY(copy_curve(curve, buffers->next));
+        TRY(copy_curve(curve, &buffers->next));
         changed.damping = found.damping;
         changed.outcome = rules.steps.steps == 0 ? LIMITED : GOES_ON;
     }
-    TRY(find_positions(surface, buffers->next));
+    TRY(find_positions(surface, &buffers->next));
     *state = changed;
     return OK;
 }
@@ -514,16 +515,16 @@ EXPORTED int relax_on_level(const Surface *surface, const RelaxationRules *given
    failed. */
 EXPORTED int trace_level(const Surface *surface, const RelaxationRules *rules,
                          const LevelRules *level, const uint8_t *movable,
-                         const CurveBuffers *buffers, int64_t pair_room, double *scratch,
+                         CurveBuffers *buffers, int64_t pair_room, double *scratch,
                          int64_t scratch_items, int64_t *is_lost)
 {
-    const Curve *curve = buffers->curve;
+    const Curve *curve = &buffers->curve;
     const Scratch memory = {scratch, scratch_items};
     Workspace space;
     int lost = 0;
     TRY(take_workspace(memory, curve->n, curve->closed, pair_room, &space));
     TRY(load_nodes(surface, curve, &space));
-    TRY(trace_deferred(surface, rules, level, movable, curve, &space, buffers->next, &lost));
+    TRY(trace_deferred(surface, rules, level, movable, curve, &space, &buffers->next, &lost));
     *is_lost = lost;
-    return find_positions(surface, buffers->next);
+    return find_positions(surface, &buffers->next);
 }
