@@ -179,8 +179,8 @@ _RELAX = Kernel(
     POINTER, COUNT, COUNT, LevelState,
 )  # fmt: skip
 _TRACE = Kernel(
-    "trace_level", SurfacePointers, RelaxationRules, LevelRules, POINTER, _CurveBuffers, COUNT,
-    POINTER, COUNT, ctypes.POINTER(COUNT),
+    "trace_level", SurfacePointers, RelaxationRules, LevelRules, _CurveBuffers, COUNT, POINTER,
+    COUNT, ctypes.POINTER(COUNT),
 )  # fmt: skip
 
 
@@ -360,10 +360,10 @@ class CurveRelaxation:
         """
         self._call(_RELAX, rules, level, (library.MOST_WORK, state), movable=movable)
 
-    def trace(self, rules: RelaxationRules, level: LevelRules, movable: BoolArray | None) -> bool:
-        """Trace the curve, which may have moved since it was traced; whether no trace failed."""
+    def trace(self, rules: RelaxationRules, level: LevelRules) -> bool:
+        """Trace the curve where it has moved since it was traced; whether no trace failed."""
         is_lost = COUNT(0)
-        self._call(_TRACE, rules, level, (is_lost,), movable=movable)
+        self._call(_TRACE, rules, level, (is_lost,))
         return not is_lost.value
 
     def _call(

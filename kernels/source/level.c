@@ -185,21 +185,33 @@ static int retrace(const Surface *surface, const RelaxationRules *rules, const L
     return copy_curve(old, next);
 }
 
+/* Whether a node is where it was when the curve was traced. */
+static int is_still(const Curve *curve, int64_t i)
+{
+    const double *now = curve->barycentric + 3 * i;
+    const double *then = curve->polyline.barycentric + 3 * curve->node_index[i];
+    if (curve->is_control[i]) return 1;
+    return curve->faces[i] == curve->polyline.faces[curve->node_index[i]] && now[0] == then[0] &&
+           now[1] == then[1] && now[2] == then[2];
+}
+
 /* Traces a curve whose nodes have moved since it was traced, simple or not. The polyline is kept
-   between nodes that must not move, where a straight trace may fail. */
+   between nodes that have not moved, where a straight trace may fail. */
 static int trace_deferred(const Surface *surface, const RelaxationRules *rules,
-                          const LevelRules *level, const uint8_t *movable, const Curve *curve,
-                          const Workspace *space, Curve *next, int *is_lost)
+                          const LevelRules *level, const Curve *curve, const Workspace *space,
+                          Curve *next, int *is_lost)
 {
     const Nodes *nodes = &space->now;
     Scratch scratch = space->rest;
     uint8_t *kept, *lost;
     TRY(take_bytes(&scratch, nodes->n, &kept));
     TRY(take_bytes(&scratch, nodes->n, &lost));
-    for (int64_t i = 0; i < nodes->n; i++)
-        kept[i] = !may_move(movable, i) && !may_move(movable, node_after(nodes, i));
-    TRY(trace_nodes(surface, rules, level, curve, nodes, kept, next, lost));
+    TRY(copy_curve(curve, next));
     finish_curve(curve, nodes, next);
+    for (int64_t i = 0; i < nodes->n; i++) CHECK(curve->node_index[i], curve->polyline.count);
+    for (int64_t i = 0; i < nodes->n; i++)
+        kept[i] = is_still(next, i) && is_still(next, node_after(nodes, i));
+    TRY(trace_nodes(surface, rules, level, curve, nodes, kept, next, lost));
     *is_lost = any_of(lost, nodes->n);
     return OK;
 }
@@ -456,7 +468,7 @@ static int end_iteration(const Surface *surface, const RelaxationRules *rules,
         unevenness(next, &space->now) <= level->spacing_ratio)
         return OK;
     if (!level->is_traced)
-        TRY(trace_deferred(surface, rules, level, movable, curve, space, next, &is_lost));
+        TRY(trace_deferred(surface, rules, level, curve, space, next, &is_lost));
     if (is_lost) {
         state->outcome = LOST;
         return OK;
@@ -514,9 +526,8 @@ EXPORTED int relax_on_level(const Surface *surface, const RelaxationRules *given
 /* Traces a curve whose nodes have moved since it was traced. `is_lost` becomes whether a trace
    failed. */
 EXPORTED int trace_level(const Surface *surface, const RelaxationRules *rules,
-                         const LevelRules *level, const uint8_t *movable,
-                         CurveBuffers *buffers, int64_t pair_room, double *scratch,
-                         int64_t scratch_items, int64_t *is_lost)
+                         const LevelRules *level, CurveBuffers *buffers, int64_t pair_room,
+                         double *scratch, int64_t scratch_items, int64_t *is_lost)
 {
     const Curve *curve = &buffers->curve;
     const Scratch memory = {scratch, scratch_items};
@@ -524,7 +535,7 @@ EXPORTED int trace_level(const Surface *surface, const RelaxationRules *rules,
     int lost = 0;
     TRY(take_workspace(memory, curve->n, curve->closed, pair_room, &space));
     TRY(load_nodes(surface, curve, &space));
-    TRY(trace_deferred(surface, rules, level, movable, curve, &space, &buffers->next, &lost));
+    TRY(trace_deferred(surface, rules, level, curve, &space, &buffers->next, &lost));
     *is_lost = lost;
     return find_positions(surface, &buffers->next);
 }

@@ -15,9 +15,10 @@ there, or the curve would buckle in the lane to gain length. So ds is held const
 and only the position of the curve counts. Where strands must not cross, a contact term keeps them
 apart.
 
-The kernels minimise E. Their unknowns are the moves of the nodes along their conormals. The
-residuals of a node depend only on the node and its two neighbours, so the Gauss–Newton matrix has
-two bands on each side and a step is cheap. Contact adds to the diagonal of the matrix only.
+The kernels minimise E (`levenberg_marquardt.c`). Their unknowns are the moves of the nodes along
+their conormals. The residuals of a node depend only on the node and its two neighbours, so the
+Gauss–Newton matrix has two bands on each side and a step is cheap. Contact adds to the diagonal of
+the matrix only.
 """
 
 from __future__ import annotations
@@ -38,17 +39,12 @@ half the radius of a circle of the same length; long curves hardly change.
 
 def bending_energy(nodes: Nodes) -> float:
     """∮ κ_g² ds of one curve, in 1/length."""
-    return float(curve_bending(nodes)[0])
+    return float(node_bending(nodes).sum())
 
 
 def node_bending(nodes: Nodes) -> FloatArray:
     """κ_g² ds at each node, (n,); zero at the ends of open curves."""
     return nodes.angles**2 / nodes.ds
-
-
-def curve_bending(nodes: Nodes) -> FloatArray:
-    """∮ κ_g² ds of each curve, (c,), in 1/length."""
-    return nodes.by_curve(node_bending(nodes)).sum(axis=1)
 
 
 def feature_energy(nodes: Nodes) -> float:

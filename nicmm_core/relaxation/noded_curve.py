@@ -209,28 +209,17 @@ def traced_through(
 
     Between two consecutive nodes that have not moved, `still` (n,), the polyline is kept.
     """
-    kept = np.zeros(len(nodes.positions), dtype=bool)
-    if still is not None:
-        kept = still & np.roll(still, -1)
-        if not curve.closed:
-            kept[-1] = False
-    polyline, node_index, lost = _traced_polyline(surface, curve, nodes, kept)
+    kept = None if still is None else still & np.roll(still, -1)
+    polyline, node_index, lost = traced_polyline(surface, curve, nodes, kept)
     if lost.any():
         return None
     return NodedCurve(nodes, curve.control_nodes, polyline, node_index)
 
 
-def straight_traces(
-    surface: CurveSurface, curve: NodedCurve, nodes: Nodes
+def traced_polyline(
+    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray | None = None
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
-    """The polyline of straight traces between nodes at new places; see `_traced_polyline`."""
-    return _traced_polyline(surface, curve, nodes, np.zeros(len(nodes.positions), dtype=bool))
-
-
-def _traced_polyline(
-    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray
-) -> tuple[SurfacePoints, IntArray, BoolArray]:
-    """The polyline traced through nodes at new places.
+    """The polyline of straight traces between nodes at new places.
 
     Parameters
     ----------
@@ -238,7 +227,7 @@ def _traced_polyline(
     curve : NodedCurve
     nodes : Nodes
         The n nodes at new places.
-    kept : (n,) bool array
+    kept : (n,) bool array, optional
         Nodes after which the polyline is kept; neither they nor the next nodes have moved.
 
     Returns
@@ -250,17 +239,16 @@ def _traced_polyline(
     (n,) bool array
         Nodes whose trace to the next node failed; there the polyline has no points in between.
     """
-    controls = np.zeros(len(nodes.positions), dtype=bool)
-    controls[curve.control_nodes] = True
     checkpoint()
+    before = curve.for_kernels
     faces, barycentric, node_index, lost = nicmm_kernels.trace_polyline(
         surface.for_kernels,
         nodes.for_kernels,
         nodes.places.for_kernels,
-        controls,
-        kept,
-        np.ascontiguousarray(curve.node_index, np.int64),
-        curve.polyline.for_kernels,
+        before.is_control,
+        np.zeros(len(before.is_control), dtype=bool) if kept is None else kept,
+        before.node_index,
+        (before.polyline_faces, before.polyline_barycentric),
         step_limits(surface),
         checkpoint,
     )

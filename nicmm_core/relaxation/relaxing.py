@@ -291,7 +291,7 @@ def _attempt(
             traced = relaxation.arrays
             status = _relax_on_level(task, relaxation, rules, level, state)
             is_lost = state.outcome == LevelOutcome.LOST
-            if is_lost or not (is_traced or relaxation.trace(rules, level, task.mask(relaxation))):
+            if is_lost or not (is_traced or relaxation.trace(rules, level)):
                 return None, status
             if status is not Status.CONVERGED:
                 break
@@ -311,11 +311,11 @@ def level_rules(
     is_traced: bool,
 ) -> LevelRules:
     """The rules of a level with about `count` nodes; see `RelaxationConfig` for the others."""
-    limits = step_limits(surface)
+    detour, fold_margin, _ = step_limits(surface)
     return LevelRules(
         placement_rules(surface),
-        limits.detour,
-        limits.fold_margin,
+        detour,
+        fold_margin,
         TOUCHING,
         spacing_ratio,
         least_decrease,
@@ -345,5 +345,6 @@ def _relax_on_level(
             and not task.watch(1.0 - left, relaxation.positions)
         ):
             return Status.CANCELLED
-    limited = state.outcome == LevelOutcome.LIMITED
-    return Status.ITERATION_LIMIT if limited else Status.CONVERGED
+    if state.outcome == LevelOutcome.LIMITED:
+        return Status.ITERATION_LIMIT
+    return Status.CONVERGED

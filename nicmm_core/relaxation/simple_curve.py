@@ -23,7 +23,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
-from .noded_curve import NodedCurve, noded, straight_traces
+from .noded_curve import NodedCurve, noded, traced_polyline
 
 ROUNDS = 4
 """Rounds in which loops are removed; traces between the remaining nodes may cross again."""
@@ -110,7 +110,7 @@ def _joined(
     traced = nodes
     if normals is not None:
         traced = Nodes(nodes.places, nodes.closed, nodes.positions, normals, nodes.phi_fea)
-    polyline, node_index, lost = straight_traces(surface, curve, traced)
+    polyline, node_index, lost = traced_polyline(surface, curve, traced)
     bypasses: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()

@@ -191,7 +191,7 @@ def on_level(**arrays):
     while state.outcome == nicmm_kernels.LevelOutcome.GOES_ON:
         movable = np.ones(len(relaxation.positions), dtype=bool)
         relaxation.iterate(rules(), level, movable, state)
-    assert relaxation.trace(rules(), level, None)
+    assert relaxation.trace(rules(), level)
     return relaxation.arrays
 
 
