@@ -153,7 +153,7 @@ class _Weights(ctypes.Structure):
         ("tension", NUMBER),
         ("contact", NUMBER),
         ("feature", NUMBER),
-        ("held_ds", POINTER),
+        ("frozen_ds", POINTER),
     ]
 
 
@@ -246,7 +246,7 @@ class Linearised:
     ----------
     tension, contact, feature : float
         Weights of the terms.
-    held : (n,) float array or None
+    frozen_ds : (n,) float array or None
         ds at each node, held constant in the term of lanes; None without a map.
     energy : float
     bands : (3, n) float array
@@ -258,7 +258,7 @@ class Linearised:
     def __init__(self, surface: SurfaceArrays, nodes: NodeArrays, rules: RelaxationRules) -> None:
         n, weights, energy = nodes.count, _Weights(), NUMBER(0.0)
         has_map = surface.pointers.feature_map is not None
-        held = np.empty(n)
+        frozen_ds = np.empty(n)
         self.bands, self.slope = np.empty((3, n)), np.empty(n)
         system = _System(self.bands.ctypes.data, self.slope.ctypes.data)
 
@@ -267,14 +267,14 @@ class Linearised:
             scratch = np.empty(items)
             code: int = _LINEARISE.result(
                 surface.pointers, nodes.one(), rules, room, scratch.ctypes.data, items,
-                held.ctypes.data, weights, energy, system,
+                frozen_ds.ctypes.data, weights, energy, system,
             )  # fmt: skip
             return code
 
         with_room_for_pairs(_LINEARISE, n, call)
         self.tension, self.contact = weights.tension, weights.contact
         self.feature, self.energy = weights.feature, energy.value
-        self.held = held if has_map else None
+        self.frozen_ds = frozen_ds if has_map else None
 
 
 def conormal_derivatives(

@@ -39,9 +39,9 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
     for (int64_t i = 0; i < nodes->n; i++) {
         double ds = arc_of_node(nodes, i), angle = nodes->angles[i];
         double at_node = angle * angle / ds + tension_at(nodes, weights, i) * ds;
-        if (weights->held_ds) {
+        if (weights->frozen_ds) {
             double phi = lesser(nodes->phi_fea[i], 1.0);
-            at_node += weights->feature * (phi * phi - 1.0) * weights->held_ds[i];
+            at_node += weights->feature * (phi * phi - 1.0) * weights->frozen_ds[i];
         }
         energy += at_node;
     }
@@ -49,7 +49,7 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
 }
 
 Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *rules,
-                double *held_ds)
+                double *frozen_ds)
 {
     double turn = 2.0 * PI / length_of_curve(nodes), tension = turn * turn / rules->smoothness;
     Weights weights = {rules->tautness * tension, 0.0, 0.0, NULL};
@@ -58,8 +58,8 @@ Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *r
     if (surface->feature_map) {
         weights.feature =
             surface->feature_weight / rules->smoothness + rules->over_tension * tension;
-        weights.held_ds = held_ds;
-        for (int64_t i = 0; i < nodes->n; i++) held_ds[i] = arc_of_node(nodes, i);
+        weights.frozen_ds = frozen_ds;
+        for (int64_t i = 0; i < nodes->n; i++) frozen_ds[i] = arc_of_node(nodes, i);
     }
     return weights;
 }
@@ -196,8 +196,8 @@ int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *w
         system->slope[i] = dot2(of_j, residuals + 2 * j) + dot2(of_i + 2, residuals + 2 * i) +
                            dot2(of_h + 4, residuals + 2 * h);
         double phi = nodes->phi_fea[i], drift = linearisation->drift[i];
-        if (weights->held_ds && phi < 1.0) {
-            double pull = weights->feature * weights->held_ds[i] * drift;
+        if (weights->frozen_ds && phi < 1.0) {
+            double pull = weights->feature * weights->frozen_ds[i] * drift;
             system->bands[i] += pull * drift;
             system->slope[i] += pull * phi;
         }

@@ -31,7 +31,7 @@ int take_workspace(Scratch scratch, int64_t n, int64_t closed, int64_t pair_room
     TRY(take_contacts(&scratch, n, pair_room, &space->contacts));
     TRY(take_linearisation(&scratch, n, &space->linearisation));
     TRY(take_system(&scratch, n, &space->system));
-    TRY(take(&scratch, n, &space->held_ds));
+    TRY(take(&scratch, n, &space->frozen_ds));
     TRY(take(&scratch, n, &space->moves));
     TRY(take_bytes(&scratch, n, &space->fixed));
     TRY(take_bytes(&scratch, n, &space->blocked));
@@ -193,12 +193,12 @@ int take_steps(const Surface *surface, const RelaxationRules *rules, double negl
                int64_t most_work, Workspace *space, Steps *found, Weights *weights, int64_t *work)
 {
     int is_lower = 0;
-    *weights = balance(surface, &space->now, &rules->energy, space->held_ds);
+    *weights = balance(surface, &space->now, &rules->energy, space->frozen_ds);
     found->taken = found->is_negligible = 0;
     found->farthest = 0.0;
     TRY(linearise(surface, rules, weights, space, &found->before));
     found->after = found->scale = found->before;
-    if (weights->held_ds) {
+    if (weights->frozen_ds) {
         Weights without_map = {weights->tension, 0.0, 0.0, NULL};
         found->scale = elastic_energy(&space->now, &without_map);
     }
@@ -217,17 +217,17 @@ EXPORTED int64_t linearisation_items(int64_t n, int64_t pair_room)
     return items_of_contacts(n, pair_room) + items_of_linearisation(n);
 }
 
-/* Computes the weights, the energy and the Gauss-Newton system of a curve. `held_ds`, (n), become
+/* Computes the weights, the energy and the Gauss-Newton system of a curve. `frozen_ds`, (n), become
    its ds if there is a map. */
 EXPORTED int linearise_curve(const Surface *surface, const Nodes *nodes,
                              const RelaxationRules *rules, int64_t pair_room, double *scratch,
-                             int64_t scratch_items, double *held_ds, Weights *weights,
+                             int64_t scratch_items, double *frozen_ds, Weights *weights,
                              double *energy, System *system)
 {
     Scratch memory = {scratch, scratch_items};
     Workspace space = {.now = *nodes, .system = *system};
     TRY(take_contacts(&memory, nodes->n, pair_room, &space.contacts));
     TRY(take_linearisation(&memory, nodes->n, &space.linearisation));
-    *weights = balance(surface, nodes, &rules->energy, held_ds);
+    *weights = balance(surface, nodes, &rules->energy, frozen_ds);
     return linearise(surface, rules, weights, &space, energy);
 }

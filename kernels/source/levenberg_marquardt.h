@@ -36,7 +36,7 @@ typedef struct {
     Contacts contacts;
     Linearisation linearisation;
     System system;
-    double *held_ds;  /* (n) */
+    double *frozen_ds;  /* (n) */
     double *moves;    /* (n) */
     uint8_t *fixed;   /* (n) nodes that do not move; those that reach a boundary are added */
     uint8_t *blocked; /* (n) nodes of the trial that have reached a boundary */

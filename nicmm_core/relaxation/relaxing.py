@@ -31,18 +31,18 @@ from ..geometry.crossings import TOUCHING
 from ..geometry.curve import SurfaceCurve
 from ..progress import CancelledError, checkpoint
 from ..status import Status
+from .curve_energies import energies_of, scaled_bending
 from .curve_nodes import CurveSurface
-from .elastic_energy import bending_energy, feature_energy
-from .node_traces import step_limits
-from .noded_curve import (
-    NodedCurve,
+from .discrete_curve import (
+    DiscreteCurve,
     curve_from_kernels,
     is_simple,
-    noded_curve,
+    place_nodes,
     placement_rules,
     without_short_segments,
 )
-from .noded_energies import energies_of, scaled_bending
+from .elastic_energy import bending_energy, feature_energy
+from .node_traces import step_limits
 from .rules import relaxation_rules
 
 
@@ -128,7 +128,7 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         The relaxed curve, which is simple.
-    noded_curve : NodedCurve
+    discrete_curve : DiscreteCurve
         The same curve with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
@@ -146,7 +146,7 @@ class Relaxed:
     """
 
     curve: SurfaceCurve
-    noded_curve: NodedCurve
+    discrete_curve: DiscreteCurve
     bending: float
     feature: float
     iterations: int
@@ -163,7 +163,7 @@ Movable = Callable[[FloatArray], BoolArray]
 
 def relax(
     surface: CurveSurface,
-    start: SurfaceCurve | NodedCurve,
+    start: SurfaceCurve | DiscreteCurve,
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
@@ -174,7 +174,7 @@ def relax(
     Parameters
     ----------
     surface : CurveSurface
-    start : SurfaceCurve or NodedCurve
+    start : SurfaceCurve or DiscreteCurve
         A simple curve that passes through its control points in order.
     smoothness : float
         Divisor of the tension and of the weight of a map.
@@ -194,18 +194,18 @@ def relax(
     """
     task = _Task(surface, smoothness, config, watch, movable)
     if isinstance(start, SurfaceCurve):
-        first = noded_curve(surface, start, config.levels[0])
+        first = place_nodes(surface, start, config.levels[0])
         return _relaxed(task, config.levels, first, start)
     if len(config.levels) == 1 or scaled_bending(start) >= config.fine_below:
         return _relaxed(task, config.levels, start)
     fine = _relaxed(task, config.levels[-1:], start)
     stopped = fine.status is Status.CANCELLED or fine.iterations >= config.most_iterations
-    before, after = energies_of(surface, [start, fine.noded_curve], smoothness)
-    good = after <= before or scaled_bending(fine.noded_curve) <= ACCEPTABLE
+    before, after = energies_of(surface, [start, fine.discrete_curve], smoothness)
+    good = after <= before or scaled_bending(fine.discrete_curve) <= ACCEPTABLE
     if stopped or (good and fine.status is not Status.UNRELAXED):
         return fine
     again = _relaxed(task, config.levels, start)
-    one, other = energies_of(surface, [fine.noded_curve, again.noded_curve], smoothness)
+    one, other = energies_of(surface, [fine.discrete_curve, again.discrete_curve], smoothness)
     if other < one:
         return again
     status = Status.CANCELLED if again.status is Status.CANCELLED else fine.status
@@ -232,7 +232,7 @@ class _Task:
 def _relaxed(
     task: _Task,
     levels: tuple[int, ...],
-    first: NodedCurve,
+    first: DiscreteCurve,
     start: SurfaceCurve | None = None,
 ) -> Relaxed:
     """Relax on some levels, at first without tracing the curve if that may be deferred.
@@ -257,8 +257,8 @@ def _relaxed(
 
 
 def _attempt(
-    task: _Task, levels: tuple[int, ...], first: NodedCurve, is_traced: bool, most_work: float
-) -> tuple[NodedCurve | None, Status]:
+    task: _Task, levels: tuple[int, ...], first: DiscreteCurve, is_traced: bool, most_work: float
+) -> tuple[DiscreteCurve | None, Status]:
     """Relax a curve level by level; no curve if it cannot be traced."""
     config, surface = task.config, task.surface
     state = LevelState(

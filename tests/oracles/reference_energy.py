@@ -9,7 +9,7 @@ import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes
-from nicmm_core.relaxation.noded_curve import shifted
+from nicmm_core.relaxation.discrete_curve import shifted
 from nicmm_core.relaxation.rules import CLEARANCE, DIFFERENT_STRANDS, SAME_SIDE, relaxation_rules
 
 
@@ -19,15 +19,15 @@ class Weights(NamedTuple):
     tension: float
     contact: float = 0.0
     feature: float = 0.0
-    held: FloatArray | None = None
+    frozen_ds: FloatArray | None = None
 
 
 def energy(nodes: Nodes, weights: Weights | nicmm_kernels.Linearised) -> float:
     """∮ κ_g² ds + τ ∮ ds + τ_fea ∮ (φ_fea² - 1) ds, with ds held in lanes, and contact."""
     excess, ds = nodes.phi_fea**2 - 1.0, nodes.ds
     total = nodes.angles**2 / ds + (weights.tension + weights.feature * excess.clip(0.0)) * ds
-    if weights.held is not None:
-        total += weights.feature * excess.clip(None, 0.0) * weights.held
+    if weights.frozen_ds is not None:
+        total += weights.feature * excess.clip(None, 0.0) * weights.frozen_ds
     overlap = 1.0 - contacts(nodes)[1] / (CLEARANCE * nodes.lengths.mean())
     return float(total.sum() + 2.0 * weights.contact * (overlap**2).sum())
 

@@ -311,7 +311,9 @@ def test_small_moves_lower_the_energy_as_predicted(flat_disc, mapped):
     surface = surface_of(flat_disc, feature_map, 1.0)
     nodes = nodes_on(flat_disc, near_strands(), feature_map=feature_map)
     here = linearised(surface, nodes, contact=True)
-    assert energy(nodes, here) > energy(nodes, Weights(here.tension, 0.0, here.feature, here.held))
+    assert energy(nodes, here) > energy(
+        nodes, Weights(here.tension, 0.0, here.feature, here.frozen_ds)
+    )
     free = np.zeros(len(nodes.positions), dtype=bool)
     step = 1e-3 * damped_step(here.bands, here.slope, free, 1.0)[0]
     fall = here.energy - energy(moved_along_conormals(surface, nodes, step), here)

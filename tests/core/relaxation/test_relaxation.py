@@ -14,8 +14,8 @@ from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation import relaxing
 from nicmm_core.relaxation.curve_nodes import FEATURE_TENSION, CurveSurface, nodes_at
+from nicmm_core.relaxation.discrete_curve import place_nodes
 from nicmm_core.relaxation.elastic_energy import OVER_TENSION, bending_energy, feature_energy
-from nicmm_core.relaxation.noded_curve import noded_curve
 from nicmm_core.relaxation.relaxing import GUIDED, RelaxationConfig, relax
 from nicmm_core.status import Status
 from tests.core.checks import (
@@ -270,7 +270,7 @@ def test_obstacles_are_avoided(flat_disc):
     aside = relaxed(flat_disc, start, feature=hill, weight=30.0)
     straight = relaxed(flat_disc, start)
     surface = CurveSurface(flat_disc, unsigned_normals(flat_disc), hill)
-    through = feature_energy(nodes_at(surface, straight.noded_curve.nodes.places, closed=False))
+    through = feature_energy(nodes_at(surface, straight.discrete_curve.nodes.places, closed=False))
     assert aside.feature < 0.6 * through
     assert aside.curve.points[:, 1].max() > 0.15
     assert aside.curve.length > straight.curve.length
@@ -455,7 +455,7 @@ def node_counts(mesh, start, config=DEFAULT):
 
 
 def with_nodes(mesh, curve, count):
-    return noded_curve(CurveSurface(mesh, unsigned_normals(mesh)), curve, count)
+    return place_nodes(CurveSurface(mesh, unsigned_normals(mesh)), curve, count)
 
 
 @pytest.mark.slow

@@ -45,7 +45,7 @@ A tube along the curve would show such a segment as a notch.
 
 
 @dataclass(frozen=True)
-class NodedCurve:
+class DiscreteCurve:
     """A polyline on the mesh and its nodes; the first point is a node.
 
     Attributes
@@ -95,7 +95,7 @@ class NodedCurve:
         return curve_on_mesh(mesh, self.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
-def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
+def without_short_segments(mesh: Mesh, curve: DiscreteCurve) -> SurfaceCurve:
     """The polyline without nodes close to edges if it stays simple; otherwise the whole polyline.
 
     The neighbours of a node strictly inside a face can be joined within this face.
@@ -116,7 +116,7 @@ def without_short_segments(mesh: Mesh, curve: NodedCurve) -> SurfaceCurve:
     return curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, at_controls)
 
 
-def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> NodedCurve:
+def place_nodes(surface: CurveSurface, curve: SurfaceCurve, count: int) -> DiscreteCurve:
     """Place nodes on a curve that passes through its control points in order.
 
     Parameters
@@ -139,11 +139,11 @@ def noded_curve(surface: CurveSurface, curve: SurfaceCurve, count: int) -> Noded
     return curve_from_kernels(surface, placed)
 
 
-def curve_from_kernels(surface: CurveSurface, given: nicmm_kernels.CurveArrays) -> NodedCurve:
+def curve_from_kernels(surface: CurveSurface, given: nicmm_kernels.CurveArrays) -> DiscreteCurve:
     """A curve that a compiled kernel has found."""
     nodes = nodes_at(surface, SurfacePoints(given.faces, given.barycentric), given.closed)
     polyline = SurfacePoints(given.polyline_faces, given.polyline_barycentric)
-    return NodedCurve(nodes, np.flatnonzero(given.is_control), polyline, given.node_index)
+    return DiscreteCurve(nodes, np.flatnonzero(given.is_control), polyline, given.node_index)
 
 
 def placement_rules(surface: CurveSurface) -> nicmm_kernels.PlacementRules:
@@ -156,10 +156,10 @@ def placement_rules(surface: CurveSurface) -> nicmm_kernels.PlacementRules:
 
 def noded(
     surface: CurveSurface, places: SurfacePoints, control_nodes: IntArray, closed: bool
-) -> NodedCurve:
+) -> DiscreteCurve:
     """A curve that consists of nodes alone, before anything is traced between them."""
     nodes = nodes_at(surface, places, closed)
-    return NodedCurve(nodes, control_nodes, places, np.arange(len(places)))
+    return DiscreteCurve(nodes, control_nodes, places, np.arange(len(places)))
 
 
 def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
@@ -197,14 +197,14 @@ def shifted(
     return nodes_at(surface, places, nodes.closed, nodes.curves), blocked, passed
 
 
-def is_simple(surface: CurveSurface, curve: NodedCurve) -> bool:
+def is_simple(surface: CurveSurface, curve: DiscreteCurve) -> bool:
     """Whether the curve neither crosses nor touches itself."""
     return not len(crossing_segments(surface.mesh.faces, curve.polyline, curve.closed))
 
 
 def traced_through(
-    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, still: BoolArray | None = None
-) -> NodedCurve | None:
+    surface: CurveSurface, curve: DiscreteCurve, nodes: Nodes, still: BoolArray | None = None
+) -> DiscreteCurve | None:
     """The curve traced through nodes at new places, simple or not; None if a trace fails.
 
     Between two consecutive nodes that have not moved, `still` (n,), the polyline is kept.
@@ -213,18 +213,18 @@ def traced_through(
     polyline, node_index, lost = traced_polyline(surface, curve, nodes, kept)
     if lost.any():
         return None
-    return NodedCurve(nodes, curve.control_nodes, polyline, node_index)
+    return DiscreteCurve(nodes, curve.control_nodes, polyline, node_index)
 
 
 def traced_polyline(
-    surface: CurveSurface, curve: NodedCurve, nodes: Nodes, kept: BoolArray | None = None
+    surface: CurveSurface, curve: DiscreteCurve, nodes: Nodes, kept: BoolArray | None = None
 ) -> tuple[SurfacePoints, IntArray, BoolArray]:
     """The polyline of straight traces between nodes at new places.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : NodedCurve
+    curve : DiscreteCurve
     nodes : Nodes
         The n nodes at new places.
     kept : (n,) bool array, optional

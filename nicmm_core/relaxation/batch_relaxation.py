@@ -20,7 +20,7 @@ from .rules import relaxation_rules
 
 
 @dataclass(frozen=True)
-class TogetherConfig:
+class BatchConfig:
     """Settings. Lengths are in mean distances between neighbouring nodes.
 
     Attributes
@@ -48,12 +48,12 @@ class TogetherConfig:
     contact: bool = True
 
 
-def relax_together(
+def relax_batch(
     surface: CurveSurface,
     nodes: Nodes,
     fixed: BoolArray,
     smoothness: float,
-    config: TogetherConfig,
+    config: BatchConfig,
 ) -> Nodes:
     """Relax several curves without tracing them.
 
@@ -67,7 +67,7 @@ def relax_together(
         fixed.
     smoothness : float
         Divisor of the tension and of the weight of a map.
-    config : TogetherConfig
+    config : BatchConfig
     """
     size = nodes.per_curve
     rules = relaxation_rules(surface, smoothness, size, config.longest_move, config.contact)
