@@ -2,7 +2,7 @@
 #ifndef NICMM_CROSSINGS_H
 #define NICMM_CROSSINGS_H
 
-#include "mesh.h"
+#include "points.h"
 #include "scratch.h"
 
 /* Pairs found so far, and where the search goes on. */

@@ -44,46 +44,19 @@ static int take_line(Scratch *scratch, int64_t n, const PointList *points, int64
     return take_integers(scratch, n, &line->segment);
 }
 
-static int position_of(const Mesh *mesh, const PointList *points, int64_t k, double position[3])
-{
-    const double *corners[3];
-    CHECK(k, points->count);
-    TRY(corners_of(mesh, points->faces[k], corners));
-    interpolate(corners, points->barycentric + 3 * k, position);
-    return OK;
-}
-
 int find_arcs_of_points(const Mesh *mesh, const PointList *points, int64_t closed, double *arcs)
 {
     double first[3], here[3], next[3];
     arcs[0] = 0.0;
-    TRY(position_of(mesh, points, 0, first));
-    memcpy(here, first, sizeof here);
-    for (int64_t k = 1; k <= points->count; k++) {
-        if (k == points->count) {
-            memcpy(next, first, sizeof next);
-        } else {
-            TRY(position_of(mesh, points, k, next));
-        }
-        double length = k < points->count || closed ? distance_between(next, here) : 0.0;
-        arcs[k] = arcs[k - 1] + length;
+    for (int64_t k = 0; k < points->count; k++) {
+        TRY(position_in_face(mesh, points->faces[k], points->barycentric + 3 * k, next));
+        if (k > 0) arcs[k] = arcs[k - 1] + distance_between(next, here);
+        if (k == 0) memcpy(first, next, sizeof first);
         memcpy(here, next, sizeof here);
     }
+    int64_t last = points->count - 1;
+    arcs[last + 1] = arcs[last] + (closed ? distance_between(first, here) : 0.0);
     return OK;
-}
-
-/* Index of the segment that contains an arc length. */
-static int64_t segment_of(const Line *line, double wanted)
-{
-    int64_t low = 0, high = line->s; /* it is `low` or later, before `high` */
-    while (high - low > 1) {
-        int64_t middle = low + (high - low) / 2;
-        if (line->arcs[middle] <= wanted)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
 }
 
 static double share_of(const Line *line, int64_t segment, double wanted)
@@ -100,7 +73,7 @@ static void position_at(const Line *line, double wanted, double position[3])
     if (line->closed && wanted < 0.0) wanted += total;
     if (line->closed && wanted > total) wanted -= total;
     wanted = lesser(greater(wanted, 0.0), total);
-    int64_t k = segment_of(line, wanted);
+    int64_t k = segment_at(line->arcs, 0, line->s + 1, wanted);
     double share = share_of(line, k, wanted);
     for (int axis = 0; axis < 3; axis++) {
         double begin = line->positions[3 * k + axis], end = line->positions[3 * (k + 1) + axis];
@@ -130,9 +103,11 @@ static int measure_line(const Surface *surface, const PlacementRules *rules, Lin
 {
     const PointList *points = line->points;
     TRY(find_arcs_of_points(&surface->mesh, points, line->closed, line->arcs));
-    for (int64_t k = 0; k <= points->count; k++)
-        TRY(position_of(&surface->mesh, points, k < points->count ? k : 0,
-                        line->positions + 3 * k));
+    for (int64_t k = 0; k <= points->count; k++) {
+        int64_t point = k < points->count ? k : 0;
+        TRY(position_in_face(&surface->mesh, points->faces[point], points->barycentric + 3 * point,
+                             line->positions + 3 * k));
+    }
     find_backward(surface, rules, line);
     return OK;
 }
@@ -241,15 +216,6 @@ static int find_place(const Mesh *mesh, const PlacementRules *rules, const Line 
     return OK;
 }
 
-static int append(int64_t face, const double *barycentric, PointList *points)
-{
-    if (points->count >= points->room) return ARRAY_TOO_SMALL;
-    points->faces[points->count] = face;
-    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
-    points->count++;
-    return OK;
-}
-
 /* Whether a point of the polyline lies inside a face, at the same place as a node. `node` is the
    first node that is not before the point. */
 static int is_replaced(const PlacementRules *rules, const Line *line, int64_t k, int64_t node)
@@ -278,11 +244,11 @@ int place_on_polyline(const Surface *surface, const PlacementRules *rules, const
         while (ahead < placed->n && line.wanted[ahead] < line.arcs[p]) ahead++;
         int is_control = i < placed->n && placed->is_control[i] && line.segment[i] == p;
         if (!is_control && !is_replaced(rules, &line, p, ahead))
-            TRY(append(points->faces[p], points->barycentric + 3 * p, &placed->polyline));
+            TRY(append_point(points->faces[p], points->barycentric + 3 * p, &placed->polyline));
         for (; i < placed->n && line.segment[i] == p; i++) {
             TRY(find_place(&surface->mesh, rules, &line, i, placed));
             placed->node_index[i] = placed->polyline.count;
-            TRY(append(placed->faces[i], placed->barycentric + 3 * i, &placed->polyline));
+            TRY(append_point(placed->faces[i], placed->barycentric + 3 * i, &placed->polyline));
         }
     }
     return OK;

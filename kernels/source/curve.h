@@ -3,6 +3,7 @@
 #define NICMM_CURVE_H
 
 #include "nodes.h"
+#include "points.h"
 
 /* Each segment of the polyline lies in one face. The nodes are points of the polyline, or have
    moved away from it since it was traced. */

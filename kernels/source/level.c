@@ -252,20 +252,11 @@ static int respace(const Surface *surface, const LevelRules *level, const Curve 
     return any_of(bad, next->n) ? copy_curve(curve, next) : OK;
 }
 
-/* Position of a node of a curve. */
-static int position_of_node(const Surface *surface, const Curve *curve, int64_t i,
-                            double position[3])
-{
-    const double *corners[3];
-    TRY(corners_of(&surface->mesh, curve->faces[i], corners));
-    interpolate(corners, curve->barycentric + 3 * i, position);
-    return OK;
-}
-
 static int find_positions(const Surface *surface, const Curve *curve)
 {
     for (int64_t i = 0; i < curve->n; i++)
-        TRY(position_of_node(surface, curve, i, curve->positions + 3 * i));
+        TRY(position_in_face(&surface->mesh, curve->faces[i], curve->barycentric + 3 * i,
+                             curve->positions + 3 * i));
     return OK;
 }
 
@@ -284,8 +275,8 @@ static int chord_at(const Surface *surface, const Curve *curve, const double *ar
     CHECK(curve->node_index[i], curve->polyline.count);
     CHECK(curve->node_index[next], curve->polyline.count);
     *step = (next ? arcs[curve->node_index[next]] : total) - arcs[curve->node_index[i]];
-    TRY(position_of_node(surface, curve, i, begin));
-    TRY(position_of_node(surface, curve, next, end));
+    TRY(position_in_face(&surface->mesh, curve->faces[i], curve->barycentric + 3 * i, begin));
+    TRY(position_in_face(&surface->mesh, curve->faces[next], curve->barycentric + 3 * next, end));
     for (int axis = 0; axis < 3; axis++)
         chord[axis] = (end[axis] - begin[axis]) / greater(*step, TINY);
     return OK;

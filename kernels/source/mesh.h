@@ -15,14 +15,6 @@ typedef struct {
     int64_t is_oriented; /* whether no two faces traverse an edge in the same direction */
 } Mesh;
 
-/* Points of a polyline or of traces, in order. */
-typedef struct {
-    int64_t room;        /* number of points that the arrays can hold */
-    int64_t count;       /* number of points that they hold */
-    int64_t *faces;      /* (room) face of the segment after each point */
-    double *barycentric; /* (room, 3) the point, in this face */
-} PointList;
-
 static const int FIRST_END[3] = {1, 2, 0}, SECOND_END[3] = {2, 0, 1};
 
 static inline int vertex_at(const Mesh *mesh, int64_t corner, int64_t *vertex)

@@ -60,15 +60,6 @@ static int trace_step(const Surface *surface, const NodePlaces *places, const No
                              reached, work);
 }
 
-static int add_point(int64_t face, const double *barycentric, PointList *points)
-{
-    CHECK(points->count, points->room);
-    points->faces[points->count] = face;
-    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
-    points->count++;
-    return OK;
-}
-
 /* The steps of which traces are asked for, and what was found. */
 typedef struct {
     int64_t m;
@@ -96,10 +87,10 @@ EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const
         uint8_t *reached = steps->reached + *done;
         CHECK(from, nodes->n);
         CHECK(to, nodes->n);
-        TRY(add_point(places->faces[from], places->barycentric + 3 * from, points));
+        TRY(append_point(places->faces[from], places->barycentric + 3 * from, points));
         TRY(trace_step(surface, places, nodes, nodes->n / c, from, to, points, reached, &work));
         if (*reached)
-            TRY(add_point(places->faces[to], places->barycentric + 3 * to, points));
+            TRY(append_point(places->faces[to], places->barycentric + 3 * to, points));
         else
             points->count = first;
         steps->point_counts[*done] = points->count - first;
@@ -149,7 +140,7 @@ static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, Poin
     CHECK(first, polyline->former_count);
     CHECK(end, polyline->former_count + 1);
     for (int64_t k = first; k < end; k++)
-        TRY(add_point(polyline->former_faces[k], polyline->former_places + 3 * k, points));
+        TRY(append_point(polyline->former_faces[k], polyline->former_places + 3 * k, points));
     return OK;
 }
 
@@ -171,7 +162,7 @@ int trace_polyline(const Surface *surface, const NodePlaces *places, const Nodes
             TRY(copy_piece(polyline, n, i, points));
             continue;
         }
-        TRY(add_point(places->faces[i], places->barycentric + 3 * i, points));
+        TRY(append_point(places->faces[i], places->barycentric + 3 * i, points));
         if (!has_step) continue;
         /* A trace must start strictly inside a face. So traces from control points run backward,
            and no trace joins two control points. */

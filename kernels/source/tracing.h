@@ -2,7 +2,7 @@
 #ifndef NICMM_TRACING_H
 #define NICMM_TRACING_H
 
-#include "mesh.h"
+#include "points.h"
 
 typedef struct {
     double least_inside; /* least barycentric coordinate of a point strictly inside its face */
