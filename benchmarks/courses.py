@@ -25,8 +25,8 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.level_set import problem
 from nicmm_core.relaxation.curve_nodes import CurveSurface
+from nicmm_core.relaxation.discrete_curve import DiscreteCurve
 from nicmm_core.relaxation.elastic_energy import comparable_energies
-from nicmm_core.relaxation.noded_curve import NodedCurve
 
 from . import collections, report
 from .evidence import Results
@@ -86,7 +86,7 @@ UNCHANGED = Similarity(np.eye(3))
 class Answer:
     """A curve in units of its own, a factor for lengths on the unchanged mesh, and points there."""
 
-    curve: NodedCurve
+    curve: DiscreteCurve
     factor: float
     points: FloatArray
 

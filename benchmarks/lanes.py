@@ -20,7 +20,7 @@ from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.normals import vertex_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
-from nicmm_core.relaxation.noded_curve import shifted
+from nicmm_core.relaxation.discrete_curve import shifted
 from tests.oracles.checker import judge
 
 from . import collections, report

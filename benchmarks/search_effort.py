@@ -16,8 +16,8 @@ from nicmm_core import improvement
 from nicmm_core.courses import attempts
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
+from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.relaxation.noded_energies import energies_of
 
 from . import collections, report
 from .evidence import Results

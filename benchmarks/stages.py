@@ -77,7 +77,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     ],
     "legs recombined": [(course_search, "recombined")],
     "crossings removed": [(course_search, "uncrossed")],
-    "courses relaxed together": [(course_search, "relax_together")],
+    "courses relaxed together": [(course_search, "relax_batch")],
     "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
     "course traced": [(start_search, "simple_curve")],
     "initial path": [(problem, "build_initial_loop")],

@@ -15,9 +15,9 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import resample
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import nearest_points
+from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import CurveSurface, curve_surface
-from nicmm_core.relaxation.noded_curve import NodedCurve
-from nicmm_core.relaxation.noded_energies import energies_of
+from nicmm_core.relaxation.discrete_curve import DiscreteCurve
 from nicmm_core.relaxation.relaxing import relax
 from nicmm_core.relaxation.simple_curve import simple_curve
 from nicmm_core.relaxation.warm_start import WARM
@@ -158,7 +158,7 @@ def _energy_of_symmetric_curve(design: nicmm.Design) -> float | None:
     curve, request = design.resumable.curve, design.resumable.request
     surface = curve_surface(design.resumable.mesh)
     relaxed = [
-        relax(surface, symmetric, request.smoothness, WARM).noded_curve
+        relax(surface, symmetric, request.smoothness, WARM).discrete_curve
         for side in (1.0, -1.0)
         if (symmetric := _with_mirrored_half(surface, curve, side)) is not None
     ]
@@ -168,7 +168,9 @@ def _energy_of_symmetric_curve(design: nicmm.Design) -> float | None:
     return round(min(others) / own, 4)
 
 
-def _with_mirrored_half(surface: CurveSurface, curve: NodedCurve, side: float) -> NodedCurve | None:
+def _with_mirrored_half(
+    surface: CurveSurface, curve: DiscreteCurve, side: float
+) -> DiscreteCurve | None:
     """The half of a curve on one side of the plane x = 0, joined to its mirror image."""
     positions = curve.nodes.positions
     inside = side * positions[:, 0] > 0.0

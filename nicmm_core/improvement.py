@@ -24,7 +24,7 @@ from .courses.attempts import (
 from .courses.bent_part import bent_part
 from .errors import NicmmError
 from .geometry.array_types import FloatArray
-from .relaxation.noded_curve import NodedCurve
+from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
 from .request import Request
@@ -147,7 +147,9 @@ class Improvement:
             and self.attempts.should_try_another_course(first)
         ):  # fmt: skip
             known = [
-                start.curve for start in self.starts[first:] if isinstance(start.curve, NodedCurve)
+                start.curve
+                for start in self.starts[first:]
+                if isinstance(start.curve, DiscreteCurve)
             ]
             start = next((start for start in courses if is_new(start, known)), None)
             if start is None:

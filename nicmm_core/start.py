@@ -20,8 +20,7 @@ from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, in_faces, joined
 from .geometry.tracing import strictly_inside, trace_between
 from .relaxation.curve_nodes import CurveSurface
-from .relaxation.node_spacing import arc_lengths
-from .relaxation.noded_curve import NodedCurve, is_simple, noded_curve
+from .relaxation.discrete_curve import DiscreteCurve, arc_lengths, is_simple, place_nodes
 from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, with_moved_controls
 from .request import Request, same_request
@@ -48,7 +47,7 @@ class Resumable:
         The mesh on which the curve was designed, a canonical copy or a manifold.
     request : Request
         The request that the curve answers, on this mesh.
-    curve : NodedCurve
+    curve : DiscreteCurve
     visited : (k,) int array
         For each control node, the index of its control point in the request.
     collisions : int
@@ -62,7 +61,7 @@ class Resumable:
 
     mesh: Mesh
     request: Request
-    curve: NodedCurve
+    curve: DiscreteCurve
     visited: IntArray
     collisions: int = 0
     unsettled: IntArray | None = None
@@ -124,7 +123,7 @@ def unsettled_vertices(start: Resumable, request: Request, visited: IntArray) ->
 
 def moved_start(
     surface: CurveSurface, start: Resumable | SurfaceCurve, request: Request
-) -> tuple[NodedCurve, IntArray]:
+) -> tuple[DiscreteCurve, IntArray]:
     """Move the curve of a start to the control points of a request.
 
     If the request has as many control points as the start, points are matched by index or by their
@@ -144,7 +143,7 @@ def moved_start(
 
     Returns
     -------
-    NodedCurve
+    DiscreteCurve
         The moved curve, which is simple.
     (k,) int array
         For each control node, the index of its control point in the request.
@@ -160,7 +159,7 @@ def moved_start(
     if isinstance(start, Resumable):
         curve, visited = start.curve, start.visited
     else:
-        curve, visited = noded_curve(surface, start, WARM.levels[-1]), None
+        curve, visited = place_nodes(surface, start, WARM.levels[-1]), None
         if not is_simple(surface, curve):
             raise CurveError("start crosses or touches itself; pass a simple curve")
     if curve.closed != request.closed:
@@ -187,8 +186,8 @@ def moved_start(
 
 
 def _moved_in_steps(
-    surface: CurveSurface, curve: NodedCurve, points: SurfacePoints, smoothness: float
-) -> NodedCurve | None:
+    surface: CurveSurface, curve: DiscreteCurve, points: SurfacePoints, smoothness: float
+) -> DiscreteCurve | None:
     """Move a curve to control points in steps, with a few iterations of relaxation in between.
 
     Returns None if there is no straight trace to one of the points, or if the curve still crosses
@@ -203,12 +202,12 @@ def _moved_in_steps(
         moved = with_moved_controls(surface, curve, joined(there))
         if moved is None:
             return None
-        curve = relax(surface, moved, smoothness, config).noded_curve
+        curve = relax(surface, moved, smoothness, config).discrete_curve
     return with_moved_controls(surface, curve, points)
 
 
 def _routes(
-    surface: CurveSurface, curve: NodedCurve, points: SurfacePoints
+    surface: CurveSurface, curve: DiscreteCurve, points: SurfacePoints
 ) -> list[SurfacePoints] | None:
     """For each control node, points on the trace to its new position, including both ends.
 
@@ -230,7 +229,9 @@ def _routes(
     return routes
 
 
-def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: SurfacePoints) -> None:
+def _check_moves(
+    mesh: Mesh, curve: DiscreteCurve, visited: IntArray, points: SurfacePoints
+) -> None:
     """Raise CurveError if a control node has to move too far to its control point."""
     away = points[visited].positions(mesh) - curve.nodes.positions[curve.control_nodes]
     distance = np.linalg.norm(away, axis=1)
@@ -245,7 +246,7 @@ def _check_moves(mesh: Mesh, curve: NodedCurve, visited: IntArray, points: Surfa
 
 
 def _nearest_numbering(
-    mesh: Mesh, curve: NodedCurve, visited: IntArray | None, request: Request
+    mesh: Mesh, curve: DiscreteCurve, visited: IntArray | None, request: Request
 ) -> IntArray:
     """For each control node, the index of its control point, if there are as many as nodes.
 
@@ -271,23 +272,23 @@ def _ascending(numbers: IntArray, closed: bool) -> bool:
 
 
 def _rotated_to_first(
-    surface: CurveSurface, curve: NodedCurve, visited: IntArray
-) -> tuple[NodedCurve, IntArray]:
+    surface: CurveSurface, curve: DiscreteCurve, visited: IntArray
+) -> tuple[DiscreteCurve, IntArray]:
     """Rotate a closed curve so that it begins at control point 0; return it and its indices."""
     first = int(visited.argmin())
     whole = curve.surface_curve(surface.mesh)
     whole = replace(whole, control_index=np.roll(whole.control_index, -first))
-    return noded_curve(surface, whole, WARM.levels[-1]), np.roll(visited, -first)
+    return place_nodes(surface, whole, WARM.levels[-1]), np.roll(visited, -first)
 
 
 def _with_other_points(
-    surface: CurveSurface, curve: NodedCurve, request: Request
-) -> tuple[NodedCurve, IntArray]:
+    surface: CurveSurface, curve: DiscreteCurve, request: Request
+) -> tuple[DiscreteCurve, IntArray]:
     """Replace the control nodes of a curve by nodes at, or nearest to, the points of a request.
 
     Returns
     -------
-    NodedCurve
+    DiscreteCurve
     (k,) int array
         For each control node, the index of its control point in the request.
     """
@@ -326,13 +327,13 @@ def _with_other_points(
             before = arcs[number]
     if (np.diff(arcs[visited]) <= 0.0).any():
         raise CurveError(f"start visits the control_points in another order{WITHOUT_START}")
-    return noded_curve(surface, line.with_points(arcs[visited]), WARM.levels[-1]), visited
+    return place_nodes(surface, line.with_points(arcs[visited]), WARM.levels[-1]), visited
 
 
 class _Line:
     """A polyline on a mesh, parametrised by arc length from its first point."""
 
-    def __init__(self, mesh: Mesh, curve: NodedCurve, shift: int = 0) -> None:
+    def __init__(self, mesh: Mesh, curve: DiscreteCurve, shift: int = 0) -> None:
         n = len(curve.polyline)
         self.mesh, self.curve = mesh, curve
         self.polyline = curve.polyline[(np.arange(n) + shift) % n]

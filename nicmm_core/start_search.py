@@ -23,7 +23,7 @@ from .network.single_pass import infer
 from .path.initial_loop import path_curve
 from .progress import checkpoint
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
-from .relaxation.noded_curve import NodedCurve
+from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
 from .request import Request, same_maps
 
@@ -34,7 +34,7 @@ class Start:
 
     Attributes
     ----------
-    curve : SurfaceCurve or NodedCurve
+    curve : SurfaceCurve or DiscreteCurve
     visited : (k,) int array
         Indices of the control points in the request, in the order visited.
     surface : CurveSurface
@@ -49,7 +49,7 @@ class Start:
         Vertices near which the curve may move; None if it may move everywhere.
     """
 
-    curve: SurfaceCurve | NodedCurve
+    curve: SurfaceCurve | DiscreteCurve
     visited: IntArray
     surface: CurveSurface
     unit: float
@@ -87,15 +87,15 @@ class StartSearch:
                 break
 
     def with_other_part(
-        self, request: Request, start: Start, curve: NodedCurve, part: BentPart
+        self, request: Request, start: Start, curve: DiscreteCurve, part: BentPart
     ) -> Iterator[Start]:
         """A curve with other courses of one part that are apart from each other, the best first."""
-        found: list[NodedCurve] = []
+        found: list[DiscreteCurve] = []
         part_request = request_for_part(request, curve, part)
         for course in self.courses(part_request, most_failures=MOST_FAILURES):
             if not is_new(course, found):
                 continue
-            assert isinstance(course.curve, NodedCurve)
+            assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
             if changed is not None:
                 found.append(course.curve)
@@ -181,7 +181,7 @@ class StartSearch:
         return CoarseStarts(self._surface)
 
 
-def is_new(start: Start, curves: list[NodedCurve]) -> bool:
+def is_new(start: Start, curves: list[DiscreteCurve]) -> bool:
     """Whether a course is somewhere apart from each of some curves."""
-    assert isinstance(start.curve, NodedCurve)
+    assert isinstance(start.curve, DiscreteCurve)
     return is_apart(start.surface, start.curve, curves)

@@ -182,7 +182,7 @@ class SurfaceDesigner:
             resumable=Resumable(
                 self.mesh,
                 request,
-                relaxed.noded_curve,
+                relaxed.discrete_curve,
                 start.visited,
                 collisions,
                 np.zeros(0, np.int64) if converged else start.unsettled,

@@ -6,7 +6,7 @@ of the installed package; there is one for every platform, and it does not depen
 Python. While it computes, other threads of Python run.
 """
 
-from .crossings import meeting_segments
+from .crossings import meeting_segments, polyline_crossings
 from .distinct_curves import distinct_curves
 from .edge_paths import (
     EdgeGraphArrays,
@@ -14,38 +14,52 @@ from .edge_paths import (
     nearest_cells,
     points_on_edge_paths,
 )
-from .energy import (
-    ContactRules,
-    EnergyRules,
-    Weights,
-    balance,
-    close_pairs,
-    conormal_derivatives,
-    damped_step,
-    elastic_energy,
-    elastic_system,
-    find_contacts,
-    predicted_decrease,
-)
 from .least_sums import least_sums
 from .legs import PathArrays, best_legs, cell_sets, distinct_routes
+from .levels import (
+    CurveArrays,
+    CurveRelaxation,
+    LevelOutcome,
+    LevelRules,
+    LevelState,
+    PlacementRules,
+    place_on_polyline,
+)
 from .library import KernelError, MissingLibraryError
 from .node_traces import StepLimits, trace_polyline, trace_steps
 from .nodes import NodeArrays, SpacingRules, SurfaceArrays, even_places, place_nodes
-from .relaxation import RelaxationRules, StepRules, relax_curves
+from .relaxation import BatchRules, relax_curves
+from .steps import (
+    ContactRules,
+    EnergyRules,
+    Linearised,
+    RelaxationRules,
+    StepRules,
+    conormal_derivatives,
+    damped_step,
+    find_contacts,
+)
 from .traced_places import TraceArrays, places_on_traces, segment_ends
 from .traces import MeshArrays, TraceLimits, trace_between, trace_from
 from .turning_paths import turning_paths
 
 __all__ = [
+    "BatchRules",
     "ContactRules",
+    "CurveArrays",
+    "CurveRelaxation",
     "EdgeGraphArrays",
     "EnergyRules",
     "KernelError",
+    "LevelOutcome",
+    "LevelRules",
+    "LevelState",
+    "Linearised",
     "MeshArrays",
     "MissingLibraryError",
     "NodeArrays",
     "PathArrays",
+    "PlacementRules",
     "RelaxationRules",
     "SpacingRules",
     "StepLimits",
@@ -53,27 +67,23 @@ __all__ = [
     "SurfaceArrays",
     "TraceArrays",
     "TraceLimits",
-    "Weights",
-    "balance",
     "best_legs",
     "cell_sets",
-    "close_pairs",
     "conormal_derivatives",
     "damped_step",
     "distances_along_edges",
     "distinct_curves",
     "distinct_routes",
-    "elastic_energy",
-    "elastic_system",
     "even_places",
     "find_contacts",
-    "meeting_segments",
     "least_sums",
+    "meeting_segments",
     "nearest_cells",
     "place_nodes",
+    "place_on_polyline",
     "places_on_traces",
     "points_on_edge_paths",
-    "predicted_decrease",
+    "polyline_crossings",
     "relax_curves",
     "segment_ends",
     "trace_between",

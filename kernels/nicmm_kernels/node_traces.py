@@ -25,7 +25,7 @@ from .library import (
     rows,
 )
 from .nodes import NodeArrays, NodePointers, SurfaceArrays, SurfacePointers
-from .traces import Crossings, FoundTraces
+from .traces import FoundTraces, PointList
 
 
 class _NodePlaces(ctypes.Structure):
@@ -84,11 +84,11 @@ Places = tuple[IntArray, FloatArray]
 """Faces of points, (n,), and barycentric coordinates in them, (n, 3)."""
 
 _TRACE_STEPS = Kernel(
-    "trace_steps", SurfacePointers, _NodePlaces, NodePointers, COUNT, _StepTraces, Crossings,
+    "trace_steps", SurfacePointers, _NodePlaces, NodePointers, COUNT, _StepTraces, PointList,
     COUNT, ctypes.POINTER(COUNT),
 )  # fmt: skip
 _TRACE_POLYLINE = Kernel(
-    "trace_polyline", SurfacePointers, _NodePlaces, NodePointers, _TracedPolyline, Crossings,
+    "trace_polyline", SurfacePointers, _NodePlaces, NodePointers, _TracedPolyline, PointList,
     COUNT, ctypes.POINTER(COUNT),
 )  # fmt: skip
 

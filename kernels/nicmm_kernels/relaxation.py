@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import energy, library
-from .energy import ContactRules, EnergyRules
+from . import library, steps
 from .library import (
     COUNT,
     FLOAT,
@@ -24,34 +23,24 @@ from .library import (
     first_fixed,
     rows_of_curves,
 )
-from .nodes import SpacingRules, SurfaceArrays, SurfacePointers
-from .traces import TraceLimits
+from .nodes import SurfaceArrays, SurfacePointers
+from .steps import RelaxationRules
 
 
-class StepRules(ctypes.Structure):
-    """How many steps are taken, and how far they go.
-
-    Lengths are in mean distances between neighbouring nodes.
+class BatchRules(ctypes.Structure):
+    """How several curves are relaxed.
 
     Parameters
     ----------
     iterations : int
-        Greatest number of steps.
+        Greatest number of iterations.
     respacing : int
-        Number of steps from one respacing of the nodes to the next.
+        Number of iterations from one respacing of the nodes to the next.
     quiet : int
-        Number of consecutive quiet steps after which a curve has converged.
+        Number of consecutive quiet iterations after which a curve has converged.
     least_decrease : float
-        Relative decrease of the energy up to which a step counts as quiet, if no node has moved by
-        more than half of `longest_move` either.
-    longest_move : float
-        Trust radius of the linearised energy.
-    least_damping, most_damping : float
-        Damping of the first step and its lower bound, and the damping above which a curve stays.
-    damping_factor : float
-        Factor by which damping rises after a failed step and falls after a successful one.
-    shortest : float
-        Least length of a step by which the tension is divided, in mesh units.
+        Relative decrease of the energy up to which an iteration is quiet, if no node has moved by
+        more than half of the longest move either.
     """
 
     _fields_ = [
@@ -59,32 +48,6 @@ class StepRules(ctypes.Structure):
         ("respacing", COUNT),
         ("quiet", COUNT),
         ("least_decrease", NUMBER),
-        ("longest_move", NUMBER),
-        ("least_damping", NUMBER),
-        ("most_damping", NUMBER),
-        ("damping_factor", NUMBER),
-        ("shortest", NUMBER),
-    ]
-
-
-class RelaxationRules(ctypes.Structure):
-    """All rules of a relaxation.
-
-    Parameters
-    ----------
-    traces : TraceLimits
-    contact : ContactRules
-    spacing : SpacingRules
-    energy : EnergyRules
-    steps : StepRules
-    """
-
-    _fields_ = [
-        ("traces", TraceLimits),
-        ("contact", ContactRules),
-        ("spacing", SpacingRules),
-        ("energy", EnergyRules),
-        ("steps", StepRules),
     ]
 
 
@@ -104,8 +67,9 @@ class _CurveBatch(ctypes.Structure):
 
 _ITEMS = Kernel("relaxation_items", COUNT, COUNT)
 _RELAX = Kernel(
-    "relax_curves", SurfacePointers, RelaxationRules, _CurveBatch, COUNT, POINTER, COUNT, COUNT
-)
+    "relax_curves", SurfacePointers, RelaxationRules, BatchRules, _CurveBatch, COUNT, POINTER,
+    COUNT, COUNT,
+)  # fmt: skip
 
 
 def relax_curves(
@@ -115,6 +79,7 @@ def relax_curves(
     fixed: BoolArray,
     closed: bool,
     rules: RelaxationRules,
+    batch: BatchRules,
     meanwhile: Callable[[], object],
 ) -> tuple[IntArray, FloatArray]:
     """Relax c curves of n nodes each; every curve is relaxed on its own.
@@ -131,6 +96,7 @@ def relax_curves(
     closed : bool
         Whether the last node of each curve is joined to its first.
     rules : RelaxationRules
+    batch : BatchRules
     meanwhile : callable
         Called after every `library.MOST_WORK` faces, or the time of as many.
 
@@ -150,18 +116,25 @@ def relax_curves(
         c, n, int(closed), faces.ctypes.data, barycentric.ctypes.data, of_fixed,
         iterations.ctypes.data, quiet.ctypes.data, dampings.ctypes.data,
     )  # fmt: skip
-    room, started = energy.PAIRS_OF_A_NODE * n, False
-    while (iterations < rules.steps.iterations).any():
+    room, started = steps.PAIRS_OF_A_NODE * n, False
+    while (iterations < batch.iterations).any():
         if started:
             meanwhile()
         started = True
         items = _ITEMS.result(n, room)
         scratch = np.empty(items)
         code = _RELAX.result(
-            surface.pointers, rules, curves, room, scratch.ctypes.data, items, library.MOST_WORK
+            surface.pointers,
+            rules,
+            batch,
+            curves,
+            room,
+            scratch.ctypes.data,
+            items,
+            library.MOST_WORK,
         )
         if code == library.TOO_SMALL and room < n * n:
-            room = energy.more_room(room, n)
+            room = steps.more_room(room, n)
         else:
             _RELAX.check(code)
     return faces, barycentric

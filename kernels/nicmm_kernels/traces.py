@@ -176,14 +176,14 @@ class _TracePairs(ctypes.Structure):
     ]
 
 
-class Crossings(ctypes.Structure):
-    """Crossings as the library writes them."""
+class PointList(ctypes.Structure):
+    """Points of polylines and traces as the library reads and writes them."""
 
     _fields_ = [("room", COUNT), ("count", COUNT), ("faces", POINTER), ("barycentric", POINTER)]
 
 
 _TRACE_BETWEEN = Kernel(
-    "trace_between", MeshPointers, POINTER, COUNT, COUNT, _TracePairs, Crossings, COUNT,
+    "trace_between", MeshPointers, POINTER, COUNT, COUNT, _TracePairs, PointList, COUNT,
     ctypes.POINTER(COUNT),
 )  # fmt: skip
 
@@ -207,7 +207,7 @@ class FoundTraces:
         room = most_faces + CROSSINGS_OF_A_TRACE * m
         self.reached, self.counts = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.int64)
         self._faces, self._barycentric = np.empty(room, dtype=np.int64), np.empty((room, 3))
-        self.crossings = Crossings(room, 0, self._faces.ctypes.data, self._barycentric.ctypes.data)
+        self.crossings = PointList(room, 0, self._faces.ctypes.data, self._barycentric.ctypes.data)
         self.done = COUNT(0)
         self._parts: list[tuple[IntArray, FloatArray]] = []
 

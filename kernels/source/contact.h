@@ -10,6 +10,9 @@ typedef struct {
                                  in clearances */
     double same_side;         /* least cosine between the normals of two nodes in contact */
     double rounded;           /* least mean step, relative to the greatest coordinate */
+    double nearby;            /* distance, in clearances, up to which pairs are kept for contacts
+                                 after short moves; they are sought again after longer ones. With
+                                 1, the same pairs are kept after all moves. */
 } ContactRules;
 
 /* Pairs of nodes that may be in contact, and the contacts among them. */
@@ -21,20 +24,20 @@ typedef struct {
     int64_t *ends;      /* (room, 2) nodes in contact */
     double *overlaps;   /* (room) 1 - distance / clearance */
     double *approaches; /* (room, 2) derivatives of the overlap by the moves of both nodes */
+    double reach;       /* distance up to which the pairs were found; below 0 before */
+    double *positions;  /* (n, 3) of the nodes at that time */
+    double *arcs;       /* (n) scratch */
 } Contacts;
 
-int64_t items_of_contacts(int64_t room);
-int take_contacts(Scratch *scratch, int64_t room, Contacts *contacts);
+int64_t items_of_contacts(int64_t n, int64_t room);
+int take_contacts(Scratch *scratch, int64_t n, int64_t room, Contacts *contacts);
 
-/* Distance below which the strands of a curve repel. */
-double clearance_of(const Nodes *nodes, const ContactRules *rules);
+/* Finds the contacts of a curve: nodes of different strands that are closer than the clearance, on
+   one side of the surface.
 
-/* Finds the pairs of nodes that are at most `reach` clearances apart, but far along the curve.
-   `arcs`, (n), is scratch. Returns ARRAY_TOO_SMALL if there is no room for all of them. */
-EXPORTED int find_close_pairs(const Nodes *nodes, const ContactRules *rules, double reach,
-                              double *arcs, Contacts *contacts);
-
-/* Finds the contacts among the pairs: closer than the clearance, on one side of the surface. */
+   Pairs that may come into contact are found first if `reach` is below 0, and again after moves
+   that are too long for them. Whether two nodes are far enough apart along the curve is decided
+   then. Returns ARRAY_TOO_SMALL if there is no room for all pairs. */
 EXPORTED int find_contacts(const Nodes *nodes, const ContactRules *rules, Contacts *contacts);
 
 #endif

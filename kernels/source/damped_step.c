@@ -1,8 +1,6 @@
 /* Damped steps of a Gauss-Newton system. */
 #include "damped_step.h"
 
-#include "profile_matrix.h"
-
 /* Bands on one side of the diagonal, after the nodes have been put in the order 0, n - 1, 1, n - 2
    and so on: there, nodes that are at most two apart on the closed curve are at most four positions
    apart. */
@@ -80,105 +78,31 @@ int damped_step(const System *system, int64_t n, const uint8_t *fixed, double da
     return OK;
 }
 
-/* A system of one curve with the entries of pairs of nodes in contact. */
-typedef struct {
-    int64_t n;
-    System system;
-    int64_t pair_count;
-    const int64_t *pairs;        /* (pair_count, 2) */
-    const double *pair_entries;  /* (3, pair_count) entries (i, i), (i, j) and (j, j) */
-} PairedSystem;
-
-/* The greatest diagonal entry of a free node; `diagonal`, (n), is scratch. */
-static int greatest_entry(const PairedSystem *paired, const uint8_t *fixed, double *diagonal,
-                          double *greatest)
+double predicted_decrease(const System *system, int64_t n, const double *moves)
 {
-    int64_t count = paired->pair_count;
-    for (int64_t i = 0; i < paired->n; i++) diagonal[i] = paired->system.bands[i];
-    for (int64_t p = 0; p < count; p++)
-        for (int end = 0; end < 2; end++) {
-            int64_t i = paired->pairs[2 * p + end];
-            CHECK(i, paired->n);
-            diagonal[i] += paired->pair_entries[2 * end * count + p];
-        }
-    *greatest = 0.0;
-    for (int64_t i = 0; i < paired->n; i++)
-        if (!fixed[i]) *greatest = greater(*greatest, diagonal[i]);
-    return OK;
-}
-
-/* A damped step with the entries of pairs, for which there is no order with few bands. */
-static int damped_step_with_pairs(const PairedSystem *paired, const uint8_t *fixed, double damping,
-                                  Scratch scratch, double *moves)
-{
-    int64_t n = paired->n, count = paired->pair_count;
-    ProfileMatrix matrix;
-    double greatest, check = 0.0;
-    TRY(greatest_entry(paired, fixed, moves, &greatest));
-    TRY(take_profile_matrix(&scratch, n, paired->pairs, count, &matrix));
-    for (int64_t i = 0; i < n; i++) {
-        for (int64_t offset = 0; offset < 3; offset++) {
-            int64_t j = (i + offset) % n;
-            double entry = fixed[i] || fixed[j] ? 0.0 : paired->system.bands[offset * n + i];
-            if (offset == 0) entry += fixed[i] ? 1.0 : damping * greatest;
-            TRY(add_entry(&matrix, i, j, entry));
-            check += entry;
-        }
-        moves[i] = fixed[i] ? 0.0 : -paired->system.slope[i];
-        check += moves[i];
-    }
-    for (int64_t p = 0; p < count; p++) {
-        int64_t ends[2] = {paired->pairs[2 * p], paired->pairs[2 * p + 1]};
-        for (int k = 0; k < 3; k++) {
-            int64_t i = ends[k / 2], j = ends[(k + 1) / 2];
-            if (fixed[i] || fixed[j]) continue;
-            double entry = paired->pair_entries[k * count + p];
-            TRY(add_entry(&matrix, i, j, entry));
-            check += entry;
-        }
-    }
-    if (isfinite(check) && greatest > TINY) return solve_profile(&matrix, moves);
-    for (int64_t i = 0; i < n; i++) moves[i] = 0.0;
-    return OK;
-}
-
-/* Finds a damped step of one curve; see `damped_step`. It returns ARRAY_TOO_SMALL if the scratch
-   does not suffice, which is known only when the nodes have been ordered. */
-EXPORTED int step_of_curve(const PairedSystem *paired, const uint8_t *fixed, double damping,
-                           double *scratch, int64_t scratch_items, double *moves)
-{
-    Scratch all = {scratch, scratch_items};
-    if (paired->pair_count > 0)
-        return damped_step_with_pairs(paired, fixed, damping, all, moves);
-    return damped_step(&paired->system, paired->n, fixed, damping, all, moves);
-}
-
-/* Number of items of scratch that always suffice without pairs, and mostly with them. */
-EXPORTED int64_t step_items(int64_t n, int64_t pair_count)
-{
-    return items_of_damped_step(n) + 40 * n + 4 * pair_count + 2;
-}
-
-/* Decrease of the linearised energy by given moves along the conormals, (n). */
-EXPORTED int predicted_decrease(const PairedSystem *paired, const double *moves, double *decrease)
-{
-    int64_t n = paired->n, count = paired->pair_count;
-    const double *bands = paired->system.bands, *entries = paired->pair_entries;
     double sum = 0.0;
-    int moves_any = 0;
     for (int64_t i = 0; i < n; i++) {
+        if (moves[i] == 0.0) continue; /* the matrix need not be finite */
         double one = moves[(i + 1) % n], other = moves[(i + 2) % n];
-        double half = 0.5 * bands[i] * moves[i] + bands[n + i] * one + bands[2 * n + i] * other;
-        sum += 2.0 * moves[i] * (paired->system.slope[i] + half);
-        moves_any |= moves[i] != 0.0;
+        double half = 0.5 * system->bands[i] * moves[i];
+        if (one != 0.0) half += system->bands[n + i] * one;
+        if (other != 0.0) half += system->bands[2 * n + i] * other;
+        sum += 2.0 * moves[i] * (system->slope[i] + half);
     }
-    for (int64_t p = 0; p < count; p++) {
-        CHECK(paired->pairs[2 * p], n);
-        CHECK(paired->pairs[2 * p + 1], n);
-        double one = moves[paired->pairs[2 * p]], other = moves[paired->pairs[2 * p + 1]];
-        sum += entries[p] * one * one + 2.0 * entries[count + p] * one * other +
-               entries[2 * count + p] * other * other;
-    }
-    *decrease = moves_any ? -sum : 0.0; /* the matrix need not be finite */
+    return -sum;
+}
+
+EXPORTED int64_t step_items(int64_t n)
+{
+    return items_of_damped_step(n);
+}
+
+/* Finds a damped step of a curve, and the decrease of the linearised energy that it predicts. */
+EXPORTED int step_of_curve(const System *system, int64_t n, const uint8_t *fixed, double damping,
+                           double *scratch, int64_t scratch_items, double *moves, double *decrease)
+{
+    const Scratch memory = {scratch, scratch_items};
+    TRY(damped_step(system, n, fixed, damping, memory, moves));
+    *decrease = predicted_decrease(system, n, moves);
     return OK;
 }

@@ -13,4 +13,7 @@ int64_t items_of_damped_step(int64_t n);
 int damped_step(const System *system, int64_t n, const uint8_t *fixed, double damping,
                 Scratch scratch, double *moves);
 
+/* Decrease of the linearised energy by moves along the conormals, (n). */
+double predicted_decrease(const System *system, int64_t n, const double *moves);
+
 #endif

@@ -39,9 +39,9 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
     for (int64_t i = 0; i < nodes->n; i++) {
         double ds = arc_of_node(nodes, i), angle = nodes->angles[i];
         double at_node = angle * angle / ds + tension_at(nodes, weights, i) * ds;
-        if (weights->held_ds) {
+        if (weights->frozen_ds) {
             double phi = lesser(nodes->phi_fea[i], 1.0);
-            at_node += weights->feature * (phi * phi - 1.0) * weights->held_ds[i];
+            at_node += weights->feature * (phi * phi - 1.0) * weights->frozen_ds[i];
         }
         energy += at_node;
     }
@@ -49,7 +49,7 @@ double elastic_energy(const Nodes *nodes, const Weights *weights)
 }
 
 Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *rules,
-                double *held_ds)
+                double *frozen_ds)
 {
     double turn = 2.0 * PI / length_of_curve(nodes), tension = turn * turn / rules->smoothness;
     Weights weights = {rules->tautness * tension, 0.0, 0.0, NULL};
@@ -58,8 +58,8 @@ Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *r
     if (surface->feature_map) {
         weights.feature =
             surface->feature_weight / rules->smoothness + rules->over_tension * tension;
-        weights.held_ds = held_ds;
-        for (int64_t i = 0; i < nodes->n; i++) held_ds[i] = arc_of_node(nodes, i);
+        weights.frozen_ds = frozen_ds;
+        for (int64_t i = 0; i < nodes->n; i++) frozen_ds[i] = arc_of_node(nodes, i);
     }
     return weights;
 }
@@ -196,8 +196,8 @@ int assemble_system(const Surface *surface, const Nodes *nodes, const Weights *w
         system->slope[i] = dot2(of_j, residuals + 2 * j) + dot2(of_i + 2, residuals + 2 * i) +
                            dot2(of_h + 4, residuals + 2 * h);
         double phi = nodes->phi_fea[i], drift = linearisation->drift[i];
-        if (weights->held_ds && phi < 1.0) {
-            double pull = weights->feature * weights->held_ds[i] * drift;
+        if (weights->frozen_ds && phi < 1.0) {
+            double pull = weights->feature * weights->frozen_ds[i] * drift;
             system->bands[i] += pull * drift;
             system->slope[i] += pull * phi;
         }
@@ -231,60 +231,6 @@ int add_contact(const Nodes *nodes, const Contacts *contacts, const Weights *wei
             system->slope[i] += pull * approach;
             system->bands[i] += 2.0 * weight * (approach * approach);
         }
-    }
-    return OK;
-}
-
-/* The functions below are those of one curve that the caller relaxes itself. */
-
-/* Energy of a curve with contact; `contacts` is NULL if strands may cross. */
-EXPORTED int energy_of_curve(const Nodes *nodes, const Weights *weights, const Contacts *contacts,
-                             double *energy)
-{
-    *energy = elastic_energy(nodes, weights);
-    if (contacts) *energy += contact_energy(contacts, weights);
-    return OK;
-}
-
-/* Weights of a curve; `held_ds`, (n), becomes their ds if there is a map. */
-EXPORTED int balance_of_curve(const Surface *surface, const Nodes *nodes,
-                              const EnergyRules *rules, double *held_ds, Weights *weights)
-{
-    *weights = balance(surface, nodes, rules, held_ds);
-    return OK;
-}
-
-EXPORTED int64_t system_items(int64_t n)
-{
-    return items_of_linearisation(n);
-}
-
-/* Assembles the system of a curve with contact; `contacts` is NULL if strands may cross.
-
-   pair_entries : (3, p) become the contributions of the p contacts to the entries (i, i), (i, j)
-   and (j, j) of the matrix, where i and j are the two nodes; the bands do not include them
-   scratch : items of eight bytes, as many as `system_items` says */
-EXPORTED int system_of_curve(const Surface *surface, const Nodes *nodes, const Weights *weights,
-                             double shortest, const Contacts *contacts, double *scratch,
-                             int64_t scratch_items, const System *system, double *pair_entries)
-{
-    Scratch all = {scratch, scratch_items};
-    Linearisation linearisation;
-    TRY(take_linearisation(&all, nodes->n, &linearisation));
-    TRY(assemble_system(surface, nodes, weights, shortest, &linearisation, system));
-    if (!contacts) return OK;
-    int64_t count = contacts->count;
-    for (int64_t p = 0; p < count; p++) {
-        /* A pair counts for both of its nodes. */
-        double weight = 2.0 * weights->contact, pull = weight * contacts->overlaps[p];
-        const double *by = contacts->approaches + 2 * p;
-        const int64_t *ends = contacts->ends + 2 * p;
-        CHECK(ends[0], nodes->n);
-        CHECK(ends[1], nodes->n);
-        for (int end = 0; end < 2; end++) system->slope[ends[end]] += pull * by[end];
-        pair_entries[p] = weight * (by[0] * by[0]);
-        pair_entries[count + p] = weight * (by[0] * by[1]);
-        pair_entries[2 * count + p] = weight * (by[1] * by[1]);
     }
     return OK;
 }

@@ -19,7 +19,7 @@ typedef struct {
     double tension;        /* in 1/length^2 */
     double contact;        /* in 1/length; 0 where strands may cross */
     double feature;        /* of the map, in 1/length^2; 0 without a map */
-    const double *held_ds; /* (n) ds, held constant in the term of lanes; NULL without a map */
+    const double *frozen_ds; /* (n) ds, held constant in the term of lanes; NULL without a map */
 } Weights;
 
 /* Half the derivatives of the energy by moves of the n nodes along their conormals. */
@@ -40,9 +40,9 @@ int take_system(Scratch *scratch, int64_t n, System *system);
 int64_t items_of_linearisation(int64_t n);
 int take_linearisation(Scratch *scratch, int64_t n, Linearisation *linearisation);
 
-/* Weights for the present nodes; `held_ds`, (n), becomes their ds if there is a map. */
+/* Weights for the present nodes; `frozen_ds`, (n), becomes their ds if there is a map. */
 Weights balance(const Surface *surface, const Nodes *nodes, const EnergyRules *rules,
-                double *held_ds);
+                double *frozen_ds);
 
 /* Energy without contact. */
 double elastic_energy(const Nodes *nodes, const Weights *weights);

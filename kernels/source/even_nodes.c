@@ -89,7 +89,7 @@ static void point_at(const Nodes *nodes, const double *arcs, double wanted, int6
 }
 
 int space_evenly(const Surface *surface, const TraceLimits *limits, const SpacingRules *rules,
-                 const Nodes *nodes, const uint8_t *fixed, Scratch scratch, const Nodes *evened,
+                 const Nodes *nodes, const uint8_t *fixed, Scratch scratch, const Nodes *spaced,
                  int64_t *work)
 {
     double *arcs, *wanted;
@@ -98,7 +98,7 @@ int space_evenly(const Surface *surface, const TraceLimits *limits, const Spacin
     find_arcs(nodes, rules, nodes->step_lengths, arcs);
     find_even_arcs(nodes, fixed, 1, arcs, wanted);
     double least = rules->short_move * (length_of_curve(nodes) / (double)nodes->n);
-    copy_places(nodes, evened);
+    copy_places(nodes, spaced);
     for (int64_t i = 0, at = 0; i < nodes->n; i++) {
         const double *here = nodes->positions + 3 * i, *normal = nodes->normals + 3 * i;
         double move[3];
@@ -111,11 +111,11 @@ int space_evenly(const Surface *surface, const TraceLimits *limits, const Spacin
         for (int axis = 0; axis < 3; axis++) move[axis] /= greater(length, TINY);
         uint8_t blocked;
         int64_t passed = 0;
-        TRY(move_point(&surface->mesh, surface->folded, limits, move, length, evened->faces + i,
-                       evened->barycentric + 3 * i, &blocked, &passed));
+        TRY(move_point(&surface->mesh, surface->folded, limits, move, length, spaced->faces + i,
+                       spaced->barycentric + 3 * i, &blocked, &passed));
         *work += passed;
     }
-    TRY(place_nodes(surface, evened));
-    measure_nodes(evened);
+    TRY(place_nodes(surface, spaced));
+    measure_nodes(spaced);
     return OK;
 }

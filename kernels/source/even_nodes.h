@@ -15,9 +15,9 @@ int64_t items_of_even_nodes(int64_t n);
 /* Moves nodes so that they are evenly spaced along the straight lines between them; closer together
    where the normals turn, as around the edge of a thin part. The first node has to be fixed.
 
-   `evened` become the moved nodes; `work` is raised by the number of faces that they pass. */
+   `spaced` become the moved nodes; `work` is raised by the number of faces that they pass. */
 int space_evenly(const Surface *surface, const TraceLimits *limits, const SpacingRules *rules,
-                 const Nodes *nodes, const uint8_t *fixed, Scratch scratch, const Nodes *evened,
+                 const Nodes *nodes, const uint8_t *fixed, Scratch scratch, const Nodes *spaced,
                  int64_t *work);
 
 #endif

@@ -1,21 +1,11 @@
 /* Straight traces between the nodes of curves. */
+#include "node_traces.h"
+
 #include <string.h>
-
-#include "nodes.h"
-#include "tracing.h"
-
-/* What all traces between nodes have in common. */
-typedef struct {
-    const int64_t *faces;      /* (n) faces of the nodes */
-    const double *barycentric; /* (n, 3) coordinates in them; those of starts strictly inside */
-    double detour;             /* greatest length of a trace, relative to the distance of nodes */
-    double fold_margin;        /* length allowed before backward parts over folds are subtracted */
-    int64_t most_faces;        /* number of faces after which a trace ends */
-} NodePlaces;
 
 /* Traces in the plane that contains the mean normal of both nodes. */
 static int trace_by_normals(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                            int64_t from, int64_t to, TraceRequest *request, Crossings *crossings,
+                            int64_t from, int64_t to, TraceRequest *request, PointList *crossings,
                             uint8_t *reached, int64_t *work)
 {
     const double *one = nodes->normals + 3 * from, *other = nodes->normals + 3 * to;
@@ -32,7 +22,7 @@ static int trace_by_normals(const Surface *surface, const NodePlaces *places, co
    contains their mean contains a trace. */
 static int trace_around_edge(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
                              int64_t per_curve, int64_t from, int64_t to, TraceRequest *request,
-                             Crossings *crossings, uint8_t *reached, int64_t *work)
+                             PointList *crossings, uint8_t *reached, int64_t *work)
 {
     int64_t from_first = from - from % per_curve, to_first = to - to % per_curve;
     int64_t before_from = from > from_first ? from - 1 : from_first + per_curve - 1;
@@ -53,7 +43,7 @@ static int trace_around_edge(const Surface *surface, const NodePlaces *places, c
 
 /* Traces from a node to the next one or the previous one, in one of these planes. */
 static int trace_step(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                      int64_t per_curve, int64_t from, int64_t to, Crossings *crossings,
+                      int64_t per_curve, int64_t from, int64_t to, PointList *crossings,
                       uint8_t *reached, int64_t *work)
 {
     double distance = distance_between(nodes->positions + 3 * to, nodes->positions + 3 * from);
@@ -70,15 +60,6 @@ static int trace_step(const Surface *surface, const NodePlaces *places, const No
                              reached, work);
 }
 
-static int add_point(int64_t face, const double *barycentric, Crossings *points)
-{
-    CHECK(points->count, points->room);
-    points->faces[points->count] = face;
-    memcpy(points->barycentric + 3 * points->count, barycentric, 3 * sizeof *barycentric);
-    points->count++;
-    return OK;
-}
-
 /* The steps of which traces are asked for, and what was found. */
 typedef struct {
     int64_t m;
@@ -93,7 +74,7 @@ typedef struct {
    It returns early when the traces have passed `most_work` faces, or when the room that is left may
    not suffice for another trace; `done` is raised to the number of steps that have been traced. */
 EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                         int64_t c, const StepTraces *steps, Crossings *points,
+                         int64_t c, const StepTraces *steps, PointList *points,
                          int64_t most_work, int64_t *done)
 {
     int64_t needed = places->most_faces + 2, work = 0;
@@ -106,10 +87,10 @@ EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const
         uint8_t *reached = steps->reached + *done;
         CHECK(from, nodes->n);
         CHECK(to, nodes->n);
-        TRY(add_point(places->faces[from], places->barycentric + 3 * from, points));
+        TRY(append_point(places->faces[from], places->barycentric + 3 * from, points));
         TRY(trace_step(surface, places, nodes, nodes->n / c, from, to, points, reached, &work));
         if (*reached)
-            TRY(add_point(places->faces[to], places->barycentric + 3 * to, points));
+            TRY(append_point(places->faces[to], places->barycentric + 3 * to, points));
         else
             points->count = first;
         steps->point_counts[*done] = points->count - first;
@@ -117,21 +98,8 @@ EXPORTED int trace_steps(const Surface *surface, const NodePlaces *places, const
     return OK;
 }
 
-/* The polyline of a curve of n nodes, and what is known about it. */
-typedef struct {
-    const uint8_t *is_control;   /* (n) control points, which need not lie strictly inside faces */
-    const uint8_t *kept;         /* (n) nodes after which the former polyline is kept */
-    const int64_t *former_index; /* (n) index of each node in the former polyline, ascending */
-    int64_t former_count;
-    const int64_t *former_faces; /* (former_count) faces of the segments of the former polyline */
-    const double *former_places; /* (former_count, 3) coordinates of its points in them */
-    int64_t before;              /* number of points that earlier calls have found */
-    int64_t *node_index;         /* (n) becomes the index of each node in the polyline */
-    uint8_t *lost;               /* (n) becomes whether the trace to the next node failed */
-} TracedPolyline;
-
 /* Expresses a point of a polyline in another face that contains it. */
-static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, Crossings *points)
+static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, PointList *points)
 {
     double changed[3], *place = points->barycentric + 3 * k;
     TRY(change_face(mesh, points->faces[k], place, face, changed));
@@ -143,7 +111,7 @@ static int move_to_face(const Mesh *mesh, int64_t face, int64_t k, Crossings *po
 /* Reverses a trace that has come from `start_face`, whose last point is that of index `first`, and
    whose crossings follow. In the reverse, a crossing belongs to the face that the trace left there,
    and the last point to the face in which the trace ended. */
-static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Crossings *points)
+static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, PointList *points)
 {
     int64_t *faces = points->faces;
     double *places = points->barycentric;
@@ -165,24 +133,19 @@ static int reverse_trace(const Mesh *mesh, int64_t start_face, int64_t first, Cr
     return OK;
 }
 
-static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, Crossings *points)
+static int copy_piece(const TracedPolyline *polyline, int64_t n, int64_t i, PointList *points)
 {
     int64_t first = polyline->former_index[i];
     int64_t end = i + 1 < n ? polyline->former_index[i + 1] : polyline->former_count;
     CHECK(first, polyline->former_count);
     CHECK(end, polyline->former_count + 1);
     for (int64_t k = first; k < end; k++)
-        TRY(add_point(polyline->former_faces[k], polyline->former_places + 3 * k, points));
+        TRY(append_point(polyline->former_faces[k], polyline->former_places + 3 * k, points));
     return OK;
 }
 
-/* Traces a polyline through the nodes of a curve, from the node of index `done` on.
-
-   Where a trace fails, the polyline has no points between the two nodes. The call returns early
-   when the traces have passed `most_work` faces, or when the room that is left may not suffice for
-   another piece; `done` is raised to the number of nodes that have been passed. */
-EXPORTED int trace_polyline(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
-                            const TracedPolyline *polyline, Crossings *points, int64_t most_work,
+int trace_polyline(const Surface *surface, const NodePlaces *places, const Nodes *nodes,
+                            const TracedPolyline *polyline, PointList *points, int64_t most_work,
                             int64_t *done)
 {
     int64_t n = nodes->n, work = 0;
@@ -199,7 +162,7 @@ EXPORTED int trace_polyline(const Surface *surface, const NodePlaces *places, co
             TRY(copy_piece(polyline, n, i, points));
             continue;
         }
-        TRY(add_point(places->faces[i], places->barycentric + 3 * i, points));
+        TRY(append_point(places->faces[i], places->barycentric + 3 * i, points));
         if (!has_step) continue;
         /* A trace must start strictly inside a face. So traces from control points run backward,
            and no trace joins two control points. */

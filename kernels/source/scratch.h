@@ -29,4 +29,12 @@ static inline int take_integers(Scratch *scratch, int64_t count, int64_t **array
     return OK;
 }
 
+static inline int take_bytes(Scratch *scratch, int64_t count, uint8_t **array)
+{
+    double *taken = NULL;
+    TRY(take(scratch, count / 8 + 1, &taken));
+    *array = (uint8_t *)(void *)taken;
+    return OK;
+}
+
 #endif

@@ -1,6 +1,5 @@
 /* Points and segments of the traces between the nodes of curves. */
-#include "mesh.h"
-#include "vectors.h"
+#include "points.h"
 
 /* The traces from n nodes to the next ones. A trace that failed has no points. */
 typedef struct {
@@ -30,30 +29,14 @@ EXPORTED int measure_traces(const Mesh *mesh, const Traces *traces)
         TRY(points_of(traces, i, &first, &end));
         double arc = 0.0, before[3] = {0.0, 0.0, 0.0};
         for (int64_t k = first; k < end; k++) {
-            const double *corners[3];
             double position[3];
-            TRY(corners_of(mesh, traces->faces[k], corners));
-            interpolate(corners, traces->barycentric + 3 * k, position);
+            TRY(position_in_face(mesh, traces->faces[k], traces->barycentric + 3 * k, position));
             if (k > first) arc += distance_between(position, before);
             traces->arcs[k] = arc;
             for (int axis = 0; axis < 3; axis++) before[axis] = position[axis];
         }
     }
     return OK;
-}
-
-/* Index of the point of a trace at which the segment begins that contains an arc length. */
-static int64_t segment_at(const double *arcs, int64_t first, int64_t end, double wanted)
-{
-    int64_t low = first, high = end - 1; /* the segment begins at `low` or later, before `high` */
-    while (high - low > 1) {
-        int64_t middle = low + (high - low) / 2;
-        if (arcs[middle] <= wanted)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
 }
 
 /* Finds q points at shares of the traces from nodes, strictly inside faces.

@@ -296,7 +296,7 @@ typedef struct {
 /* Adds a crossing to those of a trace from index `first` on. Of consecutive crossings at one
    vertex, only the last is kept. */
 static int add_crossing(const Mesh *mesh, const Crossing *crossing, int64_t first,
-                        int64_t *last_vertex, Crossings *crossings)
+                        int64_t *last_vertex, PointList *crossings)
 {
     int64_t face = crossing->beyond / 3, vertex;
     double barycentric[3];
@@ -312,7 +312,7 @@ static int add_crossing(const Mesh *mesh, const Crossing *crossing, int64_t firs
 }
 
 int trace_to(const Mesh *mesh, const uint8_t *folded, int64_t most_faces,
-             const TraceRequest *request, Crossings *crossings, uint8_t *reached, int64_t *passed)
+             const TraceRequest *request, PointList *crossings, uint8_t *reached, int64_t *passed)
 {
     int64_t face = request->start_face, end_face = request->end_face;
     const double *corners[3];
@@ -363,7 +363,7 @@ int trace_to(const Mesh *mesh, const uint8_t *folded, int64_t most_faces,
    It returns early when the traces have passed `most_work` faces, or when the room that is left may
    not suffice for another trace; `done` is raised to the number of pairs that have been traced. */
 EXPORTED int trace_between(const Mesh *mesh, const uint8_t *folded, int64_t most_faces, int64_t m,
-                           const TracePairs *pairs, Crossings *crossings, int64_t most_work,
+                           const TracePairs *pairs, PointList *crossings, int64_t most_work,
                            int64_t *done)
 {
     if (crossings->room < most_faces) return ARRAY_TOO_SMALL;

@@ -2,7 +2,7 @@
 #ifndef NICMM_TRACING_H
 #define NICMM_TRACING_H
 
-#include "mesh.h"
+#include "points.h"
 
 typedef struct {
     double least_inside; /* least barycentric coordinate of a point strictly inside its face */
@@ -30,17 +30,9 @@ typedef struct {
     double fold_margin;   /* length allowed before backward parts over folds are subtracted */
 } TraceRequest;
 
-/* Crossings of traces, in order. */
-typedef struct {
-    int64_t room;        /* number of crossings that the arrays can hold */
-    int64_t count;       /* number of crossings that they hold */
-    int64_t *faces;      /* (room) the face that the trace enters at each crossing */
-    double *barycentric; /* (room, 3) the crossing, in this face */
-} Crossings;
-
 /* Traces from one point to another. Its crossings are added if it reaches its end; there has to be
    room for `most_faces` of them. `passed` is raised by the number of faces passed. */
 int trace_to(const Mesh *mesh, const uint8_t *folded, int64_t most_faces,
-             const TraceRequest *request, Crossings *crossings, uint8_t *reached, int64_t *passed);
+             const TraceRequest *request, PointList *crossings, uint8_t *reached, int64_t *passed);
 
 #endif

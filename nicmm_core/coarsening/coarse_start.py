@@ -18,7 +18,7 @@ from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..network.single_pass import infer
 from ..progress import checkpoint, placed, subrange
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
-from ..relaxation.noded_curve import NodedCurve, noded
+from ..relaxation.discrete_curve import DiscreteCurve, noded
 from ..request import Request, renumbered_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import curve_on_fine_mesh, nodes_on_fine_mesh
@@ -52,7 +52,7 @@ class CoarseStart:
 
     Attributes
     ----------
-    curve : NodedCurve or SurfaceCurve
+    curve : DiscreteCurve or SurfaceCurve
         A simple curve on the fine mesh.
     visited : (k,) int array
         Indices of the control points in the request, in the order visited.
@@ -60,7 +60,7 @@ class CoarseStart:
         Number of breaking vertices of the level set on the coarse mesh, if there was one.
     """
 
-    curve: NodedCurve | SurfaceCurve
+    curve: DiscreteCurve | SurfaceCurve
     visited: IntArray
     breaking_vertices: int = 0
 

@@ -17,7 +17,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.noded_curve import NodedCurve, noded_curve
+from ..relaxation.discrete_curve import DiscreteCurve, place_nodes
 from ..relaxation.simple_curve import simple_curve
 from .coarse_mesh import CoarseMesh
 
@@ -58,7 +58,7 @@ def curve_on_fine_mesh(
     """
     for count in NODES:
         checkpoint()
-        coarse_curve = noded_curve(coarse_surface, curve, count)
+        coarse_curve = place_nodes(coarse_surface, curve, count)
         result = nodes_on_fine_mesh(surface, coarse, coarse_curve, controls)
         if result is not None:
             return result.surface_curve(surface.mesh)
@@ -66,8 +66,8 @@ def curve_on_fine_mesh(
 
 
 def nodes_on_fine_mesh(
-    surface: CurveSurface, coarse: CoarseMesh, coarse_curve: NodedCurve, controls: SurfacePoints
-) -> NodedCurve | None:
+    surface: CurveSurface, coarse: CoarseMesh, coarse_curve: DiscreteCurve, controls: SurfacePoints
+) -> DiscreteCurve | None:
     """The curve on the fine mesh through the nodes of a coarse curve; None if it is not simple.
 
     Only the nodes of `coarse_curve` are used. The other parameters are those of

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from ..relaxation.curve_energies import energies_of, scaled_bending
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.noded_curve import NodedCurve
-from ..relaxation.noded_energies import energies_of, scaled_bending
+from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.relaxing import RelaxationConfig, Relaxed
 from .comparison import distinct_by_energy, is_apart
 
@@ -100,9 +100,9 @@ class Attempts:
     _relaxed_before: int = 0  # number of results when the last search ended
 
     @property
-    def curves(self) -> list[NodedCurve]:
+    def curves(self) -> list[DiscreteCurve]:
         """The relaxed curves."""
-        return [each.noded_curve for each in self.relaxed]
+        return [each.discrete_curve for each in self.relaxed]
 
     @property
     def energies(self) -> list[float]:
@@ -157,7 +157,7 @@ class Attempts:
 
     def should_try_another_course(self, first: int) -> bool:
         """Whether the next course of a search is worthwhile, whose results begin at an index."""
-        least = min(scaled_bending(each.noded_curve) for each in self.relaxed[first:])
+        least = min(scaled_bending(each.discrete_curve) for each in self.relaxed[first:])
         mean = self._work_of_relaxations / len(self.relaxed)
         return least > STRONGLY_BENT and self._is_affordable(mean + RESERVED)
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.surface_points import joined
 from ..relaxation.curve_nodes import CurveSurface
+from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.elastic_energy import node_bending
-from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.simple_curve import simple_curve
 from ..request import Request
 
@@ -64,12 +64,12 @@ class BentPart:
     length: float
 
 
-def bent_part(curve: NodedCurve, tried: Sequence[FloatArray]) -> BentPart | None:
+def bent_part(curve: DiscreteCurve, tried: Sequence[FloatArray]) -> BentPart | None:
     """Select the part of a curve in which it bends most.
 
     Parameters
     ----------
-    curve : NodedCurve
+    curve : DiscreteCurve
     tried : sequence of (3,) float arrays
         Positions near which no part is selected.
 
@@ -108,7 +108,7 @@ def bent_part(curve: NodedCurve, tried: Sequence[FloatArray]) -> BentPart | None
     return BentPart(nodes.positions[middle], passed % count, int(first), int(last), length)
 
 
-def request_for_part(request: Request, curve: NodedCurve, part: BentPart) -> Request:
+def request_for_part(request: Request, curve: DiscreteCurve, part: BentPart) -> Request:
     """The request for other courses of a part, with the tension of the whole curve."""
     return replace(
         request,
@@ -121,21 +121,21 @@ def request_for_part(request: Request, curve: NodedCurve, part: BentPart) -> Req
 
 
 def with_part(
-    surface: CurveSurface, curve: NodedCurve, part: BentPart, course: NodedCurve
-) -> NodedCurve | None:
+    surface: CurveSurface, curve: DiscreteCurve, part: BentPart, course: DiscreteCurve
+) -> DiscreteCurve | None:
     """Replace a part of a curve by another course.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : NodedCurve
+    curve : DiscreteCurve
     part : BentPart
-    course : NodedCurve
+    course : DiscreteCurve
         An open curve through the nodes that the part must pass.
 
     Returns
     -------
-    NodedCurve or None
+    DiscreteCurve or None
         A simple curve through the control points in the same order; None if it would cross itself.
     """
     places, count = curve.nodes.places, len(curve.nodes.positions)

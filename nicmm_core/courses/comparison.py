@@ -11,7 +11,7 @@ from ..geometry.array_types import FloatArray
 from ..geometry.curve import SurfaceCurve, resample
 from ..geometry.mesh import Mesh
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.noded_curve import NodedCurve
+from ..relaxation.discrete_curve import DiscreteCurve
 
 SAME_COURSE = 0.02
 """Distance, relative to the diagonal of the mesh, up to which two courses count as the same."""
@@ -21,7 +21,7 @@ SAMPLES = 500
 
 
 def distinct_by_energy(
-    surface: CurveSurface, curves: Sequence[NodedCurve], energies: Sequence[float]
+    surface: CurveSurface, curves: Sequence[DiscreteCurve], energies: Sequence[float]
 ) -> list[int]:
     """Indices of curves by ascending energy, without those that equal a curve of less energy."""
     chosen: list[int] = []
@@ -31,7 +31,7 @@ def distinct_by_energy(
     return chosen
 
 
-def is_apart(surface: CurveSurface, curve: NodedCurve, others: Sequence[NodedCurve]) -> bool:
+def is_apart(surface: CurveSurface, curve: DiscreteCurve, others: Sequence[DiscreteCurve]) -> bool:
     """Whether a curve is somewhere apart from each of the others."""
     limit = SAME_COURSE * surface.mesh.diagonal
     positions = curve.nodes.positions

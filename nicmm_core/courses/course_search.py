@@ -17,10 +17,10 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints, joined
 from ..maps.guidance import length_factor
 from ..progress import checkpoint, subrange
+from ..relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies
 from ..relaxation.even_nodes import resampled
-from ..relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from .comparison import SAME_COURSE
 from .course_candidates import candidates
 from .hop_graph import HopGraph, with_control_points
@@ -64,10 +64,10 @@ seem to bend less than they do.
 MOST_DOUBLINGS = 2
 """Number of times that the nodes of courses are doubled at most."""
 
-OF_CANDIDATES = (TogetherConfig(iterations=8),)
-OF_DOUBLED = (TogetherConfig(iterations=6),)
-OF_RECOMBINED = (TogetherConfig(iterations=8),)
-OF_FINALISTS = (TogetherConfig(iterations=6), TogetherConfig(iterations=8))
+OF_CANDIDATES = (BatchConfig(iterations=8),)
+OF_DOUBLED = (BatchConfig(iterations=6),)
+OF_RECOMBINED = (BatchConfig(iterations=8),)
+OF_FINALISTS = (BatchConfig(iterations=6), BatchConfig(iterations=8))
 """Passes of the joint relaxation of all candidates, of candidates with twice as many nodes, of
 recombined courses, and of the finalists.
 
@@ -189,14 +189,14 @@ def _relaxed(
     nodes: Nodes,
     visit: IntArray,
     smoothness: float,
-    passes: tuple[TogetherConfig, ...],
+    passes: tuple[BatchConfig, ...],
 ) -> tuple[Nodes, IntArray]:
     """The curves relaxed in one or more passes, and the control point at each node."""
     for number, config in enumerate(passes):
         if number:
             nodes, visit = _resampled(surface, nodes, visit, 1)
         with subrange(number / len(passes), (number + 1) / len(passes)):
-            nodes = relax_together(surface, nodes, visit >= 0, smoothness, config)
+            nodes = relax_batch(surface, nodes, visit >= 0, smoothness, config)
     return nodes, visit
 
 

@@ -18,6 +18,7 @@ from ..geometry.crossings import meeting_segments
 from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside, trace_from
 from ..progress import checkpoint
+from ..relaxation.batch_relaxation import BatchConfig, relax_batch
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.even_nodes import resampled
 from ..relaxation.node_traces import (
@@ -26,7 +27,6 @@ from ..relaxation.node_traces import (
     traced_segments,
     traces_between_nodes,
 )
-from ..relaxation.relaxing_together import TogetherConfig, relax_together
 from .hop_graph import CourseGraph, tangents
 from .leg_routes import Routes, junction_cost, without_rounding_errors
 
@@ -42,7 +42,7 @@ NODES, FEWEST_SHARED = 96, 48
 In addition, every leg gets `FEWEST_NODES`, so with many legs a course has more nodes.
 """
 
-SEPARATING = TogetherConfig(iterations=2, contact=False, longest_move=2.0)
+SEPARATING = BatchConfig(iterations=2, contact=False, longest_move=2.0)
 """Settings with which routes are relaxed before the test; their end directions are kept."""
 
 CROSSING = 0.1
@@ -154,7 +154,7 @@ def curves_on_routes(
     nodes = nodes_at(surface, SurfacePoints(faces, barycentric), False, len(paths))
     clamped = np.zeros((len(paths), count), dtype=bool)
     clamped[:, [0, 1, -2, -1]] = True
-    nodes = relax_together(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
+    nodes = relax_batch(surface, nodes, clamped.ravel(), smoothness, SEPARATING)
     numbers = [len(leg.cells) for leg in routes]
     return LegCurves(
         surface,

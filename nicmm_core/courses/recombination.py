@@ -15,10 +15,10 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import lengths
 from ..progress import checkpoint
+from ..relaxation.batch_relaxation import curves_of
 from ..relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
 from ..relaxation.elastic_energy import comparable_energies, comparable_terms
 from ..relaxation.node_traces import places_along, traces_between_nodes
-from ..relaxation.relaxing_together import curves_of
 from .comparison import SAME_COURSE
 from .hop_graph import tangents
 from .leg_combinations import (

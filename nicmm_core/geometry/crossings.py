@@ -29,16 +29,11 @@ def crossing_segments(all_faces: IntArray, polyline: SurfacePoints, closed: bool
     closed : bool
         Whether the last point is joined to the first.
     """
-    n = len(polyline)
-    n_segments = n if closed else n - 1
-    segment = np.arange(n_segments)
-    end = nicmm_kernels.segment_ends(all_faces, *polyline.for_kernels, segment)
-    start = polyline.barycentric[:n_segments, :2]
-    first, second = meeting_segments(polyline.faces[:n_segments], start, end).T
-    apart = np.abs(first - second)
-    neighbours = (apart == 1) | (closed & (apart == n_segments - 1))
-    inside = np.stack([first[~neighbours], second[~neighbours]], axis=1)
-    return np.concatenate([inside, _vertices_passed_twice(all_faces, polyline, n_segments)])
+    # Without checkpoints: a curve is tested even after its relaxation has been cancelled, and a
+    # checkpoint would then raise an error.
+    return nicmm_kernels.polyline_crossings(
+        np.ascontiguousarray(all_faces), *polyline.for_kernels, closed, TOUCHING, lambda: None
+    )
 
 
 def meeting_segments(group: IntArray, start: FloatArray, end: FloatArray) -> IntArray:
@@ -51,8 +46,6 @@ def meeting_segments(group: IntArray, start: FloatArray, end: FloatArray) -> Int
     start, end : (s, 2) float array
         First two barycentric coordinates of the ends of each segment in this face.
     """
-    # Without checkpoints: a curve is tested even after its relaxation has been cancelled, and a
-    # checkpoint would then raise an error.
     return nicmm_kernels.meeting_segments(
         np.ascontiguousarray(group, np.int64),
         np.ascontiguousarray(start),
@@ -60,19 +53,3 @@ def meeting_segments(group: IntArray, start: FloatArray, end: FloatArray) -> Int
         TOUCHING,
         lambda: None,
     )
-
-
-def _vertices_passed_twice(
-    all_faces: IntArray, polyline: SurfacePoints, n_segments: int
-) -> IntArray:
-    """Pairs of segments of different strands that begin at the same vertex, shape (p, 2)."""
-    n = len(polyline)
-    here = polyline.barycentric > 0.0
-    place = np.flatnonzero(here.sum(axis=1) == 1)
-    vertex = all_faces[polyline.faces[place]][here[place]]
-    order = np.argsort(vertex, kind="stable")
-    first, second = place[order[:-1]], place[order[1:]]
-    apart = second - first
-    again = (vertex[order[:-1]] == vertex[order[1:]]) & (apart > 1)
-    again &= (n_segments < n) | (apart < n - 1)
-    return np.minimum(np.stack([first, second], axis=1)[again], n_segments - 1)

@@ -1,4 +1,4 @@
-"""Computes the energy of a curve, its Gauss–Newton system, and damped steps of its nodes.
+"""Computes energies of curves.
 
 The energy is that of Eq. 6 and 7 for a φ that is exactly the distance to its zero set. Then
 |∇φ| = 1, the level-set term vanishes, and the integrals reduce to integrals along the curve:
@@ -13,24 +13,20 @@ least a few times τ, which matters for short curves. In an obstacle φ_fea > 1,
 tension. In a lane, a region painted for alignment, φ_fea < 1. The energy must not reward length
 there, or the curve would buckle in the lane to gain length. So ds is held constant in this term,
 and only the position of the curve counts. Where strands must not cross, a contact term keeps them
-apart (`strand_contact`).
+apart.
 
-The unknowns are the moves of the nodes along their conormals. The residuals of a node depend only
-on the node and its two neighbours, so the Gauss–Newton matrix has two bands on each side and a step
-is cheap.
+The kernels minimise E (`levenberg_marquardt.c`). Their unknowns are the moves of the nodes along
+their conormals. The residuals of a node depend only on the node and its two neighbours, so the
+Gauss–Newton matrix has two bands on each side and a step is cheap. Contact adds to the diagonal of
+the matrix only.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-import nicmm_kernels
 import numpy as np
 
-from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import FloatArray
 from .curve_nodes import CurveSurface, Nodes
-from .strand_contact import Contacts, contacts_between
 
 OVER_TENSION = 4.0
 """Multiple of τ added to τ_fea, so that short curves follow a map too.
@@ -40,67 +36,10 @@ OVER_TENSION = 4.0
 half the radius of a circle of the same length; long curves hardly change.
 """
 
-CONTACT = 10.0
-"""Contact energy of a curve whose strands touch everywhere, relative to its energy without maps."""
-
-
-@dataclass(frozen=True)
-class Balance:
-    """Weights of the energy terms, which change from step to step but not within a step.
-
-    Attributes
-    ----------
-    tension : float
-        τ, in 1/length².
-    contact : float
-        Weight of the contacts of a node, in 1/length; 0 where strands may cross.
-    feature : float
-        τ_fea, in 1/length²; 0 without a map.
-    held : (n,) float array or None
-        ds at each node, held constant in the term of lanes; None without a map.
-    """
-
-    tension: float
-    contact: float
-    feature: float = 0.0
-    held: FloatArray | None = None
-
-    @property
-    def for_kernels(self) -> nicmm_kernels.Weights:
-        """The weights as compiled kernels read them."""
-        return nicmm_kernels.Weights(self.tension, self.contact, self.feature, self.held)
-
-
-def energy_rules(
-    smoothness: float, apart: bool, tautness: float = 1.0
-) -> nicmm_kernels.EnergyRules:
-    """How the terms are balanced; see `balance`."""
-    return nicmm_kernels.EnergyRules(smoothness, tautness, OVER_TENSION, CONTACT if apart else 0.0)
-
-
-def balance(
-    surface: CurveSurface, nodes: Nodes, smoothness: float, apart: bool, tension_factor: float = 1.0
-) -> Balance:
-    """Compute the weights of the energy terms for a curve.
-
-    Parameters
-    ----------
-    surface : CurveSurface
-    nodes : Nodes
-    smoothness : float
-        Divisor of the tension and of the weight of a map.
-    apart : bool
-        Whether strands are kept apart.
-    tension_factor : float
-        Additional factor of the tension only.
-    """
-    rules = energy_rules(smoothness, apart, tension_factor)
-    return Balance(*nicmm_kernels.balance(surface.for_kernels, nodes.for_kernels, rules))
-
 
 def bending_energy(nodes: Nodes) -> float:
     """∮ κ_g² ds of one curve, in 1/length."""
-    return float(curve_bending(nodes)[0])
+    return float(node_bending(nodes).sum())
 
 
 def node_bending(nodes: Nodes) -> FloatArray:
@@ -108,30 +47,9 @@ def node_bending(nodes: Nodes) -> FloatArray:
     return nodes.angles**2 / nodes.ds
 
 
-def curve_bending(nodes: Nodes) -> FloatArray:
-    """∮ κ_g² ds of each curve, (c,), in 1/length."""
-    return nodes.by_curve(node_bending(nodes)).sum(axis=1)
-
-
 def feature_energy(nodes: Nodes) -> float:
     """∮ φ_fea² ds of one curve, in units of length."""
     return float((nodes.phi_fea**2 * nodes.ds).sum())
-
-
-def elastic_energy(nodes: Nodes, weights: Balance, contacts: Contacts | None = None) -> float:
-    """E of one curve, with the contact term if its weight is not zero.
-
-    Contacts are computed unless they are given.
-    """
-    found = _contacts(nodes, weights, contacts)
-    return nicmm_kernels.elastic_energy(nodes.for_kernels, weights.for_kernels, found)
-
-
-def _contacts(nodes: Nodes, weights: Balance, given: Contacts | None) -> Contacts | None:
-    """The contacts of a curve; None if they have no weight."""
-    if weights.contact == 0.0:
-        return None
-    return contacts_between(nodes) if given is None else given
 
 
 def comparable_energies(
@@ -184,92 +102,3 @@ def comparable_terms(
     excess = nodes.phi_fea**2 - 1.0
     energy += weight * np.maximum(excess, 0.0) * ds
     return energy, np.minimum(excess, 0.0) * ds, scale * weight
-
-
-def energy_scale(nodes: Nodes, weights: Balance, energy: float) -> float:
-    """A positive value that decreases of the energy of a curve are compared with.
-
-    It is the energy itself unless there is a map: the term of a lane is negative. Then it is the
-    energy without maps and contact.
-    """
-    if weights.held is None:
-        return energy
-    return elastic_energy(nodes, Balance(weights.tension, 0.0))
-
-
-def shortest_step(surface: CurveSurface) -> float:
-    """Least length of a step by which the tension is divided, in mesh units."""
-    return tolerances.SAME_POSITION * surface.mesh.diagonal
-
-
-def _no_pairs() -> IntArray:
-    return np.zeros((0, 2), dtype=np.int64)
-
-
-def _no_entries() -> FloatArray:
-    return np.zeros((3, 0))
-
-
-@dataclass(frozen=True)
-class ElasticSystem:
-    """Half the derivatives of the energy by moves of the nodes along their conormals.
-
-    The first derivatives are the slope; the Gauss–Newton matrix approximates the second ones.
-
-    Attributes
-    ----------
-    bands : (3, n) float array
-        The matrix without contact: symmetric, with two cyclic bands on each side. Column i has the
-        entries (i, i), (i, i + 1) and (i, i + 2), with indices modulo n.
-    slope : (n,) float array
-        Half the derivative of the energy by the move of each node.
-    pairs : (p, 2) int array
-        Pairs (i, j) of nodes in contact.
-    pair_entries : (3, p) float array
-        Contributions of contact to the entries (i, i), (i, j) and (j, j) of the matrix.
-    """
-
-    bands: FloatArray
-    slope: FloatArray
-    pairs: IntArray = field(default_factory=_no_pairs)
-    pair_entries: FloatArray = field(default_factory=_no_entries)
-
-
-def elastic_system(
-    surface: CurveSurface, nodes: Nodes, weights: Balance, contacts: Contacts | None = None
-) -> ElasticSystem:
-    """Assemble the Gauss–Newton system; the residuals are the square roots of the energy's terms.
-
-    Contacts are computed unless they are given.
-    """
-    found = _contacts(nodes, weights, contacts)
-    bands, slope, entries = nicmm_kernels.elastic_system(
-        surface.for_kernels, nodes.for_kernels, weights.for_kernels, shortest_step(surface), found
-    )
-    return ElasticSystem(bands, slope, _no_pairs() if found is None else found.pairs, entries)
-
-
-def damped_step(system: ElasticSystem, free: BoolArray, damping: float) -> FloatArray:
-    """Moves of the free nodes along conormals that lower the linearised energy, shape (n,).
-
-    A curve does not move if its linearisation is zero or not finite, as where nodes coincide.
-
-    Parameters
-    ----------
-    system : ElasticSystem
-    free : (n,) bool array
-        Which nodes may move; at least one.
-    damping : float
-        It is added to the diagonal of the matrix, relative to the greatest diagonal entry of a free
-        node.
-    """
-    return nicmm_kernels.damped_step(
-        system.bands, system.slope, system.pairs, system.pair_entries, ~free, damping
-    )
-
-
-def predicted_decrease(system: ElasticSystem, move: FloatArray) -> float:
-    """Decrease of the linearised energy by given moves along the conormals, (n,)."""
-    return nicmm_kernels.predicted_decrease(
-        system.bands, system.slope, system.pairs, system.pair_entries, move
-    )

@@ -19,7 +19,7 @@ NODES_PER_RADIAN = 1.0
 SHORT_MOVE = 1e-3
 """Move, in mean distances between nodes, below which a node stays when nodes are respaced."""
 
-RULES = nicmm_kernels.SpacingRules(NODES_PER_RADIAN, SHORT_MOVE)
+SPACING = nicmm_kernels.SpacingRules(NODES_PER_RADIAN, SHORT_MOVE)
 
 LENGTH_WITHOUT_TRACE = 2.0
 """Assumed length of a step whose trace fails, relative to the distance between its nodes.
@@ -88,6 +88,6 @@ def _even_places(
         nodes.by_curve(fixed),
         nodes.closed,
         times,
-        RULES,
+        SPACING,
     )
     return (nodes.first[:, None] + at).ravel(), share.ravel()

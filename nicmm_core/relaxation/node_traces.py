@@ -1,7 +1,7 @@
 """Computes straight traces between the nodes of curves, without keeping a polyline.
 
 A failed trace leaves a gap, which is not an error here: whether a curve is simple is decided later,
-on the mesh on which it is returned (`noded_curve`).
+on the mesh on which it is returned (`discrete_curve`).
 """
 
 from __future__ import annotations

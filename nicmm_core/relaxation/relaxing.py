@@ -9,10 +9,9 @@ number of nodes increases from level to level. A start that bends little needs o
 fewer nodes would not resolve thin parts of the surface, and the curve would lose its shape there.
 If its energy is higher after that level than before, it is relaxed again on all levels.
 
-An iteration takes several steps of the nodes
-(`levenberg_marquardt`) and then retraces the curve. A node whose trace fails or would cross another
-trace stays where it was for that iteration, so the curve is simple after every iteration. A contact
-term repels strands.
+An iteration takes several steps of the nodes and then retraces the curve. A node whose trace fails
+or would cross another trace stays where it was for that iteration, so the curve is simple after
+every iteration. A contact term repels strands.
 
 For a curve that has nearly converged, such as one with a dragged control point, tracing can be
 deferred: the nodes move without contact, and the curve is traced after convergence. If it then
@@ -21,40 +20,30 @@ crosses itself, it is relaxed again from the start, with a trace in every iterat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-import numpy as np
+from nicmm_kernels import CurveRelaxation, LevelOutcome, LevelRules, LevelState, RelaxationRules
 
-from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray
+from ..geometry.crossings import TOUCHING
 from ..geometry.curve import SurfaceCurve
-from ..progress import CancelledError
+from ..progress import CancelledError, checkpoint
 from ..status import Status
-from .curve_nodes import CurveSurface, Nodes
-from .elastic_energy import balance, bending_energy, energy_scale, feature_energy
-from .levenberg_marquardt import (
-    DAMPING_FACTOR,
-    Linearised,
-    StepConfig,
-    Stepping,
-    Work,
-    less_damping,
-    linearised,
-    take_steps,
-)
-from .noded_curve import (
-    NodedCurve,
+from .curve_energies import energies_of, scaled_bending
+from .curve_nodes import CurveSurface
+from .discrete_curve import (
+    DiscreteCurve,
+    curve_from_kernels,
     is_simple,
-    noded_curve,
-    respaced,
-    retraced,
-    smoothed,
-    traced_through,
+    place_nodes,
+    placement_rules,
     without_short_segments,
 )
-from .noded_energies import energies_of, scaled_bending
-from .strand_contact import NearStrands
+from .elastic_energy import bending_energy, feature_energy
+from .node_traces import step_limits
+from .rules import relaxation_rules
 
 
 @dataclass(frozen=True)
@@ -65,8 +54,12 @@ class RelaxationConfig:
     ----------
     levels : tuple of int
         Number of nodes of each level, ascending.
-    stepping : StepConfig
-        Settings of the steps of an iteration.
+    steps : int
+        Greatest number of steps in an iteration.
+    longest_move : float
+        Trust radius of the linearised energy, in mean distances between neighbouring nodes. A move
+        of twice this length is taken if it lowers the energy further. Longer moves between two
+        traces would fold the curve where it bends.
     least_decrease : float
         Decrease of the energy in an iteration, relative to the bending energy, below which the last
         level has converged.
@@ -79,7 +72,8 @@ class RelaxationConfig:
     most_iterations : int
         Cap on the iterations of all attempts together.
     work : float
-        Cap on the `Work` of one attempt.
+        Cap on the moves of all nodes in one attempt, whether taken or only tried. On defective
+        surfaces few of them lower the energy.
     defer_tracing : bool
         Whether a first attempt traces the curve only after convergence.
     tension_factor : float
@@ -90,7 +84,8 @@ class RelaxationConfig:
     """
 
     levels: tuple[int, ...] = (128, 512)
-    stepping: StepConfig = field(default_factory=StepConfig)
+    steps: int = 8
+    longest_move: float = 2.0
     least_decrease: float = 2e-3
     least_decrease_before: float = 0.1
     spacing_ratio: float = 1.6
@@ -124,30 +119,6 @@ ACCEPTABLE = 80.0
 With the fewer nodes of the start, the energy of the same curve is slightly lower.
 """
 
-RELEASES = 2
-"""Number of times per level that held nodes are released after convergence."""
-
-HELD_TRIES = 1
-"""Number of times that an iteration is repeated, holding the nodes that could not be retraced."""
-
-NEGLIGIBLE_PREDICTION = 0.1
-"""Predicted decrease, relative to the least decrease, below which no step is tried.
-
-It is far below 1, because damping makes predictions too small.
-"""
-
-MOST_STALLED = 4
-"""Number of consecutive iterations without a new least energy after which a level ends.
-
-On folds and needles, respacing the nodes may raise the energy by more than the steps lower it.
-"""
-
-LEAST_BENDING = 2e-3
-"""Lower bound, as a share of the energy, on the bending energy used in the convergence test."""
-
-SMALL_MOVE = 0.1
-"""Greatest move that does not disturb the spacing, in mean distances between nodes."""
-
 
 @dataclass(frozen=True)
 class Relaxed:
@@ -157,7 +128,7 @@ class Relaxed:
     ----------
     curve : SurfaceCurve
         The relaxed curve, which is simple.
-    noded_curve : NodedCurve
+    discrete_curve : DiscreteCurve
         The same curve with its nodes.
     bending : float
         ∮ κ_g² ds, in 1/length.
@@ -169,13 +140,13 @@ class Relaxed:
         `CONVERGED`, `ITERATION_LIMIT` or `CANCELLED`; `UNRELAXED` if strands of the start are too
         close together to place nodes on it without contact. The curve is then the start itself.
     work : float
-        Number of moves of all nodes in all attempts, a measure of the duration (`Work`).
+        Number of moves of all nodes in all attempts, a measure of the duration.
     collided : bool
         Whether the curve crossed itself after an attempt with deferred tracing.
     """
 
     curve: SurfaceCurve
-    noded_curve: NodedCurve
+    discrete_curve: DiscreteCurve
     bending: float
     feature: float
     iterations: int
@@ -192,7 +163,7 @@ Movable = Callable[[FloatArray], BoolArray]
 
 def relax(
     surface: CurveSurface,
-    start: SurfaceCurve | NodedCurve,
+    start: SurfaceCurve | DiscreteCurve,
     smoothness: float,
     config: RelaxationConfig,
     watch: Watch | None = None,
@@ -203,7 +174,7 @@ def relax(
     Parameters
     ----------
     surface : CurveSurface
-    start : SurfaceCurve or NodedCurve
+    start : SurfaceCurve or DiscreteCurve
         A simple curve that passes through its control points in order.
     smoothness : float
         Divisor of the tension and of the weight of a map.
@@ -221,285 +192,159 @@ def relax(
     Relaxed
         The start itself, with the status `UNRELAXED`, if no simple relaxed curve was found.
     """
-    relaxing = _Relaxing(surface, smoothness, config, watch, movable)
+    task = _Task(surface, smoothness, config, watch, movable)
     if isinstance(start, SurfaceCurve):
-        first = noded_curve(surface, start, config.levels[0])
-        return relaxing.on_levels(config.levels, first, start)
-    whole = start.surface_curve(surface.mesh)
+        first = place_nodes(surface, start, config.levels[0])
+        return _relaxed(task, config.levels, first, start)
     if len(config.levels) == 1 or scaled_bending(start) >= config.fine_below:
-        return relaxing.on_levels(config.levels, start, whole)
-    fine = relaxing.on_levels(config.levels[-1:], start, whole)
+        return _relaxed(task, config.levels, start)
+    fine = _relaxed(task, config.levels[-1:], start)
     stopped = fine.status is Status.CANCELLED or fine.iterations >= config.most_iterations
-    before, after = energies_of(surface, [start, fine.noded_curve], smoothness)
-    good = after <= before or scaled_bending(fine.noded_curve) <= ACCEPTABLE
+    before, after = energies_of(surface, [start, fine.discrete_curve], smoothness)
+    good = after <= before or scaled_bending(fine.discrete_curve) <= ACCEPTABLE
     if stopped or (good and fine.status is not Status.UNRELAXED):
         return fine
-    again = relaxing.on_levels(config.levels, start, whole, fine)
-    one, other = energies_of(surface, [fine.noded_curve, again.noded_curve], smoothness)
+    again = _relaxed(task, config.levels, start)
+    one, other = energies_of(surface, [fine.discrete_curve, again.discrete_curve], smoothness)
     if other < one:
         return again
     status = Status.CANCELLED if again.status is Status.CANCELLED else fine.status
     return replace(fine, iterations=again.iterations, work=again.work, status=status)
 
 
-@dataclass(frozen=True)
-class _Relaxing:
-    """The arguments of `relax` that are the same for all attempts."""
+@dataclass
+class _Task:
+    """The arguments of `relax`, with the iterations and the work of all attempts so far."""
 
     surface: CurveSurface
     smoothness: float
     config: RelaxationConfig
     watch: Watch | None
     movable: Movable | None
+    iterations: int = 0
+    work: float = 0.0
 
-    def on_levels(
-        self,
-        levels: tuple[int, ...],
-        first: NodedCurve,
-        start: SurfaceCurve,
-        before: Relaxed | None = None,
-    ) -> Relaxed:
-        """Relax on some levels, at first without tracing the curve if that may be deferred.
+    def mask(self, relaxation: CurveRelaxation) -> BoolArray | None:
+        """Which of the present nodes may move, (n,); None for all."""
+        return None if self.movable is None else self.movable(relaxation.positions)
 
-        The result includes the iterations and the work of the attempt `before`.
-        """
-        config, surface = replace(self.config, levels=levels), self.surface
-        iterations, work, collided = 0, 0.0, False
-        if before is not None:
-            iterations, work = before.iterations, before.work
-            config = replace(config, work=config.work - work)
-        for traces_every_iteration in (False, True) if config.defer_tracing else (True,):
-            attempt = _Attempt(
+
+def _relaxed(
+    task: _Task,
+    levels: tuple[int, ...],
+    first: DiscreteCurve,
+    start: SurfaceCurve | None = None,
+) -> Relaxed:
+    """Relax on some levels, at first without tracing the curve if that may be deferred.
+
+    If that fails, the result is `start`, by default `first` itself.
+    """
+    most_work, collided = task.config.work - task.work, False
+    for is_traced in (False, True) if task.config.defer_tracing else (True,):
+        curve, status = _attempt(task, levels, first, is_traced, most_work)
+        good = curve is not None and is_simple(task.surface, curve)
+        if good or status is Status.CANCELLED:
+            break
+        collided = not is_traced
+    if curve is not None and good:
+        result = without_short_segments(task.surface.mesh, curve)
+    else:
+        curve = first
+        result = first.surface_curve(task.surface.mesh) if start is None else start
+        status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
+    bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
+    return Relaxed(result, curve, bending, feature, task.iterations, status, task.work, collided)
+
+
+def _attempt(
+    task: _Task, levels: tuple[int, ...], first: DiscreteCurve, is_traced: bool, most_work: float
+) -> tuple[DiscreteCurve | None, Status]:
+    """Relax a curve level by level; no curve if it cannot be traced."""
+    config, surface = task.config, task.surface
+    state = LevelState(
+        iterations=task.iterations,
+        most_iterations=min(task.iterations + config.iterations, config.most_iterations),
+        work=task.work,
+        most_work=task.work + most_work,
+    )
+    passes = [(count, 1.0) for count in levels]
+    if config.tension_factor > 1.0:
+        passes.insert(0, (levels[0], config.tension_factor))
+    traced, status = first.for_kernels, Status.CONVERGED
+    relaxation = CurveRelaxation(surface.for_kernels, traced)
+    try:
+        for number, (count, tautness) in enumerate(passes):
+            is_last = number == len(passes) - 1
+            least = config.least_decrease if is_last else config.least_decrease_before
+            rules = relaxation_rules(
                 surface,
-                self.smoothness,
-                config,
-                self.watch,
-                self.movable,
-                traces_every_iteration,
-                first,
-                iterations,
+                task.smoothness,
+                count,
+                config.longest_move,
+                contact=is_traced,
+                tautness=tautness,
+                steps=config.steps,
+                single=True,
             )
-            curve = attempt.run()
-            iterations, work = attempt.iterations, work + attempt.work.spent
-            good = curve is not None and is_simple(surface, curve)
-            if good or attempt.status is Status.CANCELLED:
+            level = level_rules(surface, count, config.spacing_ratio, least, is_traced)
+            relaxation.begin_level(rules, level)
+            traced = relaxation.arrays
+            status = _relax_on_level(task, relaxation, rules, level, state)
+            is_lost = state.outcome == LevelOutcome.LOST
+            if is_lost or not (is_traced or relaxation.trace(rules, level)):
+                return None, status
+            if status is not Status.CONVERGED:
                 break
-            collided = not traces_every_iteration
-        status = attempt.status
-        if curve is not None and good:
-            result = without_short_segments(surface.mesh, curve)
-        else:
-            curve, result = first, start
-            status = Status.CANCELLED if status is Status.CANCELLED else Status.UNRELAXED
-        bending, feature = bending_energy(curve.nodes), feature_energy(curve.nodes)
-        return Relaxed(result, curve, bending, feature, iterations, status, work, collided)
+            if is_last and state.outcome == LevelOutcome.STALLED:
+                status = Status.ITERATION_LIMIT
+    except CancelledError:
+        last = relaxation.arrays if is_traced else traced
+        return curve_from_kernels(surface, last), Status.CANCELLED
+    return curve_from_kernels(surface, relaxation.arrays), status
 
 
-def _unevenness(nodes: Nodes, control_nodes: IntArray) -> float:
-    """Greatest ratio of the longest to the shortest step on a leg."""
-    lengths = nodes.lengths
-    first = control_nodes[control_nodes < len(lengths)]
-    longest, shortest = np.maximum.reduceat(lengths, first), np.minimum.reduceat(lengths, first)
-    return float((longest / np.maximum(shortest, tolerances.TINY)).max())
+def level_rules(
+    surface: CurveSurface,
+    count: int,
+    spacing_ratio: float,
+    least_decrease: float,
+    is_traced: bool,
+) -> LevelRules:
+    """The rules of a level with about `count` nodes; see `RelaxationConfig` for the others."""
+    detour, fold_margin, _ = step_limits(surface)
+    return LevelRules(
+        placement_rules(surface),
+        detour,
+        fold_margin,
+        TOUCHING,
+        spacing_ratio,
+        least_decrease,
+        count,
+        is_traced,
+    )
 
 
-@dataclass(frozen=True)
-class _State:
-    """A curve between two iterations, with its linearised energy."""
-
-    curve: NodedCurve  # as last traced
-    here: Linearised
-    held: BoolArray  # (n,) which nodes must not move
-    stepping: Stepping
-    movable: BoolArray | None  # (n,) None if all nodes may move
-
-    @property
-    def free(self) -> BoolArray:
-        """Which nodes may move, (n,)."""
-        free = ~self.held if self.movable is None else self.movable & ~self.held
-        free[self.curve.control_nodes] = False
-        return free
-
-    @property
-    def energy_scale(self) -> float:
-        """Energy that decreases are compared with."""
-        return energy_scale(self.here.nodes, self.stepping.weights, self.here.energy)
-
-    @property
-    def predicted_decrease(self) -> float:
-        """Predicted decrease of the energy by the least damped step."""
-        return self.here.predicted_decrease(self.free, self.stepping.config)
-
-
-@dataclass(frozen=True)
-class _Iteration:
-    """The result of an iteration that lowered the energy."""
-
-    curve: NodedCurve  # as last traced
-    nodes: Nodes
-    energy: float
-    held: BoolArray  # (n,) which nodes could not move
-    damping: float  # for the next iteration
-    farthest: float  # greatest length of a move, in mean distances between nodes
-
-
-class _TraceError(Exception):
-    """The curve cannot be traced through its nodes."""
-
-
-class _Attempt:
-    """One pass through all levels, from one start."""
-
-    def __init__(
-        self,
-        surface: CurveSurface,
-        smoothness: float,
-        config: RelaxationConfig,
-        watch: Watch | None,
-        movable: Movable | None,
-        traces_every_iteration: bool,
-        start: NodedCurve,
-        iterations: int,
-    ) -> None:
-        self.surface, self.smoothness, self.config, self.watch = surface, smoothness, config, watch
-        self.movable, self.traces_every_iteration = movable, traces_every_iteration
-        self.iterations = iterations  # including those of earlier attempts
-        self.last_iteration = min(iterations + config.iterations, config.most_iterations)
-        self.work = Work(config.work)
-        self.status = Status.CONVERGED
-        self.traced = start  # the result if cancelled
-
-    def run(self) -> NodedCurve | None:
-        """Relax the curve level by level; None if it cannot be traced."""
-        config, curve = self.config, self.traced
-        passes = [(level, 1.0) for level in config.levels]
-        if config.tension_factor > 1.0:
-            passes.insert(0, (config.levels[0], config.tension_factor))
-        try:
-            for number, (level, tension_factor) in enumerate(passes):
-                last = number == len(passes) - 1
-                least = config.least_decrease if last else config.least_decrease_before
-                curve = self._level(curve, level, least, tension_factor)
-                if self.status is not Status.CONVERGED:
-                    break
-        except _TraceError:
-            return None
-        except CancelledError:
-            self.status = Status.CANCELLED
-            return self.traced
-        return curve
-
-    def _level(
-        self, curve: NodedCurve, level: int, least: float, tension_factor: float
-    ) -> NodedCurve:
-        """Iterate with a fixed number of nodes until the energy decreases by less than `least`."""
-        config, least_damping = self.config, self.config.stepping.least_damping(level)
-        damping = least_damping
-        curve = self.traced = self._respaced(curve, level)
-        nodes = curve.nodes
-        held = np.zeros(len(nodes.positions), dtype=bool)
-        releases = stalled = 0
-        least_energy = np.inf
-        while True:
-            state = self._state(curve, nodes, held, tension_factor)
-            before, least_scale = state.here.energy, LEAST_BENDING * state.energy_scale
-            scale = max(bending_energy(nodes), least_scale)
-            done = None
-            if state.predicted_decrease > NEGLIGIBLE_PREDICTION * least * scale:
-                if self.iterations == self.last_iteration or self.work.exhausted():
-                    self.status = Status.ITERATION_LIMIT
-                    break
-                self.iterations += 1
-                done = self._iteration(state, damping)
-                if done is None and self.work.exhausted():
-                    self.status = Status.ITERATION_LIMIT
-                    break
-            if done is not None:
-                curve, nodes, damping, held = done.curve, done.nodes, done.damping, held | done.held
-                self.traced = curve
-                share = 1.0 - (self.last_iteration - self.iterations) / config.iterations
-                if self.watch is not None and not self.watch(share, nodes.positions):
-                    self.status = Status.CANCELLED
-                    break
-                scale = max(bending_energy(nodes), least_scale)
-                stalled = 0 if done.energy < least_energy else stalled + 1
-                least_energy = min(least_energy, done.energy)
-                if stalled == MOST_STALLED:
-                    if level == config.levels[-1]:
-                        self.status = Status.ITERATION_LIMIT
-                    break
-            if done is None or before - done.energy <= least * scale:
-                if releases == RELEASES or not held.any():
-                    break
-                # Converged with held nodes: release them, as they may be able to move now.
-                releases, damping = releases + 1, least_damping
-                held = np.zeros(len(held), dtype=bool)
-            moved = done is not None and done.farthest > SMALL_MOVE
-            if moved and _unevenness(nodes, curve.control_nodes) > config.spacing_ratio:
-                curve = self.traced = self._respaced(self._traced(curve, nodes), level)
-                nodes = curve.nodes
-                held = np.zeros(len(nodes.positions), dtype=bool)
-        return self._traced(curve, nodes)
-
-    def _state(
-        self, curve: NodedCurve, nodes: Nodes, held: BoolArray, tension_factor: float
-    ) -> _State:
-        weights = balance(
-            self.surface, nodes, self.smoothness, self.traces_every_iteration, tension_factor
-        )
-        strands = NearStrands(nodes) if self.traces_every_iteration else None
-        stepping = Stepping(self.surface, weights, self.config.stepping, self.work, strands)
-        movable = None if self.movable is None else self.movable(nodes.positions)
-        return _State(curve, linearised(stepping, nodes), held, stepping, movable)
-
-    def _iteration(self, state: _State, damping: float) -> _Iteration | None:
-        """Take steps and retrace the curve, unless deferred; None if no step lowers the energy."""
-        free, stepping = state.free, state.stepping
-        tries = 0
-        while True:
-            moved = take_steps(stepping, state.here, free, damping)
-            if moved is None:
-                return None
-            curve, nodes, energy, stayed = state.curve, moved.nodes, moved.energy, moved.stayed
-            if self.traces_every_iteration:
-                curve, kept = retraced(self.surface, state.curve, nodes)
-                if kept.any() and tries < HELD_TRIES:
-                    free &= ~kept
-                    tries += 1
-                    continue
-                nodes, stayed = curve.nodes, stayed | kept
-                if kept.any():
-                    energy = stepping.energy(nodes)
-            if energy < state.here.energy:
-                damping = less_damping(moved, stepping.config)
-                return _Iteration(curve, nodes, energy, stayed, damping, moved.farthest)
-            damping = moved.damping * DAMPING_FACTOR
-
-    def _traced(self, curve: NodedCurve, nodes: Nodes) -> NodedCurve:
-        """The curve traced through its nodes if they have moved since the last trace."""
-        changed: NodedCurve | None = curve
-        if nodes is not curve.nodes:
-            # A straight trace may fail where the start has a bypass and nodes may not move.
-            still = None if self.movable is None else ~self.movable(nodes.positions)
-            changed = traced_through(self.surface, curve, nodes, still)
-        if changed is None:
-            raise _TraceError
-        return changed
-
-    def _respaced(self, curve: NodedCurve, level: int) -> NodedCurve:
-        """Respace the nodes if necessary, unless that would make strands touch."""
-        alike = abs(len(curve.nodes.positions) - level) <= len(curve.control_nodes)
-        if alike and _unevenness(curve.nodes, curve.control_nodes) <= self.config.spacing_ratio:
-            return curve
-        changed = respaced(self.surface, curve, level)
-        if self.traces_every_iteration and not is_simple(self.surface, changed):
-            return curve
-        return changed if alike else self._smoothed(curve, changed)
-
-    def _smoothed(self, coarse: NodedCurve, fine: NodedCurve) -> NodedCurve:
-        """Move fine nodes onto a smooth curve through the coarse ones, if that bends less."""
-        if len(fine.nodes.positions) < len(coarse.nodes.positions):
-            return fine
-        changed = smoothed(self.surface, coarse, fine)
-        less = bending_energy(changed.nodes) < bending_energy(fine.nodes)
-        return changed if less else fine
+def _relax_on_level(
+    task: _Task,
+    relaxation: CurveRelaxation,
+    rules: RelaxationRules,
+    level: LevelRules,
+    state: LevelState,
+) -> Status:
+    """Iterate with a fixed number of nodes until the energy has converged."""
+    state.outcome, state.releases, state.stalled = LevelOutcome.GOES_ON, 0, 0
+    state.damping, state.least_energy = rules.steps.least_damping, math.inf
+    while state.outcome == LevelOutcome.GOES_ON:
+        checkpoint()
+        relaxation.iterate(rules, level, task.mask(relaxation), state)
+        task.iterations, task.work = state.iterations, state.work
+        left = (state.most_iterations - state.iterations) / task.config.iterations
+        if (
+            state.has_moved
+            and task.watch is not None
+            and not task.watch(1.0 - left, relaxation.positions)
+        ):
+            return Status.CANCELLED
+    if state.outcome == LevelOutcome.LIMITED:
+        return Status.ITERATION_LIMIT
+    return Status.CONVERGED

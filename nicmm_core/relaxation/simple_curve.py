@@ -23,7 +23,7 @@ from ..geometry.surface_points import SurfacePoints, joined
 from ..geometry.tracing import strictly_inside
 from ..progress import checkpoint
 from .curve_nodes import CurveSurface, Nodes
-from .noded_curve import NodedCurve, noded, straight_traces
+from .discrete_curve import DiscreteCurve, noded, traced_polyline
 
 ROUNDS = 4
 """Rounds in which loops are removed; traces between the remaining nodes may cross again."""
@@ -46,7 +46,7 @@ def simple_curve(
     closed: bool,
     normals: FloatArray | None = None,
     neighbourhoods: Neighbourhoods | None = None,
-) -> NodedCurve | None:
+) -> DiscreteCurve | None:
     """Join nodes to a simple curve through control points.
 
     Parameters
@@ -66,7 +66,7 @@ def simple_curve(
 
     Returns
     -------
-    NodedCurve or None
+    DiscreteCurve or None
         A simple curve through the control points and most of the other nodes. None if a step cannot
         be traced or replaced by a path, or if crossings remain after `ROUNDS` rounds.
     """
@@ -96,12 +96,12 @@ def simple_curve(
 
 def _joined(
     surface: CurveSurface,
-    curve: NodedCurve,
+    curve: DiscreteCurve,
     normals: FloatArray | None,
     neighbourhoods: Neighbourhoods,
     numbers: IntArray,
     paths: Paths,
-) -> NodedCurve | None:
+) -> DiscreteCurve | None:
     """The curve through the nodes of a curve, simple or not; None if a gap remains.
 
     New paths along edges are added to `paths`, with the numbers of the nodes, (n,).
@@ -110,7 +110,7 @@ def _joined(
     traced = nodes
     if normals is not None:
         traced = Nodes(nodes.places, nodes.closed, nodes.positions, normals, nodes.phi_fea)
-    polyline, node_index, lost = straight_traces(surface, curve, traced)
+    polyline, node_index, lost = traced_polyline(surface, curve, traced)
     bypasses: dict[int, SurfacePoints] = {}
     for node in np.flatnonzero(lost).tolist():
         checkpoint()
@@ -128,7 +128,7 @@ def _joined(
     return _with_paths(curve, polyline, node_index, bypasses)
 
 
-def _outside_loops(curve: NodedCurve, crossings: IntArray) -> BoolArray:
+def _outside_loops(curve: DiscreteCurve, crossings: IntArray) -> BoolArray:
     """Which nodes, (n,), lie outside the loops between crossing segments, (p, 2).
 
     Of the two parts of a closed curve, the one with fewer nodes is the loop. A loop with a control
@@ -224,18 +224,20 @@ def _points_of_path(mesh: Mesh, ends: SurfacePoints, path: list[int]) -> Surface
 
 
 def _with_paths(
-    curve: NodedCurve,
+    curve: DiscreteCurve,
     polyline: SurfacePoints,
     node_index: IntArray,
     paths: dict[int, SurfacePoints],
-) -> NodedCurve:
+) -> DiscreteCurve:
     """The polyline with paths along edges in place of failed traces."""
     if not paths:
-        return NodedCurve(curve.nodes, curve.control_nodes, polyline, node_index)
+        return DiscreteCurve(curve.nodes, curve.control_nodes, polyline, node_index)
     bounds = np.append(node_index, len(polyline)).tolist()
     parts = [
         paths.get(node, polyline[slice(*bounds[node : node + 2])])
         for node in range(len(node_index))
     ]
     lengths = np.array([len(part) for part in parts])
-    return NodedCurve(curve.nodes, curve.control_nodes, joined(parts), np.cumsum(lengths) - lengths)
+    return DiscreteCurve(
+        curve.nodes, curve.control_nodes, joined(parts), np.cumsum(lengths) - lengths
+    )

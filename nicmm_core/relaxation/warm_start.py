@@ -15,13 +15,13 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .levenberg_marquardt import StepConfig
-from .noded_curve import NodedCurve, is_simple, shifted, traced_through
+from .discrete_curve import DiscreteCurve, is_simple, shifted, traced_through
 from .relaxing import Movable, RelaxationConfig
 
 WARM = RelaxationConfig(
     levels=(512,),
-    stepping=StepConfig(steps=1, longest_move=4.0),
+    steps=1,
+    longest_move=4.0,
     least_decrease=1e-3,
     defer_tracing=True,
 )
@@ -45,21 +45,21 @@ FOLLOW_RADIUS = 4.0
 
 
 def with_moved_controls(
-    surface: CurveSurface, curve: NodedCurve, controls: SurfacePoints
-) -> NodedCurve | None:
+    surface: CurveSurface, curve: DiscreteCurve, controls: SurfacePoints
+) -> DiscreteCurve | None:
     """Move the control points of a curve to new places nearby, and nearby nodes with them.
 
     Parameters
     ----------
     surface : CurveSurface
-    curve : NodedCurve
+    curve : DiscreteCurve
         A simple curve that passes through its control points in order.
     controls : SurfacePoints
         New places of the control points, in the order visited.
 
     Returns
     -------
-    NodedCurve or None
+    DiscreteCurve or None
         A simple curve; None if the moves are too large to give one.
     """
     mesh = surface.mesh

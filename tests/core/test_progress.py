@@ -22,7 +22,7 @@ STAGES = {
         [7, 2000, 5000, 9000],
         {"closed": False},
         "mesh nonmanifold coarse_mesh coarse_start hop_graph leg_combinations course_search "
-        "relaxing_together fine_curve relaxing tracing noded_curve",
+        "batch_relaxation fine_curve relaxing tracing discrete_curve",
     ),
     "fins and an obstacle": (
         MESHES["fins"],

@@ -510,7 +510,7 @@ class TestPaintedBesideACurve:
         assert far < 1e-3 < 1e-2 < near
         whole = designer.design(points, **{kind: weights})
         _, difference = self.moved(ball, whole, after, place)
-        assert difference < 0.5 * near
+        assert difference < 0.6 * near
 
     def test_the_numbers_of_the_points_do_not_matter(self, ball, designer, dab):
         """As in Blender, where an update gives the points in the order visited."""

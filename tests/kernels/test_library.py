@@ -13,10 +13,11 @@ from nicmm_kernels import KernelError
 
 import build
 from nicmm_core import shapes
-from tests.core.checks import points_near
+from tests.core.checks import curve_through, points_near
 
 BALL = shapes.sphere(2)
-CONTACT_RULES = nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12)
+CONTACT_RULES = nicmm_kernels.ContactRules(2.0, 4.0, 0.3, 1e-12, 2.0)
+PLACEMENT = nicmm_kernels.PlacementRules(1e-6, 1e-5, 1.0, 0.1, 6)
 LIMITS = nicmm_kernels.TraceLimits(1e-6, 4096)
 BAD_NUMBERS = st.sampled_from([np.nan, np.inf, -np.inf])
 BAD_INDICES = st.integers(-(2**62), 2**62).filter(lambda i: not 0 <= i < len(BALL.faces))
@@ -74,7 +75,7 @@ def rules(smoothness=1.0):
         CONTACT_RULES,
         nicmm_kernels.SpacingRules(1.0, 1e-3),
         nicmm_kernels.EnergyRules(smoothness, 1.0, 4.0, 10.0),
-        nicmm_kernels.StepRules(9, 3, 2, 1e-3, 1.0, 1e-6, 1e2, 10.0, 1e-12),
+        nicmm_kernels.StepRules(3, 9, 1, 1.0, 1e-6, 1e2, 10.0, 1e-12),
     )
 
 
@@ -90,6 +91,7 @@ def arguments_relax(c=4):
         "fixed": fixed,
         "closed": True,
         "rules": rules(),
+        "batch": nicmm_kernels.BatchRules(9, 3, 2, 1e-3),
         "meanwhile": nothing,
     }
 
@@ -138,42 +140,59 @@ def arguments_nodes():
 
 def arguments_contacts():
     """Arguments of `find_contacts`, by name."""
-    nodes = nicmm_kernels.NodeArrays(**arguments_nodes())
-    pairs = nicmm_kernels.close_pairs(nodes, CONTACT_RULES, 2.0)
-    return {"nodes": nodes, "rules": CONTACT_RULES, "pairs": pairs}
-
-
-def arguments_system():
-    """Arguments of `elastic_system`, by name."""
-    given = arguments_contacts()
-    return {
-        "surface": surface_arrays(),
-        "nodes": given["nodes"],
-        "weights": nicmm_kernels.Weights(3.0, 5.0, 1.0, np.full(60, 0.1)),
-        "shortest": 1e-12,
-        "contacts": nicmm_kernels.find_contacts(**given),
-    }
-
-
-def arguments_energy():
-    """Arguments of `elastic_energy`, by name."""
-    return {name: arguments_system()[name] for name in ("nodes", "weights", "contacts")}
-
-
-def arguments_decrease():
-    """Arguments of `predicted_decrease`, by name."""
-    given = arguments_system()
-    bands, slope, entries = nicmm_kernels.elastic_system(**given)
-    pairs = given["contacts"][0].copy()
-    moves = np.linspace(-1.0, 1.0, 60)
-    return {"bands": bands, "slope": slope, "pairs": pairs, "entries": entries, "moves": moves}
+    return {"nodes": nicmm_kernels.NodeArrays(**arguments_nodes()), "rules": CONTACT_RULES}
 
 
 def arguments_step():
     """Arguments of `damped_step`, by name."""
-    given = arguments_decrease()
-    del given["moves"]
-    return {**given, "fixed": np.arange(60) % 20 == 0, "damping": 1e-3}
+    nodes = nicmm_kernels.NodeArrays(**arguments_nodes())
+    system = nicmm_kernels.Linearised(surface_arrays(), nodes, rules())
+    return {
+        "bands": system.bands,
+        "slope": system.slope,
+        "fixed": np.arange(60) % 20 == 0,
+        "damping": 1e-3,
+    }
+
+
+def arguments_placing():
+    """Arguments of `place_on_polyline` for a simple curve, by name."""
+    angle = np.arange(60) * 2.0 * np.pi / 60
+    height = 0.3 * np.sin(5.0 * angle)
+    ring = np.sqrt(1.0 - height**2)
+    positions = np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
+    curve = curve_through(BALL, positions, np.array([0, 20, 40]))
+    return {
+        "surface": surface_arrays(),
+        "faces": curve.faces,
+        "barycentric": curve.barycentric,
+        "closed": True,
+        "controls": curve.control_index,
+        "count": 40,
+        "rules": PLACEMENT,
+    }
+
+
+def arguments_curve():
+    """The arrays of a `CurveArrays`, by name."""
+    return nicmm_kernels.place_on_polyline(**arguments_placing())._asdict()
+
+
+def on_level(**arrays):
+    """Relaxes a curve on a level, and returns it."""
+    level = nicmm_kernels.LevelRules(PLACEMENT, 3.0, 0.1, 1e-12, 1.6, 1e-2, 50, 1)
+    relaxation = nicmm_kernels.CurveRelaxation(
+        surface_arrays(), nicmm_kernels.CurveArrays(**arrays)
+    )
+    state = nicmm_kernels.LevelState(
+        most_iterations=5, most_work=100.0, damping=1e-6, least_energy=np.inf
+    )
+    relaxation.begin_level(rules(), level)
+    while state.outcome == nicmm_kernels.LevelOutcome.GOES_ON:
+        movable = np.ones(len(relaxation.positions), dtype=bool)
+        relaxation.iterate(rules(), level, movable, state)
+    assert relaxation.trace(rules(), level)
+    return relaxation.arrays
 
 
 def arguments_steps(m=59):
@@ -210,6 +229,19 @@ def arguments_segments(s=40):
         "groups": generator.integers(0, 2, s),
         "starts": generator.random((s, 2)),
         "ends": generator.random((s, 2)),
+        "touching": 1e-12,
+        "meanwhile": nothing,
+    }
+
+
+def arguments_crossings(n=40):
+    """Arguments of `polyline_crossings` for n random points in two faces, by name."""
+    generator = np.random.default_rng(6)
+    return {
+        "all_faces": BALL.faces,
+        "faces": generator.integers(0, 2, n),
+        "barycentric": generator.dirichlet([1.0, 1.0, 1.0], n),
+        "closed": True,
         "touching": 1e-12,
         "meanwhile": nothing,
     }
@@ -373,13 +405,13 @@ CALLS = {
     "trace_steps": (nicmm_kernels.trace_steps, arguments_steps),
     "trace_polyline": (nicmm_kernels.trace_polyline, arguments_polyline),
     "meeting_segments": (nicmm_kernels.meeting_segments, arguments_segments),
+    "polyline_crossings": (nicmm_kernels.polyline_crossings, arguments_crossings),
     "place_nodes": (nicmm_kernels.place_nodes, arguments_place),
     "NodeArrays": (nicmm_kernels.NodeArrays, arguments_nodes),
     "find_contacts": (nicmm_kernels.find_contacts, arguments_contacts),
-    "elastic_energy": (nicmm_kernels.elastic_energy, arguments_energy),
-    "elastic_system": (nicmm_kernels.elastic_system, arguments_system),
     "damped_step": (nicmm_kernels.damped_step, arguments_step),
-    "predicted_decrease": (nicmm_kernels.predicted_decrease, arguments_decrease),
+    "place_on_polyline": (nicmm_kernels.place_on_polyline, arguments_placing),
+    "CurveRelaxation": (on_level, arguments_curve),
     "trace_from": (nicmm_kernels.trace_from, arguments_from),
     "trace_between": (nicmm_kernels.trace_between, arguments_between),
     "relax_curves": (nicmm_kernels.relax_curves, arguments_relax),
@@ -391,22 +423,22 @@ FINITE = {
     "trace_between": [("starts", 1), ("ends", 1), ("normals", None)],
     "trace_steps": [("places", 1)],
     "relax_curves": [("barycentric", None)],
+    "CurveRelaxation": [("barycentric", None)],
 }
 """Arrays whose values have to be finite; others may have any values."""
 
 INDICES = {
     "trace_steps": [("places", 0), ("start", None), ("end", None)],
     "place_nodes": [("faces", None)],
-    "find_contacts": [("pairs", None)],
-    "elastic_system": [("contacts", 0)],
-    "damped_step": [("pairs", None)],
-    "predicted_decrease": [("pairs", None)],
+    "place_on_polyline": [("faces", None), ("controls", None)],
+    "CurveRelaxation": [("faces", None), ("node_index", None), ("polyline_faces", None)],
     "trace_from": [("faces", None)],
     "trace_between": [("starts", 0), ("ends", 0)],
     "relax_curves": [("faces", None)],
     "TraceArrays": [("begins", None), ("faces", None)],
     "places_on_traces": [("nodes", None)],
     "segment_ends": [("segments", None)],
+    "polyline_crossings": [("faces", None)],
     "distances_along_edges": [("corners", None)],
     "nearest_cells": [("vertices", None)],
     "points_on_edge_paths": [("starts", None), ("ends", None)],
@@ -420,10 +452,12 @@ INDICES = {
 OF_ANY_LENGTH = [
     ("TraceArrays", "begins"),
     ("segment_ends", "segments"),
+    ("polyline_crossings", "all_faces"),
     ("nearest_cells", "vertices"),
     ("turning_paths", "begins"),
     ("distinct_routes", "via"),
     ("least_sums", "other"),
+    ("place_on_polyline", "controls"),
 ]
 """Arrays whose last axis has a length that no other array has."""
 
@@ -444,6 +478,7 @@ RESUMED = [
     "meeting_segments",
     "nearest_cells",
     "points_on_edge_paths",
+    "polyline_crossings",
     "relax_curves",
     "trace_between",
     "trace_from",
@@ -595,26 +630,38 @@ def test_other_arrays_that_do_not_fit_are_refused():
         nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, none, np.arange(len(normals)), 0.0)
     with pytest.raises(KernelError, match="folded has shape"):
         nicmm_kernels.SurfaceArrays(BALL.for_kernels, normals, np.ones(3, bool), none, 0.0)
-    given = arguments_energy()
-    for held in (np.ones(59), np.ones(60, dtype=np.float32), np.ones(120)[::2]):
-        weights = nicmm_kernels.Weights(1.0, 0.0, 1.0, held)
-        with pytest.raises(KernelError, match="held has"):
-            nicmm_kernels.elastic_energy(**{**given, "weights": weights})
 
 
 def test_kernels_of_one_curve_refuse_several():
     nodes = nicmm_kernels.NodeArrays(**arguments_nodes(), curves=2)
     with pytest.raises(KernelError, match="2 curves; pass the nodes of one"):
-        nicmm_kernels.close_pairs(nodes, CONTACT_RULES, 1.0)
+        nicmm_kernels.find_contacts(nodes, CONTACT_RULES)
     with pytest.raises(KernelError, match="curves is 7; pass a divisor"):
         nicmm_kernels.NodeArrays(**arguments_nodes(), curves=7)
 
 
-def test_close_pairs_that_do_not_fit_get_more_room(monkeypatch):
-    given = arguments_contacts()
-    assert len(given["pairs"]) > 60
-    monkeypatch.setattr(nicmm_kernels.energy, "PAIRS_OF_A_NODE", 0)
-    np.testing.assert_array_equal(arguments_contacts()["pairs"], given["pairs"])
+def test_pairs_that_do_not_fit_get_more_room(monkeypatch):
+    found = nicmm_kernels.find_contacts(**arguments_contacts())
+    assert len(found[0]) > 20
+    nodes = nicmm_kernels.NodeArrays(**arguments_nodes())
+    energy = nicmm_kernels.Linearised(surface_arrays(), nodes, rules()).energy
+    relaxed = on_level(**arguments_curve())
+    monkeypatch.setattr(nicmm_kernels.steps, "PAIRS_OF_A_NODE", 0)
+    for one, other in zip(found, nicmm_kernels.find_contacts(**arguments_contacts()), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert nicmm_kernels.Linearised(surface_arrays(), nodes, rules()).energy == energy
+    for one, other in zip(relaxed, on_level(**arguments_curve()), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_an_iteration_in_several_calls_lowers_the_energy_too(monkeypatch):
+    """A call that ends after much work leaves the curve as it was, with more damping."""
+    before = arguments_curve()
+    whole = on_level(**before)
+    monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 1)
+    parts = on_level(**before)
+    for relaxed in (whole, parts):
+        assert np.abs(relaxed.barycentric[:40] - before["barycentric"][:40]).max() > 1e-3
 
 
 def test_copies_of_a_mesh_have_their_own_pointers():
@@ -649,7 +696,7 @@ def test_crossings_that_do_not_fit_are_found_in_several_calls(monkeypatch):
 
 def test_contacts_that_do_not_fit_get_more_room(monkeypatch):
     whole = nicmm_kernels.relax_curves(**arguments_relax())
-    monkeypatch.setattr(nicmm_kernels.energy, "PAIRS_OF_A_NODE", 0)
+    monkeypatch.setattr(nicmm_kernels.steps, "PAIRS_OF_A_NODE", 0)
     pauses = []
     given = {**arguments_relax(), "meanwhile": lambda: pauses.append(None)}
     few = nicmm_kernels.relax_curves(**given)

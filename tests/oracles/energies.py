@@ -18,8 +18,8 @@ from nicmm_core import shapes
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.maps.guidance import component_unit
+from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface, with_maps
-from nicmm_core.relaxation.noded_energies import energies_of
 
 from . import same_surface
 from .defects import defective_meshes

@@ -4,8 +4,8 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.courses import attempts
+from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.relaxation.noded_energies import energies_of
 from tests.oracles.energies import named_requests
 
 REQUESTS = {request.name: request for request in named_requests()}
@@ -35,7 +35,7 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
 
     class Result:
         def __init__(self, curve):
-            self.noded_curve = curve
+            self.discrete_curve = curve
 
     results = [Result(each.curve) for each in curves]
     before = attempts.Attempts(surface, 1.0, 3, relaxed=results[:2]).energies

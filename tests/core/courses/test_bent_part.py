@@ -14,9 +14,9 @@ from nicmm_core.courses.bent_part import (
     request_for_part,
     with_part,
 )
+from nicmm_core.relaxation.curve_energies import scaled_bending
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.relaxation.noded_curve import is_simple, noded
-from nicmm_core.relaxation.noded_energies import scaled_bending
+from nicmm_core.relaxation.discrete_curve import is_simple, noded
 from nicmm_core.relaxation.simple_curve import simple_curve
 from tests.core.checks import points_near
 

@@ -5,9 +5,9 @@ import pytest
 
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import joined
+from nicmm_core.relaxation.batch_relaxation import BatchConfig, relax_batch
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.even_nodes import resampled
-from nicmm_core.relaxation.relaxing_together import TogetherConfig, relax_together
 from tests.core.checks import points_near
 
 SIZE = 24
@@ -63,8 +63,8 @@ def test_new_nodes_are_even_and_fixed_nodes_stay(sphere, closed, times):
 @pytest.mark.parametrize("closed", [True, False])
 def test_moved_nodes_are_even_and_fixed_nodes_stay(sphere, closed):
     nodes, fixed = circles(sphere, closed)
-    config = TogetherConfig(iterations=1, longest_move=1e-9, contact=False)
-    found = relax_together(sphere, nodes, fixed, 1.0, config)  # respaces them before the one step
+    config = BatchConfig(iterations=1, longest_move=1e-9, contact=False)
+    found = relax_batch(sphere, nodes, fixed, 1.0, config)  # respaces them before the one step
     np.testing.assert_array_equal(found.positions[fixed], nodes.positions[fixed])
     assert unevenness(found, fixed) < 1.05
 

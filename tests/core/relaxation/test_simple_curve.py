@@ -7,7 +7,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import locate_control_points, nearest_points
 from nicmm_core.relaxation.curve_nodes import curve_surface
-from nicmm_core.relaxation.noded_curve import is_simple
+from nicmm_core.relaxation.discrete_curve import is_simple
 from nicmm_core.relaxation.simple_curve import simple_curve
 from tests.core.checks import assert_valid_curve
 

@@ -2,25 +2,31 @@
 
 from types import SimpleNamespace
 
+import nicmm_kernels
 import numpy as np
 import pytest
 
 from nicmm_core import shapes
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.relaxation.curve_nodes import CurveSurface, Nodes, nodes_at
-from nicmm_core.relaxation.strand_contact import CLEARANCE, NearStrands, contacts_between
+from nicmm_core.relaxation.rules import CLEARANCE, NEARBY, contact_rules
 from tests.core.checks import circle, points_near, scaled
+from tests.oracles import reference_energy
 
 STEP = 0.02
 
 
+def contacts_between(nodes, before=None):
+    """Pairs of nodes in contact, their overlaps and their derivatives."""
+    first = None if before is None else before.for_kernels
+    return nicmm_kernels.find_contacts(nodes.for_kernels, contact_rules(NEARBY), first)
+
+
 def seen_by_nodes(nodes):
     """Contacts listed once for each of the two nodes of a pair."""
-    found = contacts_between(nodes)
+    pairs, overlap, derivatives = contacts_between(nodes)
     return SimpleNamespace(
-        node=found.pairs.T.ravel(),
-        overlap=np.tile(found.overlap, 2),
-        derivative=found.derivatives.T.ravel(),
+        node=pairs.T.ravel(), overlap=np.tile(overlap, 2), derivative=derivatives.T.ravel()
     )
 
 
@@ -102,12 +108,17 @@ def test_both_sides_of_a_thin_sheet_do_not_touch():
     assert len(seen_by_nodes(nodes).node) == 0
 
 
-def test_each_pair_is_there_once(flat_disc):
-    contacts = contacts_between(lanes(flat_disc, STEP))
-    assert len(contacts.pairs) > 20
-    assert len(np.unique(np.sort(contacts.pairs, axis=1), axis=0)) == len(contacts.pairs)
-    assert contacts.overlap.min() > 0.0
-    assert contacts.derivatives.shape == contacts.pairs.shape
+@pytest.mark.parametrize("gap", [0.5, 1.0, 1.9])
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_pairs_are_those_of_brute_force(flat_disc, gap, closed):
+    nodes = lanes(flat_disc, gap * STEP, closed=closed)
+    pairs, overlap, derivatives = contacts_between(nodes)
+    expected, distance = reference_energy.contacts(nodes)
+    order = np.lexsort(pairs.T[::-1])
+    np.testing.assert_array_equal(pairs[order], expected)
+    clearance = CLEARANCE * nodes.lengths.mean()
+    np.testing.assert_allclose(overlap[order], 1.0 - distance / clearance, rtol=1e-9)
+    assert len(pairs) > 20 and derivatives.shape == pairs.shape
 
 
 def test_the_derivative_is_that_of_the_overlap(flat_disc):
@@ -146,12 +157,12 @@ def test_strands_sought_at_other_places_have_the_contacts_of_the_present_ones(fl
     present = lanes(flat_disc, gap * STEP)
 
     def of_straight_parts(contacts):
-        pairs = np.sort(contacts.pairs, axis=1)
+        pairs, overlap = np.sort(contacts[0], axis=1), contacts[1]
         kept = (pairs < 25).any(axis=1)
-        return dict(zip(map(tuple, pairs[kept].tolist()), contacts.overlap[kept], strict=True))
+        return dict(zip(map(tuple, pairs[kept].tolist()), overlap[kept], strict=True))
 
     expected = of_straight_parts(contacts_between(present))
     assert (len(expected) > 0) == (gap < 2.0)
     for before in (1.0, 1.8, 3.0):
-        found = NearStrands(lanes(flat_disc, before * STEP)).contacts(present)
+        found = contacts_between(present, lanes(flat_disc, before * STEP))
         assert of_straight_parts(found) == pytest.approx(expected)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .curve_nodes import CurveSurface
+from .discrete_curve import DiscreteCurve
 from .elastic_energy import bending_energy, comparable_energies
-from .noded_curve import NodedCurve
 
 
 def energies_of(
     surface: CurveSurface,
-    curves: Sequence[NodedCurve],
+    curves: Sequence[DiscreteCurve],
     smoothness: float,
     length_scale: float | None = None,
 ) -> list[float]:
@@ -22,6 +22,6 @@ def energies_of(
     ]
 
 
-def scaled_bending(curve: NodedCurve) -> float:
+def scaled_bending(curve: DiscreteCurve) -> float:
     """L ∮ κ_g² ds, which does not depend on the unit of length."""
     return bending_energy(curve.nodes) * curve.length

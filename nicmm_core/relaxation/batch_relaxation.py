@@ -1,9 +1,8 @@
 """Relaxes several curves together, so that their energies can be compared.
 
-Only nodes move; the curves are not traced between them. The steps are those of
-`levenberg_marquardt`, without its double steps and further steps; contact adds to the diagonal of
-the matrix only, so that it stays banded. Each curve is relaxed on its own. It may cross itself,
-although the contact term resists it; `node_traces.crossing_steps` finds where.
+Only nodes move; the curves are not traced between them. Each curve is relaxed on its own, with one
+trial step in each iteration. It may cross itself, although the contact term resists it;
+`node_traces.crossing_steps` finds where.
 """
 
 from __future__ import annotations
@@ -13,18 +12,15 @@ from dataclasses import dataclass
 import nicmm_kernels
 import numpy as np
 
-from ..geometry import tracing
 from ..geometry.array_types import BoolArray, IntArray
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
-from . import even_nodes, strand_contact
 from .curve_nodes import CurveSurface, Nodes, nodes_at
-from .elastic_energy import energy_rules, shortest_step
-from .levenberg_marquardt import DAMPING_FACTOR, StepConfig
+from .rules import relaxation_rules
 
 
 @dataclass(frozen=True)
-class TogetherConfig:
+class BatchConfig:
     """Settings. Lengths are in mean distances between neighbouring nodes.
 
     Attributes
@@ -52,12 +48,12 @@ class TogetherConfig:
     contact: bool = True
 
 
-def relax_together(
+def relax_batch(
     surface: CurveSurface,
     nodes: Nodes,
     fixed: BoolArray,
     smoothness: float,
-    config: TogetherConfig,
+    config: BatchConfig,
 ) -> Nodes:
     """Relax several curves without tracing them.
 
@@ -71,26 +67,12 @@ def relax_together(
         fixed.
     smoothness : float
         Divisor of the tension and of the weight of a map.
-    config : TogetherConfig
+    config : BatchConfig
     """
     size = nodes.per_curve
-    steps = StepConfig()
-    rules = nicmm_kernels.RelaxationRules(
-        tracing.LIMITS,
-        strand_contact.RULES,
-        even_nodes.RULES,
-        energy_rules(smoothness, config.contact),
-        nicmm_kernels.StepRules(
-            config.iterations,
-            config.respacing,
-            config.quiet,
-            config.least_decrease,
-            config.longest_move,
-            steps.least_damping(size),
-            steps.most_damping,
-            DAMPING_FACTOR,
-            shortest_step(surface),
-        ),
+    rules = relaxation_rules(surface, smoothness, size, config.longest_move, config.contact)
+    batch = nicmm_kernels.BatchRules(
+        config.iterations, config.respacing, config.quiet, config.least_decrease
     )
     checkpoint()
     faces, barycentric = nodes.places.for_kernels
@@ -101,6 +83,7 @@ def relax_together(
         fixed.reshape(-1, size),
         nodes.closed,
         rules,
+        batch,
         checkpoint,
     )
     places = SurfacePoints(faces.ravel(), barycentric.reshape(-1, 3))

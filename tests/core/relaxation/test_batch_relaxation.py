@@ -2,18 +2,14 @@
 
 import numpy as np
 import pytest
+from nicmm_kernels import damped_step
 
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import joined
+from nicmm_core.relaxation.batch_relaxation import BatchConfig, curves_of, relax_batch
 from nicmm_core.relaxation.curve_nodes import CurveSurface, curve_surface, nodes_at
-from nicmm_core.relaxation.elastic_energy import (
-    balance,
-    damped_step,
-    elastic_energy,
-    elastic_system,
-)
-from nicmm_core.relaxation.relaxing_together import TogetherConfig, curves_of, relax_together
 from tests.core.checks import circle, points_near, simple_curves
+from tests.oracles.reference_energy import linearised
 
 SIZE = 40
 
@@ -47,8 +43,8 @@ def test_contact_is_within_each_curve(surface):
     """Different curves do not repel each other, even in the same place."""
     _, alone = rings(surface)
     twice = nodes_at(surface, joined([alone[0].places, alone[0].places]), True, 2)
-    both = relax_together(surface, twice, fixed_nodes(2), 1.0, TogetherConfig())
-    own = relax_together(surface, alone[0], fixed_nodes(), 1.0, TogetherConfig())
+    both = relax_batch(surface, twice, fixed_nodes(2), 1.0, BatchConfig())
+    own = relax_batch(surface, alone[0], fixed_nodes(), 1.0, BatchConfig())
     np.testing.assert_array_equal(both.positions, np.tile(own.positions, (2, 1)))
 
 
@@ -59,10 +55,10 @@ def test_relaxing_together_is_relaxing_alone(surface, closed, mapped):
         phi_fea = 1.0 + 0.5 * np.sin(3.0 * surface.mesh.vertices[:, 0])
         surface = CurveSurface(surface.mesh, surface.vertex_normals, phi_fea, 40.0)
     together, alone = rings(surface, closed)
-    config = TogetherConfig(iterations=6)
-    found = relax_together(surface, together, fixed_nodes(3), 1.0, config)
+    config = BatchConfig(iterations=6)
+    found = relax_batch(surface, together, fixed_nodes(3), 1.0, config)
     for number, nodes in enumerate(alone):
-        own = relax_together(surface, nodes, fixed_nodes(), 1.0, config)
+        own = relax_batch(surface, nodes, fixed_nodes(), 1.0, config)
         here = curves_of(found, np.array([number])).positions
         np.testing.assert_array_equal(here, own.positions)
 
@@ -70,14 +66,12 @@ def test_relaxing_together_is_relaxing_alone(surface, closed, mapped):
 def energies(surface, nodes):
     """Energy of each of three curves, with weights of its own."""
     curves = [curves_of(nodes, np.array([number])) for number in range(3)]
-    return np.array(
-        [elastic_energy(curve, balance(surface, curve, 1.0, apart=False)) for curve in curves]
-    )
+    return np.array([linearised(surface, curve).energy for curve in curves])
 
 
 def test_energies_fall_and_fixed_nodes_stay(surface):
     nodes, _ = rings(surface)
-    found = relax_together(surface, nodes, fixed_nodes(3), 1.0, TogetherConfig())
+    found = relax_batch(surface, nodes, fixed_nodes(3), 1.0, BatchConfig())
     before, after = (energies(surface, curves) for curves in (nodes, found))
     assert (after <= before).all() and after[1] < 0.9 * before[1]
     fixed = fixed_nodes(3)
@@ -104,9 +98,9 @@ def test_a_curve_without_length_does_not_disturb_the_others(surface):
     point = points_near(surface.mesh, np.tile([[0.0, 0.0, -1.0]], (SIZE, 1)))
     stack = nodes_at(surface, joined([close, point, close]), True, 3)
     alone = nodes_at(surface, point, True)
-    singular = elastic_system(surface, alone, balance(surface, alone, 1.0, apart=True))
-    assert (damped_step(singular, ~fixed_nodes(), 1e-3) == 0.0).all()
-    relaxed = relax_together(surface, stack, fixed_nodes(3), 1.0, TogetherConfig(iterations=3))
+    singular = linearised(surface, alone, contact=True)
+    assert (damped_step(singular.bands, singular.slope, fixed_nodes(), 1e-3)[0] == 0.0).all()
+    relaxed = relax_batch(surface, stack, fixed_nodes(3), 1.0, BatchConfig(iterations=3))
     assert np.isfinite(relaxed.positions).all()
     first, still, last = relaxed.positions.reshape(3, SIZE, 3)
     np.testing.assert_array_equal(first, last)
