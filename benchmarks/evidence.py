@@ -38,7 +38,7 @@ DATA = ROOT / "benchmarks" / "data"
 QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
 """Output folder of quick and smoke runs; not under version control."""
 
-WEIGHTS = "nicmm_core/network/weights"
+WEIGHTS = "nicmm_core/paper/weights"
 KERNELS = ROOT / "kernels"
 """Compiled kernels: all files of the C sources, and of the package that passes arrays to them."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
-from nicmm_core.level_set.variational import VariationalConfig, solve
+from nicmm_core.paper.variational import VariationalConfig, solve
 
 from . import collections, plots, report
 from .evidence import Results

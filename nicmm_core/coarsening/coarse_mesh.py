@@ -78,8 +78,13 @@ class CoarseMesh:
         """The cells of coarse vertices and their neighbours, as ascending coarse vertices."""
         return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
 
-    def greatest_in_cells(self, values: FloatArray) -> FloatArray:
-        """The greatest value in each cell, shape (n,), of values at fine vertices, (V,)."""
+    def greatest_in_cells(self, values: FloatArray | None) -> FloatArray | None:
+        """The greatest of the weights at fine vertices, (V,), in each cell, shape (n,).
+
+        So no obstacle and no lane is lost.
+        """
+        if values is None:
+            return None
         greatest = np.full(len(self.seed), -np.inf)
         inside = self.cell >= 0
         np.maximum.at(greatest, self.cell[inside], values[inside])

@@ -12,57 +12,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..geometry.array_types import IntArray
-from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.noded_curve import NodedCurve, noded_curve
+from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.simple_curve import simple_curve
 from .coarse_mesh import CoarseMesh
 
-NODES = (256, 512, 128)
-"""Numbers of nodes that are tried, in this order.
-
-Finer detail of the coarse curve would come from the coarse mesh and not from the surface. Where
-strands are close together, traces between other nodes may avoid a crossing.
-"""
-
 MOST_RINGS = 3
 """Number of rings of cells around two nodes in which a path between them is searched for."""
-
-
-def curve_on_fine_mesh(
-    surface: CurveSurface,
-    coarse: CoarseMesh,
-    coarse_surface: CurveSurface,
-    curve: SurfaceCurve,
-    controls: SurfacePoints,
-) -> SurfaceCurve | None:
-    """Map a curve on the coarse mesh to a curve nearby on the fine mesh.
-
-    Parameters
-    ----------
-    surface, coarse_surface : CurveSurface
-        Surfaces of the fine mesh and of ``coarse.mesh``.
-    coarse : CoarseMesh
-    curve : SurfaceCurve
-        A simple curve on the coarse mesh.
-    controls : SurfacePoints
-        k points of the fine mesh, in the order in which the curve visits them.
-
-    Returns
-    -------
-    SurfaceCurve or None
-        A simple curve exactly through the control points; None if no such curve is found.
-    """
-    for count in NODES:
-        checkpoint()
-        coarse_curve = noded_curve(coarse_surface, curve, count)
-        result = nodes_on_fine_mesh(surface, coarse, coarse_curve, controls)
-        if result is not None:
-            return result.surface_curve(surface.mesh)
-    return None
 
 
 def nodes_on_fine_mesh(
@@ -70,8 +29,15 @@ def nodes_on_fine_mesh(
 ) -> NodedCurve | None:
     """The curve on the fine mesh through the nodes of a coarse curve; None if it is not simple.
 
-    Only the nodes of `coarse_curve` are used. The other parameters are those of
-    `curve_on_fine_mesh`.
+    Parameters
+    ----------
+    surface : CurveSurface
+        Surface of the fine mesh.
+    coarse : CoarseMesh
+    coarse_curve : NodedCurve
+        A curve on the coarse mesh, of which only the nodes are used.
+    controls : SurfacePoints
+        k points of the fine mesh, in the order in which the curve visits them.
     """
     fine = surface.mesh
 

@@ -119,6 +119,10 @@ class SplitMesh:
             self._faces_around[vertex] = set(self._mesh.faces_at(np.array([vertex])).tolist())
         return self._faces_around[vertex]
 
+    def input_face_with(self, start: int, end: int) -> int:
+        """An input face that contains the edge between two vertices."""
+        return min(map(self._parent, self.faces_around(start) & self.faces_around(end)))
+
     def position(self, vertex: int) -> FloatArray:
         """Position of a vertex, shape (3,)."""
         n_input = len(self._mesh.vertices)

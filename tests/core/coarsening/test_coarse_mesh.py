@@ -9,7 +9,7 @@ from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
 from nicmm_core.geometry.mesh import unique_edges
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.level_set.finite_elements import build_finite_elements
+from nicmm_core.paper.finite_elements import build_finite_elements
 from tests.core.checks import euler_characteristic, grid, joined
 
 

@@ -7,10 +7,11 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
-from nicmm_core.coarsening.fine_curve import curve_on_fine_mesh
+from nicmm_core.coarsening.fine_curve import nodes_on_fine_mesh
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface
+from nicmm_core.relaxation.noded_curve import noded_curve
 from tests.core.checks import assert_valid_curve
 
 
@@ -23,7 +24,9 @@ def curves_through(mesh, chosen, closed):
     (curve,) = nicmm.design_curve(coarse.mesh, near, closed=closed).curves
     surface = CurveSurface(mesh, normals)
     coarse_surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-    return coarse, curve, curve_on_fine_mesh(surface, coarse, coarse_surface, curve, points)
+    nodes = noded_curve(coarse_surface, curve, 256)
+    result = nodes_on_fine_mesh(surface, coarse, nodes, points)
+    return coarse, curve, None if result is None else result.surface_curve(mesh)
 
 
 def rough_sphere():
