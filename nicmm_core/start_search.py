@@ -60,11 +60,11 @@ class StartSearch:
     Parameters
     ----------
     mesh : Mesh
+        A connected mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self._units: dict[int, float] = {}  # by component
         self._mapped: tuple[Request, CurveSurface] | None = None  # of the last request with maps
 
     def courses(
@@ -108,30 +108,28 @@ class StartSearch:
             request.closed,
             request.via_points,
         )
-        return Start(path_curve(self.mesh, path), path.order, surface, self.unit(request))
+        return Start(path_curve(self.mesh, path), path.order, surface, self.unit)
 
     def surface(self, request: Request) -> CurveSurface:
         """The surface for relaxation, with the maps of a request."""
         if not request.has_maps:
             return self._surface
         last = self._mapped
-        if last is None or not self._same_maps(last[0], request):
+        if last is None or not same_maps(last[0], request):
             obstacles, alignment = request.obstacles, request.alignment
-            mapped = with_maps(self._surface, obstacles, alignment, self.unit(request))
+            mapped = with_maps(self._surface, obstacles, alignment, self.unit)
             last = self._mapped = request, mapped
         return last[1]
 
-    def unit(self, request: Request) -> float:
-        """Square root of the area of the component of a request."""
-        component = self._component(request)
-        if component not in self._units:
-            self._units[component] = component_unit(self.mesh, component)
-        return self._units[component]
+    @cached_property
+    def unit(self) -> float:
+        """Square root of the area of the mesh."""
+        return component_unit(self.mesh, 0)
 
     def _joined_courses(self, request: Request, seed: int) -> Iterator[Start | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
-        there, unit = self.surface(request), self.unit(request)
-        if self._coarse_starts.is_large(request):
+        there, unit = self.surface(request), self.unit
+        if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, seed):
                 yield None if found is None else Start(*found, there, unit)
             return
@@ -145,13 +143,6 @@ class StartSearch:
                 request.closed,
             )
             yield None if curve is None else Start(curve, course.visited, there, unit)
-
-    def _same_maps(self, one: Request, other: Request) -> bool:
-        """Whether two requests have the same maps on the same component."""
-        return self._component(one) == self._component(other) and same_maps(one, other)
-
-    def _component(self, request: Request) -> int:
-        return int(self.mesh.face_component[request.points.faces[0]])
 
     @cached_property
     def _surface(self) -> CurveSurface:

@@ -105,7 +105,7 @@ class SurfaceDesigner:
             curve,
             visited,
             surface,
-            self._search.unit(request),
+            self._search.unit,
             collisions=collisions,
             unsettled=unsettled,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..geometry.surface_points import SurfacePoints, locate_control_points
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..relaxation.noded_curve import NodedCurve, noded
-from ..request import Request, renumbered_request
+from ..request import Request, mapped_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import nodes_on_fine_mesh
 
@@ -55,7 +56,7 @@ class _CoarseSurface:
 
 
 class CoarseStarts:
-    """Finds starts on coarse meshes, one for each component, built on first use and cached.
+    """Finds starts on the coarse mesh of a connected mesh.
 
     Parameters
     ----------
@@ -65,8 +66,6 @@ class CoarseStarts:
 
     def __init__(self, surface: CurveSurface) -> None:
         self._mesh, self._fine = surface.mesh, surface
-        self._made: dict[int, _CoarseSurface] = {}
-        self._large: dict[int, bool] = {}
 
     def courses(
         self, request: Request, seed: int = 0
@@ -78,39 +77,31 @@ class CoarseStarts:
         that of `CourseSurface.courses`.
         """
         with contextlib.suppress(NicmmError):
-            here = self._coarse_surface(request)
+            here = self._coarse
             on_coarse = _on_coarse(self._mesh, here.coarse, request)
             copy, surface = here.copy_under(on_coarse.points)
-            for course in surface.courses(renumbered_request(copy, on_coarse), seed):
+            on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
+            for course in surface.courses(on_copy, seed):
                 checkpoint()
-                places = copy.original_points(course.places)
+                places = copy.points_back(course.places)
                 nodes = noded(here.surface, places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
                 curve = nodes_on_fine_mesh(self._fine, here.coarse, nodes, controls)
                 yield None if curve is None else (curve, course.visited)
 
-    def is_large(self, request: Request) -> bool:
-        """Whether the component of a request needs a coarse mesh."""
-        component = int(self._mesh.face_component[request.points.faces[0]])
-        if component not in self._large:
-            count = self._n_vertices(component)
-            needles = SMALL < count <= LARGE and edges_crossed(self._mesh, component) > CROSSED
-            self._large[component] = count > LARGE or needles
-        return self._large[component]
+    @cached_property
+    def is_large(self) -> bool:
+        """Whether the mesh needs a coarse mesh."""
+        count = np.count_nonzero(self._mesh.referenced)
+        needles = SMALL < count <= LARGE and edges_crossed(self._mesh, 0) > CROSSED
+        return count > LARGE or needles
 
-    def _n_vertices(self, component: int) -> int:
-        """Number of vertices of a component."""
-        inside = self._mesh.faces[self._mesh.face_component == component]
-        return np.count_nonzero(np.bincount(inside.ravel()))
-
-    def _coarse_surface(self, request: Request) -> _CoarseSurface:
-        """The coarse mesh of the component of a request."""
-        component = int(self._mesh.face_component[request.points.faces[0]])
-        if component not in self._made:
-            count = min(CELLS, self._n_vertices(component) // REDUCTION)
-            coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, component, count)
-            self._made[component] = _CoarseSurface(coarse, curve_surface(coarse.mesh))
-        return self._made[component]
+    @cached_property
+    def _coarse(self) -> _CoarseSurface:
+        """The coarse mesh, built on first use."""
+        count = min(CELLS, np.count_nonzero(self._mesh.referenced) // REDUCTION)
+        coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, 0, count)
+        return _CoarseSurface(coarse, curve_surface(coarse.mesh))
 
 
 def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
@@ -121,14 +112,5 @@ def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:
     ControlPointError, UnreachableError
         If control points coincide on the coarse mesh or lie on different components of it.
     """
-
-    def nearest(points: SurfacePoints) -> SurfacePoints:
-        return coarse.nearest_points(fine, points)
-
-    return replace(
-        request,
-        points=locate_control_points(coarse.mesh, nearest(request.points), request.closed),
-        via_points={key: nearest(points) for key, points in request.via_points.items()},
-        obstacles=coarse.greatest_in_cells(request.obstacles),
-        alignment=coarse.greatest_in_cells(request.alignment),
-    )
+    there = mapped_request(request, partial(coarse.nearest_points, fine), coarse.greatest_in_cells)
+    return replace(there, points=locate_control_points(coarse.mesh, there.points, request.closed))

@@ -72,6 +72,16 @@ def curve_on_mesh(
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
+def points_of(curve: SurfaceCurve) -> SurfacePoints:
+    """The points of a curve."""
+    return SurfacePoints(curve.faces, curve.barycentric)
+
+
+def with_points(mesh: Mesh, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
+    """The curve through other points, one for each of its own, on any mesh."""
+    return curve_on_mesh(mesh, curve.closed, points.faces, points.barycentric, curve.control_index)
+
+
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
     """Whether there is exactly one curve, closed or open as given, through all control points."""
     if len(curves) != 1 or curves[0].closed != closed:
@@ -296,8 +306,7 @@ def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArr
 
 def _faces_near(mesh: Mesh, curve: SurfaceCurve, one: int, other: int) -> IntArray:
     """Those of the faces of two points that also hold the other point, up to a gap."""
-    points = SurfacePoints(curve.faces, curve.barycentric)
-    positions = points[np.array([one, other])].positions(mesh)
+    positions = points_of(curve)[np.array([one, other])].positions(mesh)
     within = max(GAP * mesh.diagonal, rounding(positions))
     sides = ((curve.faces[other], positions[:1]), (curve.faces[one], positions[1:]))
     return np.array(

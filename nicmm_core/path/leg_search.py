@@ -178,7 +178,6 @@ class LegSearch:
         beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
         lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
 
-        checkpoint()
         (here,), (there,) = (patch.node_indices(np.array([vertex])) for vertex in (source, target))
         free = self._free(patch, blocked, np.array([here, there]))
         lengths[~free[patch.arcs].all(axis=1)] = np.inf
@@ -208,7 +207,6 @@ class LegSearch:
         separate the surface.
         """
         vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
-        checkpoint()
         faces = faces.reshape(-1, 3)
         edges, count = unique_edges(faces)
         n_vertices = len(vertices)
@@ -217,7 +215,6 @@ class LegSearch:
         checkpoint()
         keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
         side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
-        checkpoint()
         inner = count > 1
         midpoint = n_vertices + np.flatnonzero(inner)
         arcs = np.concatenate(
@@ -319,7 +316,6 @@ def _closeness(
     """
     checkpoint()
     to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)
-    checkpoint()
     to_ends = csgraph.dijkstra(graph, indices=ends, min_only=True)
     beside = np.zeros(graph.shape[0])
     near = np.isfinite(to_taken) & (to_taken < to_ends)

@@ -113,10 +113,8 @@ def is_manifold(mesh: Mesh) -> bool:
     # face, and count the faces on the way.
     face = np.zeros(len(mesh.vertices), dtype=np.int64)
     for corner in range(3):
-        checkpoint()
         face[faces[:, corner]] = np.arange(len(faces))
     for corner in range(3):
-        checkpoint()
         last = np.flatnonzero(across[:, corner - 1] < 0)
         face[faces[last, corner]] = last
     vertex = np.flatnonzero(degree)
@@ -163,17 +161,14 @@ class _Sides:
 
     def __init__(self, faces: IntArray) -> None:
         self._faces = faces
-        checkpoint()
         # Corners at the ends of each side, the one with the smaller vertex first.
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
-        checkpoint()
         one, other = vertices[first], vertices[second]
         swapped = one > other
         self._low = np.where(swapped, second, first)
         self._high = np.where(swapped, first, second)
-        checkpoint()
         size = int(vertices.max()) + 1
         self._order, self._first, self._count = grouped(edge_keys(one, other, size))
 
@@ -267,7 +262,6 @@ class _Sides:
         # One of the copies keeps the index of the vertex.
         order, begin, _ = grouped(source)
         new = np.delete(np.arange(len(source)), order[begin])
-        checkpoint()
         number = source.copy()
         number[new] = n_vertices + np.arange(len(new))
         return number[group], np.concatenate([np.arange(n_vertices), source[new]])
@@ -302,7 +296,6 @@ def _with_areas(
         Number of edges of more than two faces.
     """
     original, mesh = clean.original, clean.mesh
-    checkpoint()
     short = tolerances.SAME_POSITION * original.diagonal
     flat = degenerate_faces(vertices, parts.faces, short)
     same = np.array_equal(parts.faces, mesh.faces)
@@ -311,7 +304,6 @@ def _with_areas(
         doubled[:] = True
         order, first, _ = grouped(place)
         doubled[order[first]] = False
-    checkpoint()
     origin, moved = np.zeros(3), bool(flat.any() or doubled.any())
     if moved:
         # Far from the origin, rounding would remove small moves.
