@@ -19,7 +19,7 @@ from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, corners_differ, edge_lengths
-from ..geometry.numbering import frame_coordinates, uniform_hash
+from ..geometry.numbering import RESOLUTIONS, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
@@ -31,7 +31,7 @@ TIE_BREAK = 1e-6
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """A coarse mesh of one component, with its vertices on the fine mesh.
+    """A coarse mesh of a connected mesh, with its vertices on the fine mesh.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class CoarseMesh:
     seed : (n,) int array
         The fine vertex at which each coarse vertex lies.
     cell : (V,) int array
-        The coarse vertex nearest to each fine vertex along edges, -1 on other components.
+        The coarse vertex nearest to each fine vertex along edges, -1 for vertices without faces.
     """
 
     mesh: Mesh
@@ -96,18 +96,15 @@ class CoarseMesh:
         return SurfacePoints(faces, barycentric)
 
 
-def build_coarse_mesh(
-    mesh: Mesh, vertex_normals: FloatArray, component: int, count: int
-) -> CoarseMesh:
-    """Build the dual of about ``count`` Voronoi cells of one component.
+def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> CoarseMesh:
+    """Build the dual of about ``count`` Voronoi cells.
 
     Parameters
     ----------
     mesh : Mesh
+        A connected mesh in canonical coordinates, see `geometry.numbering`.
     vertex_normals : (V, 3) float array
         Unit vectors.
-    component : int
-        Index of the component.
     count : int
         Approximate number of cells; strongly curved regions get more.
 
@@ -116,22 +113,19 @@ def build_coarse_mesh(
     MeshError
         If no three cells meet in a face.
     """
-    inside = mesh.face_component == component
-    faces, face_areas = mesh.faces[inside], mesh.face_areas[inside]
-    thirds = np.repeat(face_areas / 3.0, 3)
+    faces, thirds = mesh.faces, np.repeat(mesh.face_areas / 3.0, 3)
     areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # Hashes of positions replace random numbers, so the result does not depend on the numbering.
-    places = frame_coordinates(mesh.vertices, faces, face_areas)
-    chance = uniform_hash(places)
+    chance = uniform_hash(np.round(mesh.vertices / RESOLUTIONS[0]).astype(np.int64))
     seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
     graph = _edge_graph(mesh, chance)
     checkpoint()
     _, _, nearest = csgraph.dijkstra(
         graph, directed=False, indices=seed, min_only=True, return_predecessors=True
     )
-    # On other components no seed is reached, and the cell is -1.
+    # Vertices without faces are not reached, and their cell is -1.
     cell = np.where(nearest < 0, -1, np.searchsorted(seed, nearest))
     corners = cell[faces]
     corners = corners[corners_differ(corners)]

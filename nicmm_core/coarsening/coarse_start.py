@@ -100,7 +100,7 @@ class CoarseStarts:
     def _coarse(self) -> _CoarseSurface:
         """The coarse mesh, built on first use."""
         count = min(CELLS, np.count_nonzero(self._mesh.referenced) // REDUCTION)
-        coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, 0, count)
+        coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, count)
         return _CoarseSurface(coarse, curve_surface(coarse.mesh))
 
 

@@ -21,6 +21,8 @@ from ..errors import ArgumentError, UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import locate_control_points
+from ..repair.clean_surface import Cleaning, clean_surface
+from ..repair.nonmanifold import manifold
 from .features import BASE_CHANNELS
 from .losses import LossWeights, balanced, loss_terms, total_loss
 from .network import (
@@ -266,6 +268,7 @@ def _random_problems(
     per_mesh = np.diff(np.linspace(0, config.sets, len(meshes) + 1).astype(int))
     for number, (mesh, wanted) in enumerate(zip(meshes, per_mesh, strict=True)):
         generator = np.random.default_rng([config.seed, number])
+        mesh = _manifold(mesh)
         component = np.bincount(mesh.face_component, weights=mesh.face_areas).argmax()
         vertices = np.unique(mesh.faces[mesh.face_component == component])
         if len(vertices) < config.most_points:
@@ -295,6 +298,14 @@ def _random_problems(
                 f"meshes[{number}]: only {found} of {wanted} random sets of points have a path "
                 "through them; leave the mesh out or use a finer one"
             )
+
+
+def _manifold(mesh: Mesh) -> Mesh:
+    """A manifold with the same surface, on which problems can be built."""
+    clean = clean_surface(mesh, Cleaning.FACES)
+    assert clean is not None  # a mesh has faces
+    made = manifold(clean, np.arange(len(mesh.faces)), connected=False)
+    return mesh if made is None else made.mesh
 
 
 def _maps(

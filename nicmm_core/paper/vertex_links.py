@@ -19,6 +19,7 @@ class VertexLinks:
     Parameters
     ----------
     working : WorkingMesh
+        A manifold.
     bundle : SignBundle, optional
         Signs with which faces read the values of their corners.
     """
@@ -30,7 +31,7 @@ class VertexLinks:
         self._faces = working.faces
         self._corner_sign = None if bundle is None else bundle.corner_sign
         self._ends = frozenset() if bundle is None else frozenset(bundle.ends.tolist())
-        self._link: dict[int, tuple[list[int], bool] | None] = {}
+        self._link: dict[int, tuple[list[int], bool]] = {}
 
     def neighbours(self, vertex: int) -> list[int]:
         """Vertices joined to a vertex by an edge."""
@@ -39,20 +40,16 @@ class VertexLinks:
 
     def is_simple(self, vertex: int, sign: IntArray) -> bool:
         """Whether the signs around the link form one positive and one negative run."""
-        link = self._ordered(vertex)
-        return link is not None and self.sign_changes(vertex, sign) == (2 if link[1] else 1)
+        return self.sign_changes(vertex, sign) == (2 if self._ordered(vertex)[1] else 1)
 
     def sign_changes(self, vertex: int, sign: IntArray) -> int:
-        """Number of sign changes around the link, zeros left out; -1 at a non-manifold vertex.
+        """Number of sign changes around the link, zeros left out.
 
         A control vertex in the link has the sign 0, because the curve crosses the link there.
         """
         if vertex in self._ends:
             return self._sign_changes_around_end(vertex, sign)
-        link = self._ordered(vertex)
-        if link is None:
-            return -1
-        ring, closed = link
+        ring, closed = self._ordered(vertex)
         relative = self._relative_signs(vertex)
         signs = [int(sign[v]) * relative.get(v, 1) for v in ring if sign[v] != 0]
         if closed:
@@ -82,13 +79,13 @@ class VertexLinks:
         """Faces around a vertex."""
         return self._by_vertex[self._start[vertex] : self._start[vertex + 1]]
 
-    def _ordered(self, vertex: int) -> tuple[list[int], bool] | None:
-        """Ordered vertices of the link and whether it is closed; None at a non-manifold vertex."""
+    def _ordered(self, vertex: int) -> tuple[list[int], bool]:
+        """Ordered vertices of the link and whether it is closed."""
         if vertex not in self._link:
             self._link[vertex] = self._trace(vertex)
         return self._link[vertex]
 
-    def _trace(self, vertex: int) -> tuple[list[int], bool] | None:
+    def _trace(self, vertex: int) -> tuple[list[int], bool]:
         """Compute the result of `_ordered`."""
         joined: dict[int, list[int]] = {}
         faces = self._faces[self._faces_at(vertex)]
@@ -96,10 +93,8 @@ class VertexLinks:
             a, b = (v for v in face if v != vertex)
             joined.setdefault(a, []).append(b)
             joined.setdefault(b, []).append(a)
-        if max(map(len, joined.values())) > 2:
-            return None
         ends = [v for v, others in joined.items() if len(others) == 1]
         ring = ends[:1] or [next(iter(joined))]
         while onward := [v for v in joined[ring[-1]] if v not in (*ring[-2:-1], ring[0])]:
             ring.append(onward[0])
-        return (ring, not ends) if len(ring) == len(joined) else None
+        return ring, not ends

@@ -65,6 +65,7 @@ def find_initial_path(
     Parameters
     ----------
     mesh : Mesh
+        A manifold.
     points : SurfacePoints
         At least three control points, or two for an open path, on one connected component.
     order : {"given", "shortest"}

@@ -18,7 +18,7 @@ from ..geometry.grouping import components, path_between
 from ..geometry.mesh import Mesh, side_keys, unique_edges
 from ..maps.guidance import length_factor
 from ..progress import checkpoint
-from .leg_graph import Node, Patch, nonmanifold_vertices
+from .leg_graph import Node, Patch
 from .virtual_splits import SplitMesh
 
 MIDPOINT_DETOUR = 2.0
@@ -32,13 +32,6 @@ STRAND_PENALTY = 4.0
 
 It makes two strands of a loop pass a thin limb on opposite sides, which leaves room for the level
 set between them.
-"""
-
-NONMANIFOLD_FACTOR = 20.0
-"""Factor of lengths at non-manifold vertices and edges.
-
-These belong to several sheets but can be passed only once, so a leg should use them only where it
-has to.
 """
 
 FIRST_REACH = 3.0
@@ -92,7 +85,7 @@ class LegSearch:
     Parameters
     ----------
     mesh : Mesh
-        The input mesh.
+        The input mesh, a manifold.
     split : SplitMesh
         Virtual splits of the input mesh; more may be added between searches.
     component : (F,) bool array
@@ -116,7 +109,6 @@ class LegSearch:
         self._component = component
         self._phi_fea = phi_fea
         self._clearance = clearance
-        self._nonmanifold = nonmanifold_vertices(mesh)
         corners = mesh.vertices[mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
@@ -169,9 +161,6 @@ class LegSearch:
     ) -> Leg | None:
         """The cheapest leg on a patch, penalties included; None if all exceed the cost limit."""
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
-        factor = self._nonmanifold_factor(patch)
-        if factor is not None:
-            lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
         avoided = patch.node_indices(np.append(blocked.vertices, source))
         ends = patch.node_indices(np.append(blocked.ends, source))
@@ -236,7 +225,6 @@ class LegSearch:
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
-            nonmanifold_edges=count > 2,
             positions=node_position,
             weight=weight,
             arcs=arcs,
@@ -247,8 +235,7 @@ class LegSearch:
         """Whether a leg may use each node: its ends, and interior nodes that are not blocked."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
-        # A boundary vertex at which several fans meet may be the only connection between them.
-        free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
+        free[patch.edges[patch.on_rim]] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.node_indices(blocked.vertices)] = False
         if len(blocked.edges):
@@ -259,22 +246,6 @@ class LegSearch:
             free[n_vertices + np.flatnonzero(on_path)] = False
         free[ends] = True
         return free
-
-    def _nonmanifold_factor(self, patch: Patch) -> FloatArray | None:
-        """Factor of lengths at each node, or None on a manifold."""
-        nonmanifold = self._nonmanifold_here(patch)
-        if not (len(nonmanifold) or patch.nonmanifold_edges.any()):
-            return None
-        factor = np.ones(patch.size)
-        factor[nonmanifold] = NONMANIFOLD_FACTOR
-        factor[patch.edges[patch.nonmanifold_edges]] = NONMANIFOLD_FACTOR
-        factor[len(patch.vertices) + np.flatnonzero(patch.nonmanifold_edges)] = NONMANIFOLD_FACTOR
-        return factor
-
-    def _nonmanifold_here(self, patch: Patch) -> IntArray:
-        """Nodes of a patch that are non-manifold vertices of the input mesh."""
-        n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
-        return np.flatnonzero(self._nonmanifold[patch.vertices[:n_input]])
 
     def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
         """φ_fea at vertices of the split mesh, interpolated at inserted vertices."""

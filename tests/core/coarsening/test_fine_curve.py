@@ -18,7 +18,7 @@ from tests.core.checks import assert_valid_curve
 def curves_through(mesh, chosen, closed):
     """Coarse mesh, a curve on it, and the curve mapped to the fine mesh."""
     normals = unsigned_normals(mesh)
-    coarse = build_coarse_mesh(mesh, normals, 0, 600)
+    coarse = build_coarse_mesh(mesh, normals, 600)
     points = locate_control_points(mesh, chosen, closed)
     near = coarse.nearest_points(mesh, points)
     (curve,) = nicmm.design_curve(coarse.mesh, near, closed=closed).curves

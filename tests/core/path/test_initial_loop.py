@@ -248,41 +248,6 @@ class TestBoundary:
         assert_simple_loop(mesh, points, "given", working, loop)
 
 
-class TestNoManifold:
-    @pytest.mark.slow
-    def test_spheres_that_touch_have_open_curves_only(self):
-        """A curve may pass the common vertex only once."""
-        ball = shapes.sphere(1)
-        top = int(ball.vertices[:, 2].argmax())
-        other = ball.vertices * [1, 1, -1] + [0, 0, 2 * ball.vertices[top, 2]]
-        count = len(ball.vertices)
-        number = np.arange(count) + count
-        number[top] = top
-        both = np.concatenate([ball.vertices, other])
-        mesh = nicmm.Mesh(both, np.concatenate([ball.faces, number[ball.faces[:, ::-1]]]))
-        lowest = int(ball.vertices[:, 2].argmin())
-        points = locate_control_points(mesh, [lowest, lowest + count], closed=False)
-        working, loop = initial_loop(mesh, points, "given", None, False)
-        assert_simple_loop(mesh, points, "given", working, loop, closed=False)
-        chosen = [lowest, lowest + count, int(ball.vertices[:, 0].argmax())]
-        points = locate_control_points(mesh, chosen, closed=True)
-        with pytest.raises(nicmm.UnreachableError, match="no order works"):
-            initial_loop(mesh, points, "given")
-
-    def test_a_path_leaves_an_edge_of_three_faces_alone(self):
-        """A fin stands on a sheet; a path between its two sides leads around its end."""
-        x, y = (c.ravel() for c in np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"))
-        corner = np.array([7 * i + j for i in range(6) for j in range(6)])
-        sheet = np.concatenate([corner[:, None] + [0, 7, 8], corner[:, None] + [0, 8, 1]])
-        fin = np.array([[22, 23, 49], [23, 24, 50], [49, 23, 50]])
-        vertices = np.concatenate([np.stack([x, y, 0 * x], axis=1), [[3, 1.5, 1], [3, 2.5, 1]]])
-        mesh = nicmm.Mesh(vertices, np.concatenate([sheet, fin]))
-        points = locate_control_points(mesh, [9, 37, 33], closed=True)
-        working, loop = initial_loop(mesh, points, "given")
-        assert_simple_loop(mesh, points, "given", working, loop)
-        assert not set(working.input_vertex[loop.vertices]) & {22, 23, 24}
-
-
 @pytest.mark.slow
 def test_a_path_that_winds_too_often_names_an_order(ball, monkeypatch):
     monkeypatch.setattr(legs, "MOST_PATH_SPLITS", 40)
