@@ -25,17 +25,8 @@ from .fine_curve import nodes_on_fine_mesh
 CELLS = 4_000
 """Greatest number of cells of a coarse mesh."""
 
-REDUCTION = 2
-"""Least number of fine vertices per cell."""
-
 SMALL, LARGE = 3_000, 6_000
 """Numbers of vertices up to which a mesh needs no coarse mesh, and above which it needs one."""
-
-CROSSED = 7.0
-"""Value of `edges_crossed` above which a mesh between these sizes needs a coarse mesh.
-
-Such a mesh has needles.
-"""
 
 
 @dataclass(frozen=True)
@@ -93,13 +84,15 @@ class CoarseStarts:
     def is_large(self) -> bool:
         """Whether the mesh needs a coarse mesh."""
         count = np.count_nonzero(self._mesh.referenced)
-        needles = SMALL < count <= LARGE and edges_crossed(self._mesh, 0) > CROSSED
+        # A mesh of medium size needs a coarse mesh if it has needles.
+        needles = SMALL < count <= LARGE and edges_crossed(self._mesh, 0) > 7.0
         return count > LARGE or needles
 
     @cached_property
     def _coarse(self) -> _CoarseSurface:
         """The coarse mesh, built on first use."""
-        count = min(CELLS, np.count_nonzero(self._mesh.referenced) // REDUCTION)
+        # At least two fine vertices for each cell.
+        count = min(CELLS, np.count_nonzero(self._mesh.referenced) // 2)
         coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, count)
         return _CoarseSurface(coarse, curve_surface(coarse.mesh))
 

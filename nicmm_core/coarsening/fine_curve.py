@@ -20,9 +20,6 @@ from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.simple_curve import simple_curve
 from .coarse_mesh import CoarseMesh
 
-MOST_RINGS = 3
-"""Number of rings of cells around two nodes in which a path between them is searched for."""
-
 
 def nodes_on_fine_mesh(
     surface: CurveSurface, coarse: CoarseMesh, coarse_curve: NodedCurve, controls: SurfacePoints
@@ -43,7 +40,7 @@ def nodes_on_fine_mesh(
 
     def cells_around(faces: IntArray) -> Iterator[IntArray]:
         cells = np.unique(coarse.cell[fine.faces[faces, 0]])
-        for _ in range(MOST_RINGS):
+        for _ in range(3):  # rings in which a path between two nodes is searched for
             cells = coarse.cells_around(cells)
             yield coarse.faces_of_cells(fine, cells)
 

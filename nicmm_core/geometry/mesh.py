@@ -18,9 +18,6 @@ LARGEST, SMALLEST = 1e50, 1e-50
 """Upper bound on coordinates and lower bound on the diagonal of the mesh, so that powers of lengths
 stay representable."""
 
-FEW_ROWS = 8
-"""Number of rows of a sparse matrix up to which slices are faster than indexing."""
-
 MOST_FACES_PER_TREE = 100_000
 """Maximum number of faces in a bounding-box tree.
 
@@ -193,7 +190,8 @@ class Mesh:
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces that have at least one of the given vertices, ascending."""
         incidence = self.vertex_faces
-        if not 0 < len(vertices) <= FEW_ROWS:
+        # Up to a few rows, slices of a sparse matrix are faster than indexing.
+        if not 0 < len(vertices) <= 8:
             return np.unique(incidence[vertices].indices).astype(np.int64)
         begin, end = incidence.indptr[vertices].tolist(), incidence.indptr[vertices + 1].tolist()
         rows = [incidence.indices[slice(*bounds)] for bounds in zip(begin, end, strict=True)]

@@ -110,7 +110,8 @@ def finetune(
             status = Status.DIVERGED
             break
         if value < best_loss:
-            best_loss, best_terms = value, _as_floats(terms)
+            best_loss = value
+            best_terms = {name: float(term.item()) for name, term in terms.items()}
             best_field = phi.detach().cpu().numpy().astype(np.float64)
         energies.append(narrow_band_energy(surface, phi.detach(), weights, problem.edge_length))
         if watch is not None and not watch(iteration / config.iterations, best_field):
@@ -144,7 +145,3 @@ def _has_converged(energies: list[float], config: FinetuningConfig) -> bool:
         return False
     recent = energies[-config.patience :]
     return max(recent) - min(recent) <= config.fluctuation * recent[-1]
-
-
-def _as_floats(terms: dict[str, Tensor]) -> dict[str, float]:
-    return {name: float(value.item()) for name, value in terms.items()}

@@ -25,9 +25,6 @@ from .losses import (
 )
 from .problem import Problem
 
-MASS_SHARE = 0.01
-"""Factor of the mass matrix, divided by h², in the damping; it makes the system definite."""
-
 
 @dataclass(frozen=True)
 class NarrowBand:
@@ -132,7 +129,8 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
         laplacian=(centroid @ elements.laplacian)[:, unknowns],
         centroid=centroid[:, unknowns],
         feature_map=None if phi_fea is None else elements.plain_centroid[inner] @ phi_fea,
-        damping=stiffness + sparse.diags_array(MASS_SHARE * mass),
+        # A share of the mass matrix makes the system definite.
+        damping=stiffness + sparse.diags_array(0.01 * mass),
         delta_width=DELTA_WIDTH * problem.edge_length,
     )
 

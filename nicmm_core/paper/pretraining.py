@@ -39,9 +39,6 @@ from .torch_threads import single_thread
 from .training_maps import random_maps
 from .weights_file import save_weights
 
-GRADIENT_LIMIT = 1.0
-"""Norm to which gradients are clipped; single sets with a bad loop would derail the training."""
-
 
 @dataclass(frozen=True)
 class PretrainingConfig:
@@ -179,7 +176,8 @@ def pretrain(
                 done += 1
                 all_done = epoch * len(order) + done
                 report("training", all_done, config.epochs * len(order), total / done)
-            torch.nn.utils.clip_grad_norm_(network.parameters(), GRADIENT_LIMIT)
+            # Single sets with a bad loop would derail the training.
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
             optimiser.step()
         losses.append(total / len(order))
         state = {
@@ -277,7 +275,8 @@ def _random_problems(
                 f"{config.most_points} points; leave it out or use a finer mesh"
             )
         found = 0
-        for _ in range(TRIES_PER_SET * wanted):
+        # A mesh is rejected after ten random sets for each set wanted.
+        for _ in range(10 * wanted):
             if found == wanted:
                 break
             count = generator.integers(config.fewest_points, config.most_points + 1)
@@ -318,7 +317,3 @@ def _maps(
         return random_maps(mesh, points, generator)
     nothing = np.zeros(len(mesh.vertices))
     return nothing, nothing
-
-
-TRIES_PER_SET = 10
-"""Number of random sets tried, per set wanted, before a mesh is rejected."""

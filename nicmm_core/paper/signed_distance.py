@@ -20,10 +20,6 @@ LEAST_DISTANCE = 1e-3
 """Least distance of a vertex off the path, in mean edge lengths; the heat method may give 0."""
 
 
-POISSON_SHIFT = 1e-8
-"""Factor of the mass matrix in the Poisson system, which is singular without it."""
-
-
 def signed_distance(
     elements: FiniteElements, loop: InitialLoop, edge_length: float, side: IntArray
 ) -> FloatArray:
@@ -75,7 +71,8 @@ def heat_distance(elements: FiniteElements, sources: IntArray, time: float) -> F
     direction = -gradient / np.where(length > 0.0, length, 1.0)
     flux = elements.gradient.T @ (elements.face_areas * direction).ravel()
     area = elements.vertex_areas.sum()
-    distance = factorised(elements.stiffness + (POISSON_SHIFT / area) * mass)(flux)
+    # Without a share of the mass matrix, the Poisson system is singular.
+    distance = factorised(elements.stiffness + (1e-8 / area) * mass)(flux)
     return distance - distance[sources].mean()
 
 

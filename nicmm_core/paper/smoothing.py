@@ -18,9 +18,6 @@ from ..progress import checkpoint
 from .finite_elements import FiniteElements
 from .sparse_solver import Solve, factorised
 
-MOST_ENTRIES = 150
-"""Number of products of entries of L, per vertex, up to which A is assembled; usually about 50."""
-
 BLOCK_COLUMNS = 8
 """Number of right-hand sides solved together; with more, a cancellation would take longer."""
 
@@ -94,7 +91,8 @@ def build_smoother(
 def _factorised(elements: FiniteElements, length: float) -> Solve:
     """Factorise A, or the mixed system if vertices of high valence would make A too dense."""
     valence = np.diff(elements.stiffness.indptr)
-    if (valence**2).sum() <= MOST_ENTRIES * len(valence):
+    # The number of products of entries of L per vertex is usually about 50.
+    if (valence**2).sum() <= 150 * len(valence):
         return factorised(_bending_operator(elements, length))
     return mixed_factorised(elements, length)
 

@@ -17,9 +17,6 @@ DEGENERATE = (
     "distance can be computed; merge vertices by distance or dissolve degenerate faces"
 )
 
-PREORDERED_FROM = 4000
-"""Number of unknowns from which a bandwidth-reducing order precedes the fill-reducing one."""
-
 
 Solve = Callable[[FloatArray], FloatArray]
 """A function that solves a factorised system for one right-hand side, (n,), or several, (n, k)."""
@@ -52,7 +49,7 @@ def factorised(matrix: sparse.sparray) -> Solve:
         raise MeshError(DEGENERATE)
     checkpoint()
     order: IntArray | slice = slice(None)
-    if matrix.shape[0] >= PREORDERED_FROM:
+    if matrix.shape[0] >= 4000:
         rows = sparse.csr_array(matrix)
         order = csgraph.reverse_cuthill_mckee(rows, symmetric_mode=True).astype(np.int64)
         checkpoint()

@@ -31,12 +31,6 @@ FALLBACK_RADIUS = 4.0
 The unit is the mean edge length at the loop. At three times this radius the blend ends.
 """
 
-FALLBACK_GROWTH = 1.3
-"""Factor by which that radius grows from one attempt to the next."""
-
-FALLBACK_ATTEMPTS = 12
-"""Number of attempts after which the start replaces the solution everywhere."""
-
 
 def keep_topology(
     working: WorkingMesh,
@@ -72,11 +66,11 @@ def keep_topology(
     breaking = breaking_vertices(links, start, wanted, control_vertices)
     n_breaking = len(breaking)
     field, all_breaking = wanted, breaking
-    for attempt in range(FALLBACK_ATTEMPTS):
+    for attempt in range(12):
         if not len(breaking):
             return field, n_breaking
         checkpoint()
-        radius = FALLBACK_RADIUS * FALLBACK_GROWTH**attempt * loop.edge_length
+        radius = FALLBACK_RADIUS * 1.3**attempt * loop.edge_length
         graph = working.edge_graph()
         away = csgraph.dijkstra(graph, directed=False, indices=all_breaking, min_only=True)
         share = _smooth_step(away / radius - 1.0)

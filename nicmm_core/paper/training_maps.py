@@ -19,11 +19,6 @@ LANE_PART = (0.2, 0.8)
 OBSTACLE_RADII = (0.02, 0.07)
 """Range of the radii of obstacles, in √area."""
 
-STROKE_WEIGHTS = (0.4, 1.0)
-"""Range of the weights of strokes."""
-
-MOST_STROKES = 3
-
 
 def random_maps(
     mesh: Mesh, points: IntArray, generator: np.random.Generator
@@ -53,10 +48,10 @@ def random_maps(
     component = mesh.face_component == mesh.face_component[mesh.faces_at(points[:1])[0]]
     unit = float(np.sqrt(mesh.face_areas[component].sum()))
     obstacles, alignment = np.zeros(size), np.zeros(size)
-    for _ in range(generator.integers(1, MOST_STROKES + 1)):
+    for _ in range(generator.integers(1, 4)):
         ends = generator.choice(points, 2, replace=False)
         path = _shortest_path(graph, int(ends[0]), int(ends[1]))
-        weight = generator.uniform(*STROKE_WEIGHTS)
+        weight = generator.uniform(0.4, 1.0)
         if generator.random() < 0.5:
             middle = generator.choice(path)
             radius = generator.uniform(*OBSTACLE_RADII) * unit

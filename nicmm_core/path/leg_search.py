@@ -34,15 +34,6 @@ It makes two strands of a loop pass a thin limb on opposite sides, which leaves 
 set between them.
 """
 
-FIRST_REACH = 3.0
-"""Length limit of the first search, relative to the straight-line distance between the ends."""
-
-REACH_GROWTH = 2.0
-"""Factor by which the length limit grows from one search to the next."""
-
-WHOLE_SHARE = 0.5
-"""Fraction of the component's faces above which the search covers the whole component instead."""
-
 
 @dataclass(frozen=True)
 class BlockedElements:
@@ -128,18 +119,18 @@ class LegSearch:
         start, end = self._split.position(source), self._split.position(target)
         apart = np.linalg.norm(self._mesh.vertices - start, axis=1)
         apart += np.linalg.norm(self._mesh.vertices - end, axis=1)
-        reach = FIRST_REACH * float(np.linalg.norm(end - start))
+        reach = 3.0 * float(np.linalg.norm(end - start))
         while True:
             checkpoint()
             near = apart <= reach + 2.0 * (self._clearance + self._longest_edge)
             inside = self._component & near[self._mesh.faces].any(axis=1)
-            whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
+            whole = inside.sum() >= 0.5 * self._component.sum()
             limit = np.inf if whole else self._least_factor * reach
             patch = self._whole() if whole else self._patch(inside)
             leg = self._search(patch, source, target, blocked, limit)
             if leg is not None or whole:
                 return leg
-            reach *= REACH_GROWTH
+            reach *= 2.0
 
     def are_joinable(self, pairs: list[tuple[int, int]], blocked: BlockedElements) -> bool:
         """Whether each pair of vertices, taken alone, can be joined by a leg."""

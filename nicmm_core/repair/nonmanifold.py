@@ -29,18 +29,12 @@ from .edge_subdivision import SubdividedFaces, subdivided
 from .face_parts import FaceParts
 from .mapped_mesh import MappedMesh
 
-TURNED_FACES = "faces turned"
-NONMANIFOLD_EDGES = "non-manifold edges separated"
-
 SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
 one pair of faces, so no two edges of the result have the same ends."""
 
 MOST_FACES = 100
 """Number of faces at a vertex up to which `is_manifold` walks around the vertices of a mesh."""
-
-MOST_COMPARED = 32
-"""Number of faces at an edge up to which all pairs are compared to find the straightest one."""
 
 
 def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMesh | None:
@@ -233,7 +227,8 @@ class _Sides:
         outward -= (outward * edge).sum(axis=1, keepdims=True) / squared * edge
         length = np.linalg.norm(outward, axis=1, keepdims=True)
         outward /= np.maximum(length, tolerances.TINY)
-        if len(sides) > MOST_COMPARED:
+        # Comparing all pairs of many faces would take long.
+        if len(sides) > 32:
             return _opposite(outward)
         straight = outward @ outward.T
         np.fill_diagonal(straight, np.inf)
@@ -314,7 +309,11 @@ def _with_areas(
     if which.any():
         parts = parts.turned(which)
         result = Mesh(vertices, parts.faces)
-    repairs = {**clean.repairs, TURNED_FACES: int(which.sum()), NONMANIFOLD_EDGES: separated}
+    repairs = {
+        **clean.repairs,
+        "faces turned": int(which.sum()),
+        "non-manifold edges separated": separated,
+    }
     return MappedMesh(
         original=original,
         mesh=result,
