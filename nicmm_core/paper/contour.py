@@ -76,7 +76,6 @@ def extract_curves(
     nodes, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     curves = []
     for chain, along, closed in _chains(index.reshape(-1, 2), len(nodes)):
-        checkpoint()
         chain, along = _directed(chain, along, closed, nodes, control_vertices)
         parent = working.parent_face[segment_face[along]]
         # No segment starts at the last point of an open chain, so it gets the last segment's face.
@@ -208,7 +207,6 @@ def _chains(segments: IntArray, n_nodes: int) -> list[tuple[IntArray, IntArray, 
 
     irregular = [node for node in range(n_nodes) if len(at_node[node]) != 2]
     for start in [*irregular, *range(n_nodes)]:
-        checkpoint()
         for segment in at_node[start]:
             if unused[segment]:
                 chain, along = walk(start, segment)

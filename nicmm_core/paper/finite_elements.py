@@ -114,7 +114,6 @@ def build_finite_elements(
         cotangents = -igl.cotmatrix_intrinsic(lengths, apart)
         stiffness = sparse.csr_array(reading.T @ cotangents @ reading)
         gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
-    checkpoint()
     if not (face_areas > 0.0).all():
         raise MeshError(DEGENERATE)
     inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)

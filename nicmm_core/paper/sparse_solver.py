@@ -52,9 +52,7 @@ def factorised(matrix: sparse.sparray) -> Solve:
     if matrix.shape[0] >= 4000:
         rows = sparse.csr_array(matrix)
         order = csgraph.reverse_cuthill_mckee(rows, symmetric_mode=True).astype(np.int64)
-        checkpoint()
         matrix = rows[order][:, order]
-        checkpoint()
     try:
         factors = linalg.splu(
             sparse.csc_array(matrix),

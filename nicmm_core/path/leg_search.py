@@ -192,7 +192,6 @@ class LegSearch:
         n_vertices = len(vertices)
         corner = self._split.positions(vertices)
         node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
-        checkpoint()
         keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
         side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
         inner = count > 1

@@ -229,14 +229,12 @@ class SplitMesh:
         mesh = self._mesh
         kept = np.flatnonzero(self._alive & (mesh.face_component == component))
         new_faces, new_parents = self._living_new_faces()
-        checkpoint()
 
         faces = np.concatenate([mesh.faces[kept], new_faces])
         used = np.unique(faces)
         n_input = len(mesh.vertices)
         renumbered = np.full(n_input + len(self._new_weights), -1, dtype=np.int64)
         renumbered[used] = np.arange(len(used))
-        checkpoint()
         interpolation = self._interpolation(used)
         working = WorkingMesh(
             vertices=interpolation @ mesh.vertices,
