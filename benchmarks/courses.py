@@ -145,6 +145,7 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """Energies relative to the least known, and how far the default moves."""
     requests = results["requests"]
+    alone = next(name for name in requests[0]["energies"] if name.startswith("started by"))
     header = ("start", "curves", "geometric mean", "median", "75 %", "90 %", "greatest")
     return (
         "Curves through the same points may take different courses; the first table shows how far "
@@ -155,7 +156,7 @@ def section(results: Results) -> str:
         f"shortest order, seed {results['seed']}). The values are the energies of the relaxed "
         "curves divided by the least energy of all starts for that request, with a common length "
         "scale, the least length of these curves. The starts are: the default; the default on "
-        f"{results['renumberings']} renumbered copies of the mesh; the initial path, "
+        f"{results['renumberings']} renumbered copies of the mesh; a curve {alone}, "
         f"without a search for courses; {results['starts']} initial paths with edge lengths "
         f"multiplied by a random smooth field (exp({results['field']} x), x averaged "
         f"{results['smoothing']} times); and {results['starts']} hop graphs with random weights "

@@ -168,7 +168,7 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
     if "nicmm_core/geometry/mesh.py" in digests:  # the first module that uses the kernels
         for path in sorted([*KERNELS.glob("source/*.[ch]"), *KERNELS.glob("nicmm_kernels/*.py")]):
             digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
-    if "network" not in excluded:
+    if "paper" not in excluded:
         for path in sorted((ROOT / WEIGHTS).iterdir()):
             if path.is_file() and path.suffix != ".py":
                 digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]

@@ -16,7 +16,7 @@ from .scale import Scale
 from .solving import PARTS_WITHOUT, random_samples, significant
 
 TITLE = "Order of convergence of the variational method"
-WITHOUT = (*PARTS_WITHOUT, "network")
+WITHOUT = (*PARTS_WITHOUT, "repair")
 
 SEED = 0
 NOISE = 1e-3
