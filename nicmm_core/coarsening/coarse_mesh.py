@@ -8,6 +8,7 @@ The only requirement on the mesh is that it is connected. Dijkstra's algorithm f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -84,16 +85,27 @@ class CoarseMesh:
             If a cell has no coarse face.
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
-        positions = points.positions(fine)
-        faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-        for number, vertex in enumerate(self.cell[corner]):
-            checkpoint()
-            around = self.mesh.faces_at(self.cells_around(vertex[None]))
-            if not len(around):
+
+        def around(cell: IntArray) -> IntArray:
+            faces = self.mesh.faces_at(self.cells_around(cell))
+            if not len(faces):
                 raise UnreachableError("a cell of the coarse mesh has no face")
-            found, _ = nearest_points(self.mesh, positions[number : number + 1], around)
-            faces[number], barycentric[number] = found.faces[0], found.barycentric[0]
-        return SurfacePoints(faces, barycentric)
+            return faces
+
+        return nearest_in_cells(self.mesh, points.positions(fine), self.cell[corner], around)
+
+
+def nearest_in_cells(
+    mesh: Mesh, positions: FloatArray, cell: IntArray, faces_of: Callable[[IntArray], IntArray]
+) -> SurfacePoints:
+    """Project positions, (n, 3), each to the faces of its cell, (n,), which a function gives."""
+    faces, barycentric = np.zeros(len(cell), np.int64), np.zeros((len(cell), 3))
+    for one in np.unique(cell):
+        checkpoint()
+        here = np.flatnonzero(cell == one)
+        found, _ = nearest_points(mesh, positions[here], faces_of(one[None]))
+        faces[here], barycentric[here] = found.faces, found.barycentric
+    return SurfacePoints(faces, barycentric)
 
 
 def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> CoarseMesh:

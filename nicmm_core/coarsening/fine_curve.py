@@ -8,17 +8,16 @@ on that side.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from ..geometry.array_types import IntArray
-from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, nearest_points
-from ..progress import checkpoint
+from ..geometry.surface_points import SurfacePoints
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.noded_curve import NodedCurve
 from ..relaxation.simple_curve import simple_curve
-from .coarse_mesh import CoarseMesh
+from .coarse_mesh import CoarseMesh, nearest_in_cells
 
 
 def nodes_on_fine_mesh(
@@ -36,7 +35,9 @@ def nodes_on_fine_mesh(
     controls : SurfacePoints
         k points of the fine mesh, in the order in which the curve visits them.
     """
-    fine = surface.mesh
+    fine, places = surface.mesh, coarse_curve.nodes.places
+    cell = coarse.mesh.faces[places.faces, places.barycentric.argmax(axis=1)]
+    faces_of = partial(coarse.faces_of_cells, fine)
 
     def cells_around(faces: IntArray) -> Iterator[IntArray]:
         cells = np.unique(coarse.cell[fine.faces[faces, 0]])
@@ -46,7 +47,7 @@ def nodes_on_fine_mesh(
 
     return simple_curve(
         surface,
-        _nearest_points(fine, coarse, coarse_curve.nodes.places),
+        nearest_in_cells(fine, places.positions(coarse.mesh), cell, faces_of),
         coarse_curve.control_nodes,
         controls,
         coarse_curve.closed,
@@ -54,18 +55,3 @@ def nodes_on_fine_mesh(
         normals=coarse_curve.nodes.normals,
         neighbourhoods=cells_around,
     )
-
-
-def _nearest_points(fine: Mesh, coarse: CoarseMesh, points: SurfacePoints) -> SurfacePoints:
-    """Coarse points projected to the faces of their cells on the fine mesh."""
-    positions = points.positions(coarse.mesh)
-    cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
-    faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-    for one in np.unique(cell).tolist():
-        checkpoint()
-        here = np.flatnonzero(cell == one)
-        found, _ = nearest_points(
-            fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))
-        )
-        faces[here], barycentric[here] = found.faces, found.barycentric
-    return SurfacePoints(faces, barycentric)
