@@ -32,6 +32,12 @@ from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
 
+LARGEST_COPY = 200_000
+"""Number of faces of a connected mesh above which curves are designed on the mesh itself.
+
+A canonical copy of it would take a large part of the time of a curve.
+"""
+
 WAYS = tuple((cleaning, connected) for cleaning in Cleaning for connected in (False, True))
 """Ways to make a manifold, in the order in which they are tried: how much is cleaned, and whether
 all faces at an edge of more than two faces are connected."""
@@ -47,15 +53,15 @@ class Manifold:
         A manifold made from the faces of the given mesh.
     straight : StraightenedMesh or None
         The manifold without vertices that divide straight edges, or None if it has no such vertex.
-    copy : Renumbered
-        Canonical copy of the component of the request.
+    copy : Renumbered or None
+        Canonical copy of the component of the request; None if the mesh is large and connected.
     designer : SurfaceDesigner
         Designer on the last of these meshes.
     """
 
     repaired: MappedMesh
     straight: StraightenedMesh | None
-    copy: Renumbered
+    copy: Renumbered | None
     designer: SurfaceDesigner
 
     @property
@@ -66,11 +72,13 @@ class Manifold:
     @property
     def copies(self) -> tuple[StraightenedMesh | Renumbered, ...]:
         """The copies that lead from the manifold to the mesh of the designer."""
-        return (self.copy,) if self.straight is None else (self.straight, self.copy)
+        return tuple(copy for copy in (self.straight, self.copy) if copy is not None)
 
     def in_original(self, positions: FloatArray) -> FloatArray:
         """Map positions on the mesh of the designer, (n, 3), to the given mesh."""
-        return self.copy.in_original(positions) + self.repaired.origin
+        if self.copy is not None:
+            positions = self.copy.in_original(positions)
+        return positions + self.repaired.origin
 
     def request(self, request: Request) -> Request:
         """Map a request from the repaired mesh to the mesh of the designer."""
@@ -203,13 +211,18 @@ class RepairedSurface:
         component = int(mapped.mesh.face_component[request.points.faces[0]])
         key = (*way, component)
         if key not in self._manifolds:
-            straight = straightened(mapped.mesh, mapped.divisions)
-            mesh = mapped.mesh
-            if straight is not None:
-                mesh = straight.mesh
-                component = int(mesh.face_component[straight.parent[request.points.faces[0]]])
-            copy = renumbered(mesh, component, exact=mapped.moved)
-            self._manifolds[key] = Manifold(mapped, straight, copy, SurfaceDesigner(copy.mesh))
+            inside = mapped.mesh.face_component == component
+            if inside.all() and len(inside) > LARGEST_COPY:
+                made = Manifold(mapped, None, None, SurfaceDesigner(mapped.mesh))
+            else:
+                straight = straightened(mapped.mesh, mapped.divisions)
+                mesh = mapped.mesh
+                if straight is not None:
+                    mesh = straight.mesh
+                    component = int(mesh.face_component[straight.parent[request.points.faces[0]]])
+                copy = renumbered(mesh, component, exact=mapped.moved)
+                made = Manifold(mapped, straight, copy, SurfaceDesigner(copy.mesh))
+            self._manifolds[key] = made
         return self._manifolds[key]
 
 

@@ -20,7 +20,7 @@ from ..errors import MeshError, UnreachableError
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh, corners_differ, edge_lengths
-from ..geometry.numbering import RESOLUTIONS, uniform_hash
+from ..geometry.numbering import frame_coordinates, uniform_hash
 from ..geometry.sampling import CANDIDATES, PACKING, spread_vertices
 from ..geometry.surface_points import SurfacePoints, nearest_points
 from ..progress import checkpoint
@@ -114,7 +114,7 @@ def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> Coa
     Parameters
     ----------
     mesh : Mesh
-        A connected mesh in canonical coordinates, see `geometry.numbering`.
+        A connected mesh.
     vertex_normals : (V, 3) float array
         Unit vectors.
     count : int
@@ -130,7 +130,7 @@ def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> Coa
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # Hashes of positions replace random numbers, so the result does not depend on the numbering.
-    chance = uniform_hash(np.round(mesh.vertices / RESOLUTIONS[0]).astype(np.int64))
+    chance = uniform_hash(frame_coordinates(mesh.vertices, faces, mesh.face_areas))
     seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
     graph = _edge_graph(mesh, chance)
     checkpoint()

@@ -13,6 +13,7 @@ from scipy import sparse
 from ..errors import ArgumentError, MeshError, NicmmError
 from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
+from .vectors import cross, lengths
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Upper bound on coordinates and lower bound on the diagonal of the mesh, so that powers of lengths
@@ -79,7 +80,7 @@ class Mesh:
     def face_normals(self) -> FloatArray:
         """Unit normal of each face, shape (F, 3); zero if the face has no area."""
         normals = area_vectors(self.vertices, self.faces)
-        length = np.linalg.norm(normals, axis=1)
+        length = lengths(normals.T)
         return normals / np.where(length > 0.0, length, 1.0)[:, None]
 
     @property
@@ -239,19 +240,19 @@ def real_array(values: ArrayLike) -> FloatArray:
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
-    return 0.5 * np.linalg.norm(area_vectors(vertices, faces), axis=1)
+    return 0.5 * lengths(area_vectors(vertices, faces).T)
 
 
 def area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Normals whose lengths are twice the areas of the faces, shape (F, 3)."""
     origin, one, other = (np.take(vertices, corner, axis=0) for corner in faces.T)
-    return np.cross(one - origin, other - origin)
+    return np.ascontiguousarray(cross((one - origin).T, (other - origin).T).T)
 
 
 def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
     """Length of each edge, shape (E,)."""
     start, end = (np.take(vertices, of_edge, axis=0) for of_edge in edges.T)
-    return np.linalg.norm(end - start, axis=1)
+    return lengths((end - start).T)
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:

@@ -223,6 +223,21 @@ def _rounded_soundly(
     return places[vertex], integers
 
 
+def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> IntArray:
+    """Rounded coordinates in the principal frame of some faces, as integers, (V, 3).
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+    faces : (F, 3) int array
+        The faces that determine the frame and the unit, the square root of their area.
+    face_areas : (F,) float array
+    """
+    places = _in_frame(vertices, faces, face_areas)[2]
+    unit = max(float(np.sqrt(face_areas.sum())), TINY)
+    return _integers(places, RESOLUTIONS[0] * unit)
+
+
 def _in_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.geometry.numbering import (
     RESOLUTIONS,
+    frame_coordinates,
     principal_frame,
     renumbered,
     uniform_hash,
@@ -51,6 +52,10 @@ def test_rigid_motions_and_scales_keep_the_numbers(body, seed):
     np.testing.assert_array_equal(one.number, other.number)
     np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
     assert one.unit == pytest.approx(3.7 * other.unit)
+    at, there = (
+        frame_coordinates(mesh.vertices, mesh.faces, mesh.face_areas) for mesh in (body, moved)
+    )
+    np.testing.assert_array_equal(there, at)
 
 
 @pytest.mark.slow
