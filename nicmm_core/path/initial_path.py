@@ -221,7 +221,7 @@ def _advice(
     Parameters
     ----------
     mesh, points, phi_fea
-        Arguments of `build_initial_loop`.
+        Arguments of `find_initial_path`.
     tours : _Tours
         Orders to try.
     visited : (k,) int array
