@@ -28,7 +28,6 @@ MEASUREMENTS = (
     "one_loop",
     "pretraining",
     "transfer",
-    "pretrained_start",
     "convergence",
     "ablation",
     "ninth_channel",

@@ -10,9 +10,8 @@ import numpy as np
 
 from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.network.finetuning import FinetuningConfig, finetune
-from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.trainable_network import CurveNetwork
+from nicmm_core.paper.finetuning import FinetuningConfig, finetune
+from nicmm_core.paper.network import CurveNetwork, NetworkConfig
 from nicmm_core.status import Status
 
 from . import collections, plots, report

@@ -10,8 +10,9 @@ import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
-from nicmm_core.network.finetuning import FinetuningConfig, finetune
-from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.paper.finetuning import FinetuningConfig, finetune
+from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.weights_file import load_network
 from nicmm_core.status import Status
 
 from . import collections, plots, renders, report

@@ -1,7 +1,7 @@
 """Measures how fair the course of a curve is, and whether it depends only on the surface.
 
 The best curve known for a request is the one of least energy among many: the default, the default
-on renumbered meshes, the start by the network, paths over random smooth fields, and hop graphs with
+on renumbered meshes, the initial path, paths over random smooth fields, and hop graphs with
 random weights, each searched once, all relaxed. None of these is chosen by its result.
 """
 
@@ -18,12 +18,11 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import improvement
+from nicmm_core import improvement, start_search
 from nicmm_core.courses import course_search, course_surface
 from nicmm_core.courses.comparison import farthest_between
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.level_set import problem
 from nicmm_core.relaxation.curve_nodes import CurveSurface
 from nicmm_core.relaxation.discrete_curve import DiscreteCurve
 from nicmm_core.relaxation.elastic_energy import comparable_energies
@@ -53,7 +52,7 @@ MOVED = 0.01
 TIE = 0.02
 """Relative difference of two energies below which either course is a right answer."""
 
-DEFAULT, NETWORK, RENUMBERED = "default", "started by the network", "renumbered"
+DEFAULT, PATH, RENUMBERED = "default", "started by the initial path", "renumbered"
 FIELDS, GRAPHS = "paths over random fields", "hop graphs with random weights"
 
 KIND = {True: "closed", False: "open"}
@@ -146,6 +145,7 @@ def measure(scale: Scale) -> Results:
 def section(results: Results) -> str:
     """Energies relative to the least known, and how far the default moves."""
     requests = results["requests"]
+    alone = next(name for name in requests[0]["energies"] if name.startswith("started by"))
     header = ("start", "curves", "geometric mean", "median", "75 %", "90 %", "greatest")
     return (
         "Curves through the same points may take different courses; the first table shows how far "
@@ -156,7 +156,7 @@ def section(results: Results) -> str:
         f"shortest order, seed {results['seed']}). The values are the energies of the relaxed "
         "curves divided by the least energy of all starts for that request, with a common length "
         "scale, the least length of these curves. The starts are: the default; the default on "
-        f"{results['renumberings']} renumbered copies of the mesh; the level set of the network, "
+        f"{results['renumberings']} renumbered copies of the mesh; a curve {alone}, "
         f"without a search for courses; {results['starts']} initial paths with edge lengths "
         f"multiplied by a random smooth field (exp({results['field']} x), x averaged "
         f"{results['smoothing']} times); and {results['starts']} hop graphs with random weights "
@@ -265,7 +265,7 @@ def _portfolio(job: Job) -> tuple[dict[str, list[Answer]], int]:
     """Answers by the kind of their start, and the number of starts that were declined."""
     designer = nicmm.Designer(job.mesh)
     default = _answer(designer.design(job.points, order="shortest", closed=job.closed))
-    found: dict[str, list[Answer]] = {DEFAULT: [default], NETWORK: [], FIELDS: [], GRAPHS: []}
+    found: dict[str, list[Answer]] = {DEFAULT: [default], PATH: [], FIELDS: [], GRAPHS: []}
     declined = 0
 
     def add(kind: str) -> None:
@@ -277,7 +277,7 @@ def _portfolio(job: Job) -> tuple[dict[str, list[Answer]], int]:
             declined += 1
 
     with without_courses():
-        add(NETWORK)
+        add(PATH)
     for start in range(job.starts):
         generator = np.random.default_rng([SEED, job.number, start])
         with without_courses(), _random_field(generator):
@@ -297,7 +297,7 @@ def _answer(design: nicmm.Design, change: Similarity = UNCHANGED) -> Answer:
 
 @contextmanager
 def without_courses() -> Iterator[None]:
-    """Designs start from the network."""
+    """Designs start from the initial path."""
     with mock.patch.object(course_surface, "find_courses", lambda *arguments, **named: iter(())):
         yield
 
@@ -305,7 +305,7 @@ def without_courses() -> Iterator[None]:
 @contextmanager
 def _random_field(generator: np.random.Generator) -> Iterator[None]:
     """Multiply the lengths of initial paths by a smooth random field."""
-    build = problem.build_initial_loop
+    build = start_search.find_initial_path
 
     def with_field(mesh: Mesh, *arguments: object, **named: object) -> object:
         field = generator.standard_normal(len(mesh.vertices))
@@ -315,12 +315,12 @@ def _random_field(generator: np.random.Generator) -> Iterator[None]:
             degree = np.bincount(mesh.edges.ravel(), minlength=len(field))
             field = 0.5 * (field + total / np.maximum(degree, 1))
         field = (field - field.mean()) / field.std()
-        # The initial loop multiplies lengths by the square of this weight.
+        # The initial path multiplies lengths by the square of this weight.
         given = list(arguments)
         given[2:3] = [np.exp(0.5 * FIELD * field)]
         return build(mesh, *given, **named)  # type: ignore[arg-type]
 
-    with mock.patch.object(problem, "build_initial_loop", with_field):
+    with mock.patch.object(start_search, "find_initial_path", with_field):
         yield
 
 

@@ -16,7 +16,7 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.problem import build_problem
+from nicmm_core.paper.problem import build_problem
 
 from . import collections, plots, renders, report
 from .elastic_curve import NODES, elastic_curve

@@ -20,7 +20,6 @@ from . import (
     fuzz,
     guarantee,
     ninth_channel,
-    pretrained_start,
     report,
     sharp_edges,
     transfer,
@@ -333,24 +332,6 @@ def _transfer(results: Results) -> str:
     return report.table(header, rows)
 
 
-def _pretrained_start(results: Results) -> str:
-    """The final bending by start, over all kinds of curves."""
-    pooled = pretrained_start.relaxed_from(results["sets"])
-    rows = []
-    for label, relaxed in pooled.items():
-        mean, error = pretrained_start.gain(pooled, label)
-        ratio = "1" if label == pretrained_start.NO_NETWORK else f"{np.exp(mean):.3f} ± {error:.3f}"
-        iterations = np.mean([one["iterations"] for one in relaxed])
-        milliseconds = 1000.0 * np.mean([one["seconds"] for one in relaxed])
-        repaired = 100.0 * np.mean([one["repaired"] for one in relaxed])
-        rows.append((label, ratio, f"{repaired:.0f} %", f"{iterations:.1f}", f"{milliseconds:.0f}"))
-    header = (
-        "start", "final bending relative to φ₀, geometric mean", "topology repaired",
-        "iterations, mean", "CPU ms of a design",
-    )  # fmt: skip
-    return f"{report.table(header, rows)}\n\n{_paragraph(pretrained_start.findings(pooled))}"
-
-
 def _by(items: Iterable[Results], key: str) -> dict[str, list[Results]]:
     groups: dict[str, list[Results]] = defaultdict(list)
     for item in items:
@@ -449,7 +430,6 @@ FIGURES: dict[str, tuple[Callable[..., str], *tuple[str, ...]]] = {
     "cuts": (_cuts, "cuts"),
     "ninth_channel": (_ninth_channel, "ninth_channel"),
     "transfer": (_transfer, "transfer"),
-    "pretrained_start": (_pretrained_start, "pretrained_start"),
     "corpus": (_corpus, "corpus"),
     "messes": (_messes, "messes"),
     "fuzz": (_fuzz, "fuzz"),

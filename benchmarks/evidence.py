@@ -38,7 +38,7 @@ DATA = ROOT / "benchmarks" / "data"
 QUICK_OUTPUT = ROOT / "benchmarks" / "quick"
 """Output folder of quick and smoke runs; not under version control."""
 
-WEIGHTS = "nicmm_core/network/weights"
+WEIGHTS = "nicmm_core/paper/weights"
 KERNELS = ROOT / "kernels"
 """Compiled kernels: all files of the C sources, and of the package that passes arrays to them."""
 
@@ -168,7 +168,7 @@ def code_behind(name: str, read: Read = Path.read_bytes) -> dict[str, str]:
     if "nicmm_core/geometry/mesh.py" in digests:  # the first module that uses the kernels
         for path in sorted([*KERNELS.glob("source/*.[ch]"), *KERNELS.glob("nicmm_kernels/*.py")]):
             digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]
-    if "network" not in excluded:
+    if "paper" not in excluded:
         for path in sorted((ROOT / WEIGHTS).iterdir()):
             if path.is_file() and path.suffix != ".py":
                 digests[_relative(path)] = hashlib.sha256(read(path)).hexdigest()[:16]

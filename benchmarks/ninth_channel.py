@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import torch
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.losses import LossWeights, balanced
-from nicmm_core.level_set.problem import build_problem
 from nicmm_core.maps.guidance import BASELINE
-from nicmm_core.network.forward_pass import NetworkWeights
-from nicmm_core.network.trainable_network import build_network
-from nicmm_core.network.training_maps import random_maps
-from nicmm_core.network.weights_file import shipped_weights
+from nicmm_core.paper.losses import LossWeights, balanced
+from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.problem import build_problem
+from nicmm_core.paper.training_maps import random_maps
+from nicmm_core.paper.weights_file import shipped_network
 
 from . import collections, plots, report
 from .evidence import Results
@@ -36,11 +37,11 @@ SEEN, NEUTRAL, WITHOUT_MAPS = "with φ_fea", "the same, φ_fea neutral", "traine
 
 def measure(scale: Scale) -> Results:
     """Fine-tune networks with and without φ_fea on sets with maps."""
-    with_maps, without = shipped_weights(CHANNEL + 1), shipped_weights(CHANNEL)
+    with_maps, without = shipped_network(CHANNEL + 1), shipped_network(CHANNEL)
     networks = {
-        SEEN: build_network(with_maps),
-        NEUTRAL: build_network(blind(with_maps)),
-        WITHOUT_MAPS: build_network(_padded(without)),
+        SEEN: with_maps,
+        NEUTRAL: blind(with_maps),
+        WITHOUT_MAPS: _padded(without),
     }
     return {
         "seed": SEED,
@@ -104,18 +105,22 @@ def _samples(scale: Scale) -> Iterator[Sample]:
         yield Sample(name, mesh, points, problem, balanced(LossWeights(), problem))
 
 
-def blind(weights: NetworkWeights) -> NetworkWeights:
+@torch.no_grad()
+def blind(network: CurveNetwork) -> CurveNetwork:
     """Network that computes what the given one computes for a neutral φ_fea everywhere."""
-    parameters = dict(weights.parameters)
-    stem = parameters["stem.weight"].copy()
-    parameters["stem.bias"] = parameters["stem.bias"] + BASELINE * stem[:, CHANNEL]
-    stem[:, CHANNEL] = 0.0
-    parameters["stem.weight"] = stem
-    return NetworkWeights(weights.config, parameters)
+    blinded = copy.deepcopy(network)
+    stem = blinded.stem
+    stem.bias += BASELINE * stem.weight[:, CHANNEL]
+    stem.weight[:, CHANNEL] = 0.0
+    return blinded
 
 
-def _padded(weights: NetworkWeights) -> NetworkWeights:
+@torch.no_grad()
+def _padded(network: CurveNetwork) -> CurveNetwork:
     """Network with an input for φ_fea that it ignores, made from one without that input."""
-    stem = weights.parameters["stem.weight"]
-    wider = {"stem.weight": np.pad(stem, ((0, 0), (0, CHANNEL + 1 - stem.shape[1])))}
-    return NetworkWeights(weights.config, {**weights.parameters, **wider})
+    wider = CurveNetwork(network.config, CHANNEL + 1)
+    state = network.state_dict()
+    added = CHANNEL + 1 - state["stem.weight"].shape[1]
+    state["stem.weight"] = torch.nn.functional.pad(state["stem.weight"], (0, added))
+    wider.load_state_dict(state)
+    return wider

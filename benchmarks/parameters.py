@@ -9,9 +9,10 @@ import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
-from nicmm_core.level_set.losses import LossWeights
-from nicmm_core.network.finetuning import BAND_WIDTH, finetune
-from nicmm_core.network.trainable_network import CurveNetwork, load_network
+from nicmm_core.paper.finetuning import BAND_WIDTH, finetune
+from nicmm_core.paper.losses import LossWeights
+from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, renders, report
 from .evidence import Results

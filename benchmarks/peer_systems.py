@@ -22,7 +22,7 @@ import numpy as np
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.problem import build_problem
+from nicmm_core.paper.problem import build_problem
 
 
 @dataclass(frozen=True)

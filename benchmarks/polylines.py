@@ -10,7 +10,7 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve, curve_on_mesh
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.normals import vertex_normals
-from nicmm_core.level_set.problem import Problem
+from nicmm_core.paper.problem import Problem
 
 PARTS_OF_A_SEGMENT = 16
 """Points on each segment at which distances are measured."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nicmm_core.network.trainable_network import load_network
+from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, report
 from .evidence import Results

@@ -20,22 +20,21 @@ from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.level_set.contour import extract_curves
-from nicmm_core.level_set.losses import LossWeights, balanced
-from nicmm_core.level_set.problem import Problem, build_problem
-from nicmm_core.level_set.zero_set import zero_set
-from nicmm_core.network.finetuning import FinetuningConfig, finetune
-from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.pretraining import PretrainingConfig, pretrain
-from nicmm_core.network.trainable_network import CurveNetwork, load_network
-from nicmm_core.path.band_refinement import RESOLUTION
+from nicmm_core.paper.contour import extract_curves
+from nicmm_core.paper.finetuning import FinetuningConfig, finetune
+from nicmm_core.paper.losses import LossWeights, balanced
+from nicmm_core.paper.network import CurveNetwork, NetworkConfig
+from nicmm_core.paper.pretraining import PretrainingConfig, pretrain
+from nicmm_core.paper.problem import Problem, build_problem
+from nicmm_core.paper.weights_file import load_network
+from nicmm_core.paper.zero_set import zero_set
 from tests.oracles.distances import distances
 
 from .evidence import Results
 from .measures import diagonal
 from .samples import random_sets
 
-PARTS_WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "repair", "splines")
+PARTS_WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "splines")
 """Folders of the core that nothing in this module runs, for the `WITHOUT` of a measurement."""
 
 DIGITS = 6
@@ -78,7 +77,6 @@ def random_samples(
     seed: int,
     order: str = "shortest",
     closed: bool = True,
-    resolution: int = RESOLUTION,
 ) -> Iterator[Sample]:
     """Problems for the point sets of `random_sets`.
 
@@ -87,7 +85,7 @@ def random_samples(
     for name, mesh, points in random_sets(meshes, per_mesh, seed):
         located = locate_control_points(mesh, points, closed)
         try:
-            problem = build_problem(mesh, located, order, closed=closed, resolution=resolution)
+            problem = build_problem(mesh, located, order, closed=closed)
         except nicmm.UnreachableError as error:
             print(f"  {name}: {error}", flush=True)
             continue

@@ -20,8 +20,6 @@ from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_candidates, course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.level_set import problem, zero_set
-from nicmm_core.network import single_pass
 
 from . import report
 from .evidence import Results
@@ -80,18 +78,8 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "courses relaxed together": [(course_search, "relax_batch")],
     "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
     "course traced": [(start_search, "simple_curve")],
-    "initial path": [(problem, "build_initial_loop")],
-    "distance and smoothing": [(problem, "signed_distance"), (problem, "build_smoother")],
-    "network": [(single_pass, "infer_level_set")],
-    "one loop, contour": [
-        (problem, "keep_topology"),
-        (zero_set, "keep_topology"),
-        (zero_set, "extract_curves"),
-    ],
-    "mapping to the fine mesh": [
-        (coarse_start, "curve_on_fine_mesh"),
-        (coarse_start, "nodes_on_fine_mesh"),
-    ],
+    "initial path": [(start_search, "find_initial_path")],
+    "mapping to the fine mesh": [(coarse_start, "nodes_on_fine_mesh")],
     "start from the last curve": [(surface_designer, "moved_start")],
     "relaxation": [(surface_designer, "relax")],
 }

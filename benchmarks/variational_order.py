@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
-from nicmm_core.level_set.variational import VariationalConfig, solve
+from nicmm_core.paper.variational import VariationalConfig, solve
 
 from . import collections, plots, report
 from .evidence import Results
@@ -16,7 +16,7 @@ from .scale import Scale
 from .solving import PARTS_WITHOUT, random_samples, significant
 
 TITLE = "Order of convergence of the variational method"
-WITHOUT = (*PARTS_WITHOUT, "network")
+WITHOUT = (*PARTS_WITHOUT, "repair")
 
 SEED = 0
 NOISE = 1e-3

@@ -148,8 +148,8 @@ def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> Float
 def _pretrain(given: argparse.Namespace) -> None:
     from tqdm import tqdm
 
-    from .network.forward_pass import NetworkConfig
-    from .network.pretraining import PretrainingConfig, pretrain
+    from .paper.network import NetworkConfig
+    from .paper.pretraining import PretrainingConfig, pretrain
 
     bars: dict[str, tqdm] = {}
 

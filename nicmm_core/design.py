@@ -10,11 +10,10 @@ best course,
 
 or, if no course is found,
 
-control points → initial path → signed distance → features (`level_set.problem`) → pretrained
-network → its level set → one loop through the points → contour → relaxation of the curve.
+control points → initial path (`path`) → relaxation of the path.
 
-Except on small meshes, all steps before the relaxation run on a coarse mesh of the same surface,
-and the curve is mapped from there to the fine mesh (`coarsening`).
+Except on small meshes, courses are found on a coarse mesh of the same surface, and mapped from
+there to the fine mesh (`coarsening`). The other methods are in `paper`.
 """
 
 from __future__ import annotations
@@ -258,9 +257,9 @@ def design_curve(
         that control points may have, through which the curve from which the computation starts
         runs to the next control point. The result passes near them. Only for the order "given".
     method : {"nicmm", "nicmm-paper", "variational"}
-        The best of many candidate courses, or else the level set of the pretrained network, relaxed
-        on the surface (the default); the method of the paper, which trains the network further for
-        every curve; or the same energy minimised without a network.
+        The best of many candidate courses, or else the initial path, relaxed on the surface (the
+        default); the method of the paper, which trains a network for every curve; or the same
+        energy minimised without a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
         Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
         a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.

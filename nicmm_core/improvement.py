@@ -2,7 +2,7 @@
 
 In turn: other courses of the first search, the courses of a repeated search, the best curve with
 other parts, the courses of more searches, and for kinks the same start with more tension and the
-curve of the network. At last come courses for alternatives. `courses.attempts` decides whether each
+initial path. At last come courses for alternatives. `courses.attempts` decides whether each
 of them is made.
 """
 
@@ -92,12 +92,12 @@ class Improvement:
             self._search_again(further)
         if attempts.should_tighten():
             self.attempt(self.starts[attempts.best], attempts.limited(TIGHTENED))
-        if by_course and attempts.should_try_network():
-            # On steps and creases, the network's path may be better than any course. It is only
+        if by_course and attempts.should_try_path():
+            # On steps and creases, the initial path may be better than any course. It is only
             # another candidate, so its errors do not matter.
             start = None
             with contextlib.suppress(NicmmError):
-                start = self.search.by_network(request)
+                start = self.search.by_path(request)
             if start is not None:
                 self.attempt(start, self._config)
         if request.alternatives:

@@ -36,9 +36,6 @@ A cancellation usually takes effect within 0.2 s. On meshes of a million faces i
 since checkpoints are farther apart there.
 """
 
-SHOWING = 10.0
-"""Pause between two evaluations of the points, relative to the duration of the earlier one."""
-
 
 class CancelledError(Exception):
     """The caller has cancelled. Internal: `Design.status` reports the cancellation."""
@@ -78,7 +75,8 @@ class _Watch:
             find, self._pending = self._pending, None
             self._points, self._shown = find(), True
             after = time.perf_counter()
-            self._next_points = after + SHOWING * (after - now)
+            # Evaluating the points takes at most about a tenth of the time.
+            self._next_points = after + 10.0 * (after - now)
         # The caller may modify the copy.
         answer = self._progress(self._fraction, self._points.copy())
         self._stopped = isinstance(answer, bool | np.bool_) and not answer

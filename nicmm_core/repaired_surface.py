@@ -28,12 +28,12 @@ from .repair.clean_surface import Cleaning, CleanSurface, clean_surface
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
 from .repair.straight_edges import StraightenedMesh, straightened
-from .request import Request, renumbered_request
+from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
 
 LARGEST_COPY = 200_000
-"""Number of faces of a component above which curves are designed on the component itself.
+"""Number of faces of a connected mesh above which curves are designed on the mesh itself.
 
 A canonical copy of it would take a large part of the time of a curve.
 """
@@ -54,7 +54,7 @@ class Manifold:
     straight : StraightenedMesh or None
         The manifold without vertices that divide straight edges, or None if it has no such vertex.
     copy : Renumbered or None
-        Canonical copy of the component of the request; None if the component is large.
+        Canonical copy of the component of the request; None if the mesh is large and connected.
     designer : SurfaceDesigner
         Designer on the last of these meshes.
     """
@@ -69,6 +69,11 @@ class Manifold:
         """The mesh of the designer."""
         return self.designer.mesh
 
+    @property
+    def copies(self) -> tuple[StraightenedMesh | Renumbered, ...]:
+        """The copies that lead from the manifold to the mesh of the designer."""
+        return tuple(copy for copy in (self.straight, self.copy) if copy is not None)
+
     def in_original(self, positions: FloatArray) -> FloatArray:
         """Map positions on the mesh of the designer, (n, 3), to the given mesh."""
         if self.copy is not None:
@@ -77,11 +82,9 @@ class Manifold:
 
     def request(self, request: Request) -> Request:
         """Map a request from the repaired mesh to the mesh of the designer."""
-        if self.straight is not None:
-            to_mesh = self.straight.points_to_mesh
-            via_points = {leg: to_mesh(points) for leg, points in request.via_points.items()}
-            request = replace(request, points=to_mesh(request.points), via_points=via_points)
-        return request if self.copy is None else renumbered_request(self.copy, request)
+        for copy in self.copies:
+            request = mapped_request(request, copy.points_to, copy.weights_to)
+        return request
 
     def curve(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve from the given mesh to that of the designer.
@@ -94,29 +97,26 @@ class Manifold:
         CurveError
             If the curve lies on another component.
         """
-        mapped = self.repaired.curve_from_original(curve)
-        if mapped is not None and self.straight is not None:
-            mapped = self.straight.curve_to_mesh(mapped)
-        if mapped is None or self.copy is None:
-            return mapped
-        on_copy = self.copy.curve_to_copy(mapped)
-        if on_copy is None:
-            raise CurveError(
-                f"start and control_points lie on different components of the mesh{WITHOUT_START}"
-            )
-        return on_copy
+        mapped = self.repaired.curve_to(curve)
+        if mapped is None:
+            return None
+        for copy in self.copies:
+            mapped = copy.curve_to(mapped)
+            if mapped is None:
+                raise CurveError(
+                    "start and control_points lie on different components of the mesh"
+                    f"{WITHOUT_START}"
+                )
+        return mapped
 
     def design_on_original(self, design: Design, points: SurfacePoints) -> Design:
         """Map a design to the given mesh, on which its control points are given."""
-        if self.copy is not None:
-            design = _mapped(design, self.copy.curve_to_original, self.copy.field_to_original)
-        straight, repaired = self.straight, self.repaired
-        if straight is not None:
-            design = _mapped(design, straight.curve_to_original, straight.field_to_original)
-        if repaired.differs:
-            to_original = partial(repaired.curve_to_original, points=points)
-            design = _mapped(design, to_original, repaired.field_to_original)
-        return _given_on(repaired, design)
+        for copy in self.copies[::-1]:
+            design = _mapped(design, copy.curve_back, copy.field_back)
+        if self.repaired.differs:
+            curve_back = partial(self.repaired.curve_back, points=points)
+            design = _mapped(design, curve_back, self.repaired.field_back)
+        return _given_on(self.repaired, design)
 
 
 class CleanSurfaces:
@@ -160,7 +160,6 @@ class RepairedSurface:
         self._clean, self._usable = clean, usable
         self._made: dict[tuple[Cleaning, bool], MappedMesh | None] = {}
         self._manifolds: dict[tuple[Cleaning, bool, int], Manifold] = {}  # the last is a component
-        self._whole: dict[tuple[Cleaning, bool], SurfaceDesigner] = {}  # without a copy
 
     @property
     def first(self) -> MappedMesh:
@@ -212,9 +211,9 @@ class RepairedSurface:
         component = int(mapped.mesh.face_component[request.points.faces[0]])
         key = (*way, component)
         if key not in self._manifolds:
-            if np.count_nonzero(mapped.mesh.face_component == component) > LARGEST_COPY:
-                whole = self._whole.setdefault(way, SurfaceDesigner(mapped.mesh))
-                made = Manifold(mapped, None, None, whole)
+            inside = mapped.mesh.face_component == component
+            if inside.all() and len(inside) > LARGEST_COPY:
+                made = Manifold(mapped, None, None, SurfaceDesigner(mapped.mesh))
             else:
                 straight = straightened(mapped.mesh, mapped.divisions)
                 mesh = mapped.mesh
@@ -237,16 +236,13 @@ def request_on(mapped: MappedMesh, request: Request) -> Request | None:
     component = mapped.common_component([point for of_set in representations for point in of_set])
     if component is None:
         return None
-    points, *via_points = (mapped.points(of_set, component) for of_set in representations)
+    on_component = [mapped.points(of_set, component) for of_set in representations]
+    points = on_component[0]
     if coincide(mapped.mesh, points):  # on the two sides of a gap that was closed
         return None
-    return replace(
-        request,
-        points=points,
-        via_points=dict(zip(request.via_points, via_points, strict=True)),
-        obstacles=mapped.weights(request.obstacles),
-        alignment=mapped.weights(request.alignment),
-    )
+    there = mapped_request(request, lambda given: given, mapped.weights_to)
+    via_points = dict(zip(request.via_points, on_component[1:], strict=True))
+    return replace(there, points=points, via_points=via_points)
 
 
 def is_on(manifold: Manifold, start: Resumable) -> bool:

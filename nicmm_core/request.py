@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from .geometry.array_types import FloatArray
-from .geometry.numbering import Renumbered
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
 
@@ -58,15 +58,18 @@ class Request:
         return {"control_points": self.points, **via}
 
 
-def renumbered_request(there: Renumbered, request: Request) -> Request:
-    """Map a request from the original of a renumbered mesh to the renumbered copy."""
-    via_points = {key: there.points_to_copy(points) for key, points in request.via_points.items()}
+def mapped_request(
+    request: Request,
+    points: Callable[[SurfacePoints], SurfacePoints],
+    weights: Callable[[FloatArray], FloatArray],
+) -> Request:
+    """Map a request to another mesh, by functions that map its points and its weights."""
     return replace(
         request,
-        points=there.points_to_copy(request.points),
-        via_points=via_points,
-        obstacles=there.values(request.obstacles),
-        alignment=there.values(request.alignment),
+        points=points(request.points),
+        via_points={key: points(via) for key, via in request.via_points.items()},
+        obstacles=None if request.obstacles is None else weights(request.obstacles),
+        alignment=None if request.alignment is None else weights(request.alignment),
     )
 
 

@@ -1,7 +1,7 @@
 """Searches for starts: simple curves on a mesh from which relaxation begins.
 
-A start is a course of a search (`courses`), or the curve of the network if no course is found. On a
-large mesh both are found on a coarse mesh (`coarsening`).
+A start is a course of a search (`courses`), or the initial path (`path`) if no course is found. On
+a large mesh courses are searched for on a coarse mesh (`coarsening`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
 from .maps.guidance import component_unit
-from .network.single_pass import infer
-from .path.initial_loop import path_curve
+from .path.initial_path import find_initial_path, path_curve
 from .progress import checkpoint
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from .relaxation.discrete_curve import DiscreteCurve
@@ -41,8 +40,6 @@ class Start:
         The surface with the maps of the request.
     unit : float
         Square root of the area of the component.
-    breaking : int
-        Number of breaking vertices of the level set, if the start is its zero set.
     collisions : int
         Number of next designs for which strands are assumed to collide again.
     unsettled : (n,) int array or None
@@ -53,7 +50,6 @@ class Start:
     visited: IntArray
     surface: CurveSurface
     unit: float
-    breaking: int = 0
     collisions: int = 0
     unsettled: IntArray | None = None
 
@@ -64,11 +60,11 @@ class StartSearch:
     Parameters
     ----------
     mesh : Mesh
+        A connected mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self._units: dict[int, float] = {}  # by component
         self._mapped: tuple[Request, CurveSurface] | None = None  # of the last request with maps
 
     def courses(
@@ -101,54 +97,41 @@ class StartSearch:
                 found.append(course.curve)
                 yield replace(start, curve=changed)
 
-    def by_network(self, request: Request) -> Start:
-        """The zero set of the network's level set, or the path if the zero set is not simple."""
-        coarse = self._coarse_starts.by_network(request)
-        if coarse is not None:
-            return Start(
-                curve=coarse.curve,
-                visited=coarse.visited,
-                surface=self.surface(request),
-                unit=self.unit(request),
-                breaking=coarse.breaking_vertices,
-            )
-        found = infer(self.mesh, request)
-        problem, zeros = found.problem, found.zeros
-        # A zero set may touch itself where the mesh is too coarse; the path does not.
-        one = zeros.is_simple_curve(self.mesh, request.closed)
-        curve = zeros.curves[0] if one else path_curve(self.mesh, problem.working, problem.loop)
-        return Start(
-            curve=curve,
-            visited=problem.loop.order,
-            surface=self.surface(request),
-            unit=problem.unit,
-            breaking=zeros.breaking_vertices,
+    def by_path(self, request: Request) -> Start:
+        """The initial path."""
+        surface = self.surface(request)
+        path = find_initial_path(
+            self.mesh,
+            request.points,
+            request.order,
+            surface.feature_map,
+            request.closed,
+            request.via_points,
         )
+        return Start(path_curve(self.mesh, path), path.order, surface, self.unit)
 
     def surface(self, request: Request) -> CurveSurface:
         """The surface for relaxation, with the maps of a request."""
         if not request.has_maps:
             return self._surface
         last = self._mapped
-        if last is None or not self._same_maps(last[0], request):
+        if last is None or not same_maps(last[0], request):
             obstacles, alignment = request.obstacles, request.alignment
-            mapped = with_maps(self._surface, obstacles, alignment, self.unit(request))
+            mapped = with_maps(self._surface, obstacles, alignment, self.unit)
             last = self._mapped = request, mapped
         return last[1]
 
-    def unit(self, request: Request) -> float:
-        """Square root of the area of the component of a request."""
-        component = self._component(request)
-        if component not in self._units:
-            self._units[component] = component_unit(self.mesh, component)
-        return self._units[component]
+    @cached_property
+    def unit(self) -> float:
+        """Square root of the area of the mesh."""
+        return component_unit(self.mesh, 0)
 
     def _joined_courses(self, request: Request, seed: int) -> Iterator[Start | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
-        there, unit = self.surface(request), self.unit(request)
-        if self._coarse_starts.is_large(request):
+        there, unit = self.surface(request), self.unit
+        if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, seed):
-                yield None if found is None else Start(found.curve, found.visited, there, unit)
+                yield None if found is None else Start(*found, there, unit)
             return
         for course in self._courses.courses(request, seed):
             checkpoint()
@@ -160,13 +143,6 @@ class StartSearch:
                 request.closed,
             )
             yield None if curve is None else Start(curve, course.visited, there, unit)
-
-    def _same_maps(self, one: Request, other: Request) -> bool:
-        """Whether two requests have the same maps on the same component."""
-        return self._component(one) == self._component(other) and same_maps(one, other)
-
-    def _component(self, request: Request) -> int:
-        return int(self.mesh.face_component[request.points.faces[0]])
 
     @cached_property
     def _surface(self) -> CurveSurface:

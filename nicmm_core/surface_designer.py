@@ -1,4 +1,4 @@
-"""Designs a curve on a manifold: from an earlier curve, from a course, or from the network.
+"""Designs a curve on a manifold: from an earlier curve, from a course, or from the initial path.
 
 This is the pipeline of a checked request; `design` is its entry point.
 """
@@ -15,15 +15,9 @@ from .courses.attempts import Attempts
 from .design_result import Design
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
+from .geometry.curve_field import curve_field
 from .geometry.mesh import Mesh
 from .improvement import Improvement, relaxation_config
-from .level_set import variational
-from .level_set.curve_field import curve_field
-from .level_set.losses import LossWeights, balanced, energy_surface, loss_terms
-from .level_set.problem import Problem, requested_problem
-from .level_set.solution import Solution
-from .level_set.zero_set import ZeroSet, zero_set
-from .network.weights_file import shipped_weights
 from .progress import CancelledError, checkpoint, subrange
 from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
@@ -88,19 +82,9 @@ class SurfaceDesigner:
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
             return self._designed(request, max_iterations, started)
-        with subrange(0.0, 0.3):
-            problem = requested_problem(self.mesh, request)
-        watch = _FieldWatch(self.mesh, problem)
-        try:
-            with subrange(0.3, 0.9):
-                solution = self._solution(problem, request, watch)
-            zeros = zero_set(self.mesh, problem, solution.field, solution.keeps_topology)
-        except CancelledError:
-            if watch.shown is None:
-                raise
-            design = self._level_set_design(problem, watch.solution, watch.shown, started)
-            return replace(design, iterations=watch.shown_after)
-        return self._level_set_design(problem, solution, zeros, started)
+        from .paper.level_set_design import level_set_design  # only the other methods need it
+
+        return level_set_design(self.mesh, request, started)
 
     def _resumed(
         self,
@@ -121,7 +105,7 @@ class SurfaceDesigner:
             curve,
             visited,
             surface,
-            self._search.unit(request),
+            self._search.unit,
             collisions=collisions,
             unsettled=unsettled,
         )
@@ -129,13 +113,13 @@ class SurfaceDesigner:
         return self._relaxed_design(request, begin, relaxed, started)
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
-        """Relax the best course, or the curve of the network if no course is found."""
+        """Relax the best course, or the initial path if no course is found."""
         with subrange(0.0, START_FRACTION):
             courses = self._search.courses(request)
             start = next(courses, None)
             by_course = start is not None
             if start is None:
-                start = self._search.by_network(request)
+                start = self._search.by_path(request)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
             if max_iterations is not None or first.status is Status.CANCELLED:
@@ -177,7 +161,7 @@ class SurfaceDesigner:
             iterations=relaxed.iterations,
             seconds=time.perf_counter() - started,
             energy=energy,
-            breaking_vertices=start.breaking,
+            breaking_vertices=0,
             find_field=partial(curve_field, self.mesh, relaxed.curve),
             resumable=Resumable(
                 self.mesh,
@@ -188,33 +172,6 @@ class SurfaceDesigner:
                 np.zeros(0, np.int64) if converged else start.unsettled,
             ),
         )
-
-    def _level_set_design(
-        self, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
-    ) -> Design:
-        """The design whose curve is the zero set of a level set, without relaxation."""
-        one = zeros.is_simple_curve(self.mesh, problem.loop.closed)
-        return Design(
-            status=solution.status if one else Status.NOT_ONE_CURVE,
-            curves=zeros.curves,
-            iterations=solution.iterations,
-            seconds=time.perf_counter() - started,
-            energy=solution.terms,
-            breaking_vertices=zeros.breaking_vertices,
-            find_field=partial(_at_input_vertices, self.mesh, problem, zeros.field),
-        )
-
-    def _solution(self, problem: Problem, request: Request, watch: _FieldWatch) -> Solution:
-        """Solve for the level set by a method other than "nicmm"."""
-        weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
-        if request.method == "variational":
-            return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-        pretrained = shipped_weights(problem.features.shape[1])
-        # These modules import PyTorch, which only this method needs.
-        from .network.finetuning import FinetuningConfig, finetune
-        from .network.trainable_network import build_network
-
-        return finetune(build_network(pretrained), problem, weights, FinetuningConfig(), watch)
 
 
 def _relaxed(
@@ -240,43 +197,3 @@ def _relaxed_unless_cancelled(request: Request, start: Start, config: Relaxation
     if relaxed.status is Status.CANCELLED:
         raise CancelledError
     return relaxed
-
-
-class _FieldWatch:
-    """Reports the zero set while a level set is computed, and keeps the last one reported."""
-
-    def __init__(self, mesh: Mesh, problem: Problem) -> None:
-        self._mesh, self._problem = mesh, problem
-        self._iterations = 0
-        self.shown: ZeroSet | None = None
-        self.shown_after = 0
-
-    def __call__(self, done: float, field: FloatArray) -> bool:
-        self._iterations += 1
-        checkpoint(done, partial(self._show, field, self._iterations))
-        return True
-
-    @property
-    def solution(self) -> Solution:
-        """The level set reported last, as the solution of a cancelled solver."""
-        assert self.shown is not None  # checked by the caller
-        field = self.shown.field
-        terms = loss_terms(energy_surface(self._problem), field)
-        terms = {name: float(value) for name, value in terms.items()}
-        return Solution(field, terms, [], Status.CANCELLED)
-
-    def _show(self, field: FloatArray, iteration: int) -> FloatArray:
-        zeros = zero_set(self._mesh, self._problem, field)
-        self.shown, self.shown_after = zeros, iteration
-        return zeros.curves[0].points if zeros.curves else np.zeros((0, 3))
-
-
-def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:
-    """φ at the input vertices, in mesh units; vertices without φ get the largest value."""
-    if problem.bundle is not None:
-        # A section of a sign bundle has no sign at a vertex: the sign depends on the face.
-        field = np.abs(field)
-    inputs = problem.working.input_vertex
-    values = np.full(len(mesh.vertices), field.max() * problem.unit)
-    values[inputs[inputs >= 0]] = field[inputs >= 0] * problem.unit
-    return values

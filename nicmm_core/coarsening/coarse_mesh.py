@@ -3,13 +3,12 @@
 Some vertices of the fine mesh are chosen as seeds, spread about evenly. Every vertex belongs to the
 cell of the seed that is nearest to it along edges. Three seeds whose cells meet in a face form a
 coarse face. Distances are measured along the surface, so two sheets that come close stay separate.
-The only requirement on the mesh is that it is connected. Dijkstra's algorithm finds the cells, on a
-large mesh slab by slab.
+The only requirement on the mesh is that it is connected. Dijkstra's algorithm finds the cells.
 """
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,23 +29,10 @@ from ..repair.degenerate_faces import degenerate_faces, perturbed
 TIE_BREAK = 1e-6
 """Greatest relative change of the length of an edge due to each of its ends."""
 
-SLAB = 150_000
-"""Number of vertices in a slab, over which Dijkstra's algorithm takes about 0.1 s.
-
-It holds Python's global lock and cannot be cancelled while it runs.
-"""
-
-MARGIN = 4.0
-"""Overlap of a slab with its neighbours on either side, in least distances between seeds.
-
-Candidates are about half a least distance apart, so hardly any vertex is farther than two least
-distances from its nearest seed; paths along edges are slightly longer.
-"""
-
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """A coarse mesh of one component, with its vertices on the fine mesh.
+    """A coarse mesh of a connected mesh, with its vertices on the fine mesh.
 
     Attributes
     ----------
@@ -55,7 +41,7 @@ class CoarseMesh:
     seed : (n,) int array
         The fine vertex at which each coarse vertex lies.
     cell : (V,) int array
-        The coarse vertex nearest to each fine vertex along edges, -1 on other components.
+        The coarse vertex nearest to each fine vertex along edges, -1 for vertices without faces.
     """
 
     mesh: Mesh
@@ -79,7 +65,10 @@ class CoarseMesh:
         return np.unique(self.mesh.faces[self.mesh.faces_at(vertices)])
 
     def greatest_in_cells(self, values: FloatArray) -> FloatArray:
-        """The greatest value in each cell, shape (n,), of values at fine vertices, (V,)."""
+        """The greatest of the weights at fine vertices, (V,), in each cell, shape (n,).
+
+        So no obstacle and no lane is lost.
+        """
         greatest = np.full(len(self.seed), -np.inf)
         inside = self.cell >= 0
         np.maximum.at(greatest, self.cell[inside], values[inside])
@@ -96,30 +85,38 @@ class CoarseMesh:
             If a cell has no coarse face.
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
-        positions = points.positions(fine)
-        faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-        for number, vertex in enumerate(self.cell[corner]):
-            checkpoint()
-            around = self.mesh.faces_at(self.cells_around(vertex[None]))
-            if not len(around):
+
+        def around(cell: IntArray) -> IntArray:
+            faces = self.mesh.faces_at(self.cells_around(cell))
+            if not len(faces):
                 raise UnreachableError("a cell of the coarse mesh has no face")
-            found, _ = nearest_points(self.mesh, positions[number : number + 1], around)
-            faces[number], barycentric[number] = found.faces[0], found.barycentric[0]
-        return SurfacePoints(faces, barycentric)
+            return faces
+
+        return nearest_in_cells(self.mesh, points.positions(fine), self.cell[corner], around)
 
 
-def build_coarse_mesh(
-    mesh: Mesh, vertex_normals: FloatArray, component: int, count: int
-) -> CoarseMesh:
-    """Build the dual of about ``count`` Voronoi cells of one component.
+def nearest_in_cells(
+    mesh: Mesh, positions: FloatArray, cell: IntArray, faces_of: Callable[[IntArray], IntArray]
+) -> SurfacePoints:
+    """Project positions, (n, 3), each to the faces of its cell, (n,), which a function gives."""
+    faces, barycentric = np.zeros(len(cell), np.int64), np.zeros((len(cell), 3))
+    for one in np.unique(cell):
+        checkpoint()
+        here = np.flatnonzero(cell == one)
+        found, _ = nearest_points(mesh, positions[here], faces_of(one[None]))
+        faces[here], barycentric[here] = found.faces, found.barycentric
+    return SurfacePoints(faces, barycentric)
+
+
+def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> CoarseMesh:
+    """Build the dual of about ``count`` Voronoi cells.
 
     Parameters
     ----------
     mesh : Mesh
+        A connected mesh.
     vertex_normals : (V, 3) float array
         Unit vectors.
-    component : int
-        Index of the component.
     count : int
         Approximate number of cells; strongly curved regions get more.
 
@@ -128,28 +125,22 @@ def build_coarse_mesh(
     MeshError
         If no three cells meet in a face.
     """
-    inside = mesh.face_component == component
-    faces, face_areas = mesh.faces[inside], mesh.face_areas[inside]
-    checkpoint()
-    thirds = np.repeat(face_areas / 3.0, 3)
+    faces, thirds = mesh.faces, np.repeat(mesh.face_areas / 3.0, 3)
     areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # Hashes of positions replace random numbers, so the result does not depend on the numbering.
-    places = frame_coordinates(mesh.vertices, faces, face_areas)
-    checkpoint()
-    chance = uniform_hash(places)
-    checkpoint()
+    chance = uniform_hash(frame_coordinates(mesh.vertices, faces, mesh.face_areas))
     seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
     graph = _edge_graph(mesh, chance)
     checkpoint()
-    cell = _nearest_seeds(mesh.vertices, graph, seed, MARGIN * distance)
-    if (cell[faces] < 0).any():
-        cell = _nearest_seeds(mesh.vertices, graph, seed, np.inf)
+    _, _, nearest = csgraph.dijkstra(
+        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
+    )
+    # Vertices without faces are not reached, and their cell is -1.
+    cell = np.where(nearest < 0, -1, np.searchsorted(seed, nearest))
     corners = cell[faces]
-    apart = corners_differ(corners)
-    checkpoint()
-    corners = corners[apart]
+    corners = corners[corners_differ(corners)]
     _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
     if not len(first):
         raise MeshError("no three cells of the coarse mesh meet in a face")
@@ -173,41 +164,7 @@ def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
     Lengths are changed slightly, so that no two paths on a grid are equally long.
     """
     edges = mesh.edges
-    checkpoint()
     length = edge_lengths(mesh.vertices, edges)
-    checkpoint()
     length *= 1.0 + TIE_BREAK * chance[edges].sum(axis=1)
     size = len(mesh.vertices)
     return sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))
-
-
-def _nearest_seeds(
-    vertices: FloatArray, graph: sparse.csr_array, seed: IntArray, margin: float
-) -> IntArray:
-    """The index of the seed nearest to each vertex along edges, shape (V,).
-
-    The index is -1 if no seed is connected with the vertex or, on a mesh of several slabs, if none
-    is within the margin. Paths from a vertex of a slab that are no longer than the margin stay in
-    the slab widened by the margin, so the results for vertices of the slab itself hold on the whole
-    mesh.
-    """
-    n_slabs = -(-len(vertices) // SLAB) if np.isfinite(margin) else 1
-    along = vertices[:, int(np.ptp(vertices[seed], axis=0).argmax())]
-    bounds = np.quantile(along, np.linspace(0.0, 1.0, n_slabs + 1))
-    if n_slabs == 1:
-        margin = np.inf
-    nearest = np.full(len(vertices), -1)
-    for low, high in itertools.pairwise(bounds):
-        near = np.flatnonzero((along >= low - margin) & (along <= high + margin))
-        seeds = np.flatnonzero(np.isin(near, seed, assume_unique=True))
-        if not len(seeds):
-            continue
-        part = graph if len(near) == len(along) else graph[near][:, near]
-        checkpoint()
-        _, _, found = csgraph.dijkstra(
-            part, directed=False, indices=seeds, min_only=True, return_predecessors=True,
-            limit=margin,
-        )  # fmt: skip
-        own = (along[near] >= low) & (along[near] <= high) & (found >= 0)
-        nearest[near[own]] = np.searchsorted(seed, near[found[own]])
-    return nearest

@@ -8,61 +8,16 @@ on that side.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from ..geometry.array_types import IntArray
-from ..geometry.curve import SurfaceCurve
-from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, nearest_points
-from ..progress import checkpoint
+from ..geometry.surface_points import SurfacePoints
 from ..relaxation.curve_nodes import CurveSurface
-from ..relaxation.discrete_curve import DiscreteCurve, place_nodes
+from ..relaxation.discrete_curve import DiscreteCurve
 from ..relaxation.simple_curve import simple_curve
-from .coarse_mesh import CoarseMesh
-
-NODES = (256, 512, 128)
-"""Numbers of nodes that are tried, in this order.
-
-Finer detail of the coarse curve would come from the coarse mesh and not from the surface. Where
-strands are close together, traces between other nodes may avoid a crossing.
-"""
-
-MOST_RINGS = 3
-"""Number of rings of cells around two nodes in which a path between them is searched for."""
-
-
-def curve_on_fine_mesh(
-    surface: CurveSurface,
-    coarse: CoarseMesh,
-    coarse_surface: CurveSurface,
-    curve: SurfaceCurve,
-    controls: SurfacePoints,
-) -> SurfaceCurve | None:
-    """Map a curve on the coarse mesh to a curve nearby on the fine mesh.
-
-    Parameters
-    ----------
-    surface, coarse_surface : CurveSurface
-        Surfaces of the fine mesh and of ``coarse.mesh``.
-    coarse : CoarseMesh
-    curve : SurfaceCurve
-        A simple curve on the coarse mesh.
-    controls : SurfacePoints
-        k points of the fine mesh, in the order in which the curve visits them.
-
-    Returns
-    -------
-    SurfaceCurve or None
-        A simple curve exactly through the control points; None if no such curve is found.
-    """
-    for count in NODES:
-        checkpoint()
-        coarse_curve = place_nodes(coarse_surface, curve, count)
-        result = nodes_on_fine_mesh(surface, coarse, coarse_curve, controls)
-        if result is not None:
-            return result.surface_curve(surface.mesh)
-    return None
+from .coarse_mesh import CoarseMesh, nearest_in_cells
 
 
 def nodes_on_fine_mesh(
@@ -70,20 +25,29 @@ def nodes_on_fine_mesh(
 ) -> DiscreteCurve | None:
     """The curve on the fine mesh through the nodes of a coarse curve; None if it is not simple.
 
-    Only the nodes of `coarse_curve` are used. The other parameters are those of
-    `curve_on_fine_mesh`.
+    Parameters
+    ----------
+    surface : CurveSurface
+        Surface of the fine mesh.
+    coarse : CoarseMesh
+    coarse_curve : DiscreteCurve
+        A curve on the coarse mesh, of which only the nodes are used.
+    controls : SurfacePoints
+        k points of the fine mesh, in the order in which the curve visits them.
     """
-    fine = surface.mesh
+    fine, places = surface.mesh, coarse_curve.nodes.places
+    cell = coarse.mesh.faces[places.faces, places.barycentric.argmax(axis=1)]
+    faces_of = partial(coarse.faces_of_cells, fine)
 
     def cells_around(faces: IntArray) -> Iterator[IntArray]:
         cells = np.unique(coarse.cell[fine.faces[faces, 0]])
-        for _ in range(MOST_RINGS):
+        for _ in range(3):  # rings in which a path between two nodes is searched for
             cells = coarse.cells_around(cells)
             yield coarse.faces_of_cells(fine, cells)
 
     return simple_curve(
         surface,
-        _nearest_points(fine, coarse, coarse_curve.nodes.places),
+        nearest_in_cells(fine, places.positions(coarse.mesh), cell, faces_of),
         coarse_curve.control_nodes,
         controls,
         coarse_curve.closed,
@@ -91,18 +55,3 @@ def nodes_on_fine_mesh(
         normals=coarse_curve.nodes.normals,
         neighbourhoods=cells_around,
     )
-
-
-def _nearest_points(fine: Mesh, coarse: CoarseMesh, points: SurfacePoints) -> SurfacePoints:
-    """Coarse points projected to the faces of their cells on the fine mesh."""
-    positions = points.positions(coarse.mesh)
-    cell = coarse.mesh.faces[points.faces, points.barycentric.argmax(axis=1)]
-    faces, barycentric = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-    for one in np.unique(cell).tolist():
-        checkpoint()
-        here = np.flatnonzero(cell == one)
-        found, _ = nearest_points(
-            fine, positions[here], coarse.faces_of_cells(fine, np.array([one]))
-        )
-        faces[here], barycentric[here] = found.faces, found.barycentric
-    return SurfacePoints(faces, barycentric)

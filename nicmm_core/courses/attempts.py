@@ -171,8 +171,8 @@ class Attempts:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
         return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
 
-    def should_try_network(self) -> bool:
-        """Whether the best curve has kinks, and an attempt by the network is affordable."""
+    def should_try_path(self) -> bool:
+        """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
         mean = self._work_of_relaxations / len(self.relaxed)
         return self._is_kinked and self._is_affordable(self._work_of_search + mean)
 

@@ -1,7 +1,7 @@
 """Curves on a mesh: polylines in which every segment lies in one face.
 
-`SurfaceCurve` is the curve that a design returns. The functions build, check, measure and resample
-such curves.
+`SurfaceCurve` is the curve that a design returns. The functions build, check and resample such
+curves.
 """
 
 from __future__ import annotations
@@ -70,6 +70,16 @@ def curve_on_mesh(
     corners = mesh.vertices[mesh.faces[faces]]
     points = (barycentric[:, :, None] * corners).sum(axis=1)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
+
+
+def points_of(curve: SurfaceCurve) -> SurfacePoints:
+    """The points of a curve."""
+    return SurfacePoints(curve.faces, curve.barycentric)
+
+
+def with_points(mesh: Mesh, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
+    """The curve through other points, one for each of its own, on any mesh."""
+    return curve_on_mesh(mesh, curve.closed, points.faces, points.barycentric, curve.control_index)
 
 
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
@@ -209,43 +219,6 @@ def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatA
     return kept / kept.sum(axis=1, keepdims=True)
 
 
-def geodesic_curvature(points: FloatArray, normals: FloatArray, closed: bool = True) -> FloatArray:
-    """Geodesic curvature at the points of a polyline on a surface (Eq. 10).
-
-    Parameters
-    ----------
-    points : (n, 3) float array
-        Evenly spaced points, see `resample`. Otherwise the values at short segments are noise.
-    normals : (n, 3) float array
-        Unit surface normals at the points.
-    closed : bool, default True
-        Whether the last point is joined to the first.
-
-    Returns
-    -------
-    (n,) float array
-        Signed curvature, in 1/length: ``2 sin θ / |r(i+1) - r(i-1)|`` in the tangent plane at r(i).
-        It is positive where the curve turns left, seen from the tip of the normal, and zero at the
-        ends of an open polyline.
-    """
-    if not closed:
-        return np.pad(_turns(points[:-2], points[1:-1], points[2:], normals[1:-1]), 1)
-    return _turns(np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0), normals)
-
-
-def _turns(
-    previous: FloatArray, points: FloatArray, following: FloatArray, normals: FloatArray
-) -> FloatArray:
-    """Geodesic curvature at points that have two neighbours each, (n,)."""
-    before, after = previous - points, following - points
-    before -= (before * normals).sum(axis=1, keepdims=True) * normals
-    after -= (after * normals).sum(axis=1, keepdims=True) * normals
-    across = np.linalg.norm(after - before, axis=1)
-    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    sine = (np.cross(-before, after) * normals).sum(axis=1) / lengths
-    return 2.0 * sine / across
-
-
 def resample(points: FloatArray, count: int, closed: bool = True) -> tuple[FloatArray, IntArray]:
     """Sample points at equal distances along a polyline.
 
@@ -296,8 +269,7 @@ def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArr
 
 def _faces_near(mesh: Mesh, curve: SurfaceCurve, one: int, other: int) -> IntArray:
     """Those of the faces of two points that also hold the other point, up to a gap."""
-    points = SurfacePoints(curve.faces, curve.barycentric)
-    positions = points[np.array([one, other])].positions(mesh)
+    positions = points_of(curve)[np.array([one, other])].positions(mesh)
     within = max(GAP * mesh.diagonal, rounding(positions))
     sides = ((curve.faces[other], positions[:1]), (curve.faces[one], positions[1:]))
     return np.array(

@@ -1,7 +1,4 @@
-"""Sorts and groups arrays as large as a mesh, and finds connected components.
-
-These functions have checkpoints, so a design can be cancelled while they run.
-"""
+"""Sorts and groups arrays as large as a mesh, and finds connected components."""
 
 from __future__ import annotations
 
@@ -13,36 +10,6 @@ from scipy.sparse import csgraph
 
 from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
-
-MOST_KEYS_PER_SORT = 2_000_000
-"""Maximum number of keys sorted in one call.
-
-Sorting them takes a fifth of a second, during which a design cannot be cancelled.
-"""
-
-SAMPLED = 64
-"""Number of keys sampled per part, to divide all keys into parts of about equal size."""
-
-
-def stable_order(keys: IntArray | FloatArray) -> IntArray:
-    """Indices that sort the keys, (n,); equal keys stay in their order.
-
-    The same as ``np.argsort(keys, kind="stable")`` for keys without NaN. If there are more than
-    `MOST_KEYS_PER_SORT` keys, they are divided into ranges of values, which are sorted one after
-    another.
-    """
-    checkpoint()
-    n_parts = -(-len(keys) // MOST_KEYS_PER_SORT)
-    if n_parts <= 1:
-        return np.argsort(keys, kind="stable")
-    sample = keys[:: max(1, len(keys) // (SAMPLED * n_parts))]
-    bounds = np.quantile(sample, np.arange(1, n_parts) / n_parts)
-    part = np.searchsorted(bounds, keys, side="right").astype(np.uint8)
-    order = np.argsort(part, kind="stable")
-    for inside in np.split(order, np.cumsum(np.bincount(part, minlength=n_parts))[:-1]):
-        checkpoint()
-        inside[:] = inside[np.argsort(keys[inside], kind="stable")]
-    return order
 
 
 def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -62,7 +29,7 @@ def grouped(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     (g,) int array
         Number of keys in each group.
     """
-    order = stable_order(keys)
+    order = np.argsort(keys, kind="stable")
     checkpoint()
     in_order = keys[order]
     start = np.flatnonzero(np.append(True, in_order[1:] != in_order[:-1])[: len(keys)])
@@ -119,13 +86,11 @@ def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray
     (size,) int array
         Index of the component of each node; components are in the order of their first nodes.
     """
-    checkpoint()
     arcs = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
     arcs.has_canonical_format = True  # repeated arcs need not be summed
     graph = arcs.tocsr()
     checkpoint()
     number, label = csgraph.connected_components(graph, directed=False)
-    checkpoint()
     return int(number), label.astype(np.int64)
 
 
@@ -157,7 +122,7 @@ def occurrences(keys: IntArray, wanted: IntArray) -> tuple[IntArray, IntArray]:
     (p,) int array
         Index of the occurrence among the keys.
     """
-    order = stable_order(keys)
+    order = np.argsort(keys, kind="stable")
     in_order = keys[order]
     begin = np.searchsorted(in_order, wanted, side="left")
     count = np.searchsorted(in_order, wanted, side="right") - begin

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, blocks, joined_corners, side_corners
+from .mesh import Mesh, joined_corners, side_corners
 from .vectors import unit
 
 
@@ -15,7 +15,6 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Unit normals weighted by corner angle, shape (n, 3); zero where they cancel."""
     checkpoint()
     normals = igl.per_vertex_normals(vertices, faces, igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE)
-    checkpoint()
     return np.nan_to_num(normals)
 
 
@@ -57,12 +56,8 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
 
 def _facing(mesh: Mesh, normals: FloatArray) -> FloatArray:
     """Cosines between the normal of each face and the normals of its corners, (F, 3)."""
-    facing = np.empty(mesh.faces.shape)
-    for block in blocks(len(mesh.faces)):
-        for corner in range(3):
-            of_corner = np.take(normals, mesh.faces[block, corner], axis=0)
-            facing[block, corner] = np.einsum("fd,fd->f", of_corner, mesh.face_normals[block])
-    return facing
+    of_corners = [np.take(normals, corner, axis=0) for corner in mesh.faces.T]
+    return np.stack([np.einsum("fd,fd->f", each, mesh.face_normals) for each in of_corners], axis=1)
 
 
 def _normals_on_double_cover(mesh: Mesh) -> FloatArray:
@@ -80,7 +75,6 @@ def _normals_on_double_cover(mesh: Mesh) -> FloatArray:
     rises = (mesh.faces[:, [1, 2, 0]] < mesh.faces[:, [2, 0, 1]]).ravel()
     alike = (rises[side] == rises[across])[:, None]
     one, other = ends[side], ends[across]
-    checkpoint()
     joined_to = np.where(alike, reverse[other], other), np.where(alike, other, reverse[other])
     group, vertex = joined_corners(
         np.concatenate([mesh.faces, mesh.faces[:, [0, 2, 1]]]),

@@ -21,8 +21,8 @@ import numpy as np
 
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
-from .curve import SurfaceCurve, curve_on_mesh
-from .mesh import LARGEST, Mesh, area_vectors, blocks
+from .curve import SurfaceCurve, points_of, with_points
+from .mesh import LARGEST, Mesh, area_vectors
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
@@ -100,28 +100,24 @@ class Renumbered:
         place[self.face] = np.arange(len(self.face))
         return place
 
-    def points_to_copy(self, points: SurfacePoints) -> SurfacePoints:
+    def points_to(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the component to the copy, each in the first face that contains it."""
-        faces = self._place[points.faces]
-        weights = np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
-        return in_first_faces(self.mesh, SurfacePoints(faces, weights))
+        return in_first_faces(self.mesh, self._in_copy(points))
 
-    def values(self, values: FloatArray | None) -> FloatArray | None:
-        """Map values at the vertices of the original, (V,), to the vertices of the copy, (V',)."""
-        if values is None:
-            return None
-        inside = self.number >= 0
-        result = np.empty(len(self.mesh.vertices))
-        result[self.number[inside]] = values[inside]
-        return result
-
-    def original_points(self, points: SurfacePoints) -> SurfacePoints:
+    def points_back(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the copy to the original."""
         barycentric = np.empty_like(points.barycentric)
         np.put_along_axis(barycentric, self.corner[points.faces], points.barycentric, axis=1)
         return SurfacePoints(self.face[points.faces], barycentric)
 
-    def field_to_original(self, values: FloatArray) -> FloatArray:
+    def weights_to(self, weights: FloatArray) -> FloatArray:
+        """Map weights at the vertices of the original, (V,), to the vertices of the copy, (V',)."""
+        inside = self.number >= 0
+        result = np.empty(len(self.mesh.vertices))
+        result[self.number[inside]] = weights[inside]
+        return result
+
+    def field_back(self, values: FloatArray) -> FloatArray:
         """Map lengths at the vertices of the copy, (V',), to the vertices of the original, (V,).
 
         Vertices outside the component get the greatest value.
@@ -131,19 +127,21 @@ class Renumbered:
         result[inside] = values[self.number[inside]]
         return self.unit * result
 
-    def curve_to_copy(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+    def curve_to(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve on the original to the copy; None if it is on another component."""
-        faces = self._place[curve.faces]
-        if (faces < 0).any():
+        if (self._place[curve.faces] < 0).any():
             return None
-        weights = np.take_along_axis(curve.barycentric, self.corner[faces], axis=1)
-        return curve_on_mesh(self.mesh, curve.closed, faces, weights, curve.control_index)
+        return with_points(self.mesh, curve, self._in_copy(points_of(curve)))
 
-    def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
+    def curve_back(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a curve on the copy to the original."""
-        there = self.original_points(SurfacePoints(curve.faces, curve.barycentric))
-        return curve_on_mesh(
-            self.original, curve.closed, there.faces, there.barycentric, curve.control_index
+        return with_points(self.original, curve, self.points_back(points_of(curve)))
+
+    def _in_copy(self, points: SurfacePoints) -> SurfacePoints:
+        """Points of the component in the faces of the copy that replace theirs."""
+        faces = self._place[points.faces]
+        return SurfacePoints(
+            faces, np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
         )
 
 
@@ -175,7 +173,6 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
     low, middle, high = np.sort(faces, axis=1).T
     face = np.lexsort((high, low * len(order) + middle))
     corner = corner[face]
-    checkpoint()
     vertices = places[vertex[order]]
     which = _turned(mesh, vertices, np.take_along_axis(faces[face], corner, axis=1))
     corner[which] = corner[which][:, [0, 2, 1]]
@@ -218,7 +215,6 @@ def _rounded_soundly(
     greatest = SOUND * np.linalg.norm(before, axis=1)
     rounded = places.copy()
     for resolution in RESOLUTIONS:
-        checkpoint()
         integers = _integers(places[vertex], resolution)
         rounded[vertex] = resolution * integers
         change = area_vectors(rounded, faces) - before
@@ -247,7 +243,6 @@ def _in_frame(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Centre, (3,), and signed axes, (3, 3), of the principal frame; vertices in it, (V, 3)."""
     frame = principal_frame(vertices, faces, face_areas)
-    checkpoint()
     axes = frame.signed_axes()
     with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
         places = np.nan_to_num((vertices - frame.centre) @ axes)
@@ -293,10 +288,8 @@ def principal_frame(
     vertices: FloatArray, faces: IntArray, face_areas: FloatArray
 ) -> PrincipalFrame:
     """Compute the principal frame of a surface from the centroids and areas of its faces."""
-    offset = np.empty(faces.shape)
-    for block in blocks(len(faces)):
-        first, second, third = (np.take(vertices, corner, axis=0) for corner in faces[block].T)
-        offset[block] = (first + second + third) / 3.0
+    first, second, third = (np.take(vertices, corner, axis=0) for corner in faces.T)
+    offset = (first + second + third) / 3.0
     share = face_areas / face_areas.sum()
     centre = share @ offset
     offset -= centre

@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..progress import checkpoint
 from .array_types import FloatArray, IntArray
 from .mesh import Mesh
 
@@ -63,12 +62,10 @@ def spread_vertices(
     # The vertices with the smallest exponentially distributed times are a sample without
     # replacement, weighted by area.
     times = -np.log(chance[there]) / areas[there]
-    checkpoint()
     candidates = there[np.argsort(times)[:n_candidates]]
     scaled = np.concatenate(
         [mesh.vertices[candidates] / distance, normal_weight * normals[candidates]], axis=1
     )
-    checkpoint()
     near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")
     size = len(candidates)
     graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))

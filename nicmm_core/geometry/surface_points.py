@@ -40,7 +40,8 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        return interpolated(corners_of(mesh, self.faces), self.barycentric.T).T
+        corners = at_corners(mesh, self.faces, mesh.vertices)
+        return dot(self.barycentric.T[:, None], corners).T
 
     @property
     def for_kernels(self) -> tuple[IntArray, FloatArray]:
@@ -68,16 +69,6 @@ def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
     The axes of the result are corner, component and face.
     """
     return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
-
-
-def corners_of(mesh: Mesh, faces: IntArray) -> FloatArray:
-    """Positions of the corners of the given faces, (3, 3, k): corner, component, face."""
-    return at_corners(mesh, faces, mesh.vertices)
-
-
-def interpolated(at_corners: FloatArray, barycentric: FloatArray) -> FloatArray:
-    """Interpolate vectors at corners, (3, 3, k), with barycentric coordinates, (3, k); (3, k)."""
-    return dot(barycentric[:, None], at_corners)
 
 
 def locate_control_points(

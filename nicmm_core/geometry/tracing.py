@@ -26,10 +26,6 @@ connection."""
 
 LIMITS = nicmm_kernels.TraceLimits(tolerances.INSIDE, MOST_FACES)
 
-FOLDS = 4.0
-"""Extra length allowed to a trace before backward parts over folded faces are subtracted, in mean
-edge lengths."""
-
 
 @dataclass(frozen=True)
 class Traces:
@@ -102,7 +98,7 @@ def trace_between(
 
 def fold_margin(mesh: Mesh, folded: BoolArray | None) -> float:
     """Extra length of traces before backward parts over folded faces are subtracted."""
-    return 0.0 if folded is None else FOLDS * mesh.mean_edge_length
+    return 0.0 if folded is None else 4.0 * mesh.mean_edge_length
 
 
 def trace_from(

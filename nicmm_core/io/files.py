@@ -43,14 +43,12 @@ def read_mesh(path: str | Path) -> Mesh:
     try:
         if not path.is_file():
             raise MeshError(f"{path} does not exist or is not a file; check the path of the mesh")
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{path} cannot be opened ({error}); check its permissions") from error
-    try:
         # Positions that are not finite need no warning here, since `Mesh` refuses them below.
         with np.errstate(invalid="ignore", over="ignore"):
-            polygons = _READERS[path.suffix.lower()](data)
+            polygons = _READERS[path.suffix.lower()](path)
             triangles = polygons.triangles()
+    except OSError as error:
+        raise MeshError(f"{path} cannot be opened ({error}); check its permissions") from error
     except FormatError as error:
         raise MeshError(
             f"{path} cannot be read as {path.suffix[1:].upper()} ({error}); export it again"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from .numbers import floats, integer, quoted
 from .polygons import FormatError, Polygons
 
 
-def read_obj(data: bytes) -> Polygons:
+def read_obj(path: Path) -> Polygons:
     """Read the ``v`` and ``f`` lines.
 
     Raises
@@ -20,7 +22,7 @@ def read_obj(data: bytes) -> Polygons:
     corners: list[int] = []
     sizes: list[int] = []
     count = 0
-    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    data = path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     for number, line in enumerate(data.splitlines(), start=1):
         if line[:1] not in b"vf \t":
             continue

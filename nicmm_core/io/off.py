@@ -6,6 +6,7 @@ Colours, normals and texture coordinates are ignored.
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from .polygons import FormatError, Polygons
 _HEADER = re.compile(rb"(ST)?C?N?OFF")
 
 
-def read_off(data: bytes) -> Polygons:
+def read_off(path: Path) -> Polygons:
     """Read a text file that has one vertex or face in each line.
 
     Raises
@@ -23,7 +24,7 @@ def read_off(data: bytes) -> Polygons:
     FormatError
         If the header is not supported, or lines are missing or cannot be parsed.
     """
-    rows = (line.partition(b"#")[0].split() for line in data.splitlines())
+    rows = (line.partition(b"#")[0].split() for line in path.read_bytes().splitlines())
     lines = [words for words in rows if words]
     if not lines or not _HEADER.fullmatch(lines[0][0]):
         raise FormatError("it does not begin with OFF (binary and 4D OFF are not supported)")

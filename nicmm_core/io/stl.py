@@ -6,6 +6,7 @@ Triangles in STL do not share vertices, so corners with equal positions become o
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 
 
-def read_stl(data: bytes) -> Polygons:
+def read_stl(path: Path) -> Polygons:
     """Read a binary or text file. A binary file, too, may begin with "solid".
 
     Raises
@@ -32,6 +33,7 @@ def read_stl(data: bytes) -> Polygons:
     FormatError
         If the file is truncated, or cannot be parsed as binary or as text.
     """
+    data = path.read_bytes()
     count = int.from_bytes(data[HEADER_BYTES - 4 : HEADER_BYTES], "little")
     room = max(len(data) - HEADER_BYTES, 0) // TRIANGLE.itemsize
     whole_file = HEADER_BYTES + TRIANGLE.itemsize * count == len(data)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
-from .ply import TYPES
 from .stl import HEADER_BYTES, TRIANGLE
 
 
@@ -32,7 +31,7 @@ def ply_bytes(vertices: FloatArray, faces: IntArray) -> bytes:
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
     header += [f"property double {axis}" for axis in "xyz"]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-    row = np.dtype([("count", "u1"), ("corners", "<" + TYPES["int"], 3)])
+    row = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
     rows = np.empty(len(faces), dtype=row)
     rows["count"], rows["corners"] = 3, faces
     return _text([*header, "end_header"]) + vertices.astype("<f8").tobytes() + rows.tobytes()

@@ -26,15 +26,6 @@ SHARP_ANGLE = math.radians(30.0)
 USUAL, STRIKING = 0.5, 0.95
 """Quantiles of the curvature over the area that get weight 0 and weight 1 by default."""
 
-LEAST_CONTRAST = 2.0
-"""Least ratio of the curvatures with weight 1 and weight 0, so that a sphere has no weights."""
-
-HUB = 64
-"""Valence above which two-rings do not extend through a vertex: they would be too large."""
-
-UNDETERMINED = 1e-8
-"""Relative eigenvalue of a fit below which its direction counts as undetermined."""
-
 
 def principal_curvatures(mesh: Mesh) -> FloatArray:
     """Principal curvatures at the vertices, shape (V, 2), in 1/length, the larger one first.
@@ -114,7 +105,8 @@ def curvature_map(mesh: Mesh, low: float | None = None, high: float | None = Non
     if low is None or high is None:
         usual, striking = _quantiles_by_area(mesh, curvature, [USUAL, STRIKING])
         low = usual if low is None else checked_number("low", low)
-        high = max(striking, LEAST_CONTRAST * low) if high is None else checked_number("high", high)
+        # With at least twice the usual curvature, a sphere has no weights.
+        high = max(striking, 2.0 * low) if high is None else checked_number("high", high)
         if high <= tolerances.FLAT / mesh.diagonal:
             return np.zeros(len(mesh.vertices))
     return value_map(mesh, curvature, low, high)
@@ -254,7 +246,8 @@ def _two_rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
     entries = (np.ones(len(start), dtype=np.float32), (start, end))
     beside = sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
     beside = sparse.csr_array(beside + beside.T)
-    onward = beside[np.flatnonzero(np.diff(beside.indptr) <= HUB)]
+    # Two-rings through vertices of high valence would be too large.
+    onward = beside[np.flatnonzero(np.diff(beside.indptr) <= 64)]
     reached = beside + sparse.csr_array(onward.T @ onward)
     centre, neighbour = sparse.coo_array(reached).coords
     others = centre != neighbour
@@ -285,7 +278,8 @@ def _least_squares(terms: FloatArray, right: FloatArray, row: IntArray, count: i
         vector[:, i] = np.bincount(row, terms[i] * right, count)
         for j in range(i, k):
             matrix[:, i, j] = matrix[:, j, i] = np.bincount(row, terms[i] * terms[j], count)
-    inverse = np.linalg.pinv(matrix, rcond=UNDETERMINED, hermitian=True)
+    # Below this relative eigenvalue, the direction of a fit is undetermined.
+    inverse = np.linalg.pinv(matrix, rcond=1e-8, hermitian=True)
     return np.einsum("nij,nj->ni", inverse, vector)
 
 

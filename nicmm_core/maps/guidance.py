@@ -55,9 +55,6 @@ At 0.1, distant legs are attracted to a lane, and two legs share a lane. At 0.5,
 the lanes that are 5 % of the diagonal away.
 """
 
-CUT = 3.0
-"""Radius at which a Gaussian is cut off, in standard deviations."""
-
 DEPTH = 0.1
 """Depth in a painted region, in the same unit, above which all vertices belong to the ridge."""
 
@@ -137,7 +134,8 @@ def _response(mesh: Mesh, level: IntArray, start: FloatArray, width: float) -> F
         if not len(own):
             continue
         sigma = weight * width
-        away = _distances(edges, length, own, sigma * start[own], CUT * sigma, len(level))
+        # The Gaussian is cut off at three standard deviations.
+        away = _distances(edges, length, own, sigma * start[own], 3.0 * sigma, len(level))
         response = np.maximum(response, weight * np.exp(-0.5 * (away / sigma) ** 2))
     return response
 

@@ -77,7 +77,8 @@ def build_chain(
     corners = mesh.faces[faces]
     n = len(faces)
     following = (np.arange(n) + 1) % n
-    same = _same_support(corners, barycentric, following)
+    support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
+    same = (support == support[following]).all(axis=1)
     theirs = weights_at(corners[following], barycentric[following], corners)
     near = np.abs(theirs - barycentric).max(axis=1) < np.minimum(margin, margin[following])
     at_vertex = (barycentric > 0.0).sum(axis=1) == 1
@@ -201,9 +202,3 @@ def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int
     count = (np.roll(begins, -1) - begins - 1) % n_points + 1
     runs = [_run(int(begins[p]), int(count[p]), n_points) for p in sorted(near)]
     return np.array([point for run in runs for point in run], dtype=np.int64)
-
-
-def _same_support(corners: IntArray, barycentric: FloatArray, following: IntArray) -> BoolArray:
-    """Whether each point and the next have the same support: a vertex, an edge or a face."""
-    support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
-    return (support == support[following]).all(axis=1)

@@ -14,9 +14,6 @@ import numpy as np
 from ..geometry.array_types import FloatArray, IntArray
 from .cut import CutMesh
 
-LEAST_COSINE = 0.9
-"""Least cosine between the normals of a merged polygon and of each of its triangles."""
-
 
 @dataclass(frozen=True)
 class CutPolygons:
@@ -127,4 +124,5 @@ def _is_flat(vertices: FloatArray, faces: IntArray) -> bool:
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(normal, axis=1)
     together = normal.sum(axis=0)
-    return bool((normal @ together > LEAST_COSINE * length * np.linalg.norm(together)).all())
+    # A merged polygon is nearly plane.
+    return bool((normal @ together > 0.9 * length * np.linalg.norm(together)).all())

@@ -12,7 +12,6 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.mesh import Mesh, adjacent_sides, joined_corners, side_corners
 from ..progress import checkpoint
 
 Node = int | tuple[int, int]
@@ -31,8 +30,6 @@ class Patch:
         Edges as pairs of indices into ``vertices``, smaller index first, sorted.
     on_rim : (E,) bool array
         Whether an edge has only one face in the patch.
-    nonmanifold_edges : (E,) bool array
-        Whether an edge has more than two faces.
     positions : (n + E, 3) float array
         Positions of the nodes.
     weight : (n + E,) float array
@@ -46,7 +43,6 @@ class Patch:
     vertices: IntArray
     edges: IntArray
     on_rim: BoolArray
-    nonmanifold_edges: BoolArray
     positions: FloatArray
     weight: FloatArray
     arcs: IntArray
@@ -99,14 +95,3 @@ class Patch:
             return int(self.vertices[index])
         start, end = self.vertices[self.edges[index - len(self.vertices)]]
         return int(start), int(end)
-
-
-def nonmanifold_vertices(mesh: Mesh) -> BoolArray:
-    """Vertices whose faces form more than one fan, shape (V,).
-
-    Faces at a vertex belong to the same fan if they are connected through edges at that vertex.
-    """
-    ends = side_corners(mesh.faces)
-    one, other = adjacent_sides(mesh.faces)
-    _, vertex_of_fan = joined_corners(mesh.faces, ends[one].ravel(), ends[other].ravel())
-    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1

@@ -18,7 +18,7 @@ from ..geometry.grouping import components, path_between
 from ..geometry.mesh import Mesh, side_keys, unique_edges
 from ..maps.guidance import length_factor
 from ..progress import checkpoint
-from .leg_graph import Node, Patch, nonmanifold_vertices
+from .leg_graph import Node, Patch
 from .virtual_splits import SplitMesh
 
 MIDPOINT_DETOUR = 2.0
@@ -33,22 +33,6 @@ STRAND_PENALTY = 4.0
 It makes two strands of a loop pass a thin limb on opposite sides, which leaves room for the level
 set between them.
 """
-
-NONMANIFOLD_FACTOR = 20.0
-"""Factor of lengths at non-manifold vertices and edges.
-
-These belong to several sheets but can be passed only once, so a leg should use them only where it
-has to.
-"""
-
-FIRST_REACH = 3.0
-"""Length limit of the first search, relative to the straight-line distance between the ends."""
-
-REACH_GROWTH = 2.0
-"""Factor by which the length limit grows from one search to the next."""
-
-WHOLE_SHARE = 0.5
-"""Fraction of the component's faces above which the search covers the whole component instead."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +76,7 @@ class LegSearch:
     Parameters
     ----------
     mesh : Mesh
-        The input mesh.
+        The input mesh, a manifold.
     split : SplitMesh
         Virtual splits of the input mesh; more may be added between searches.
     component : (F,) bool array
@@ -116,7 +100,6 @@ class LegSearch:
         self._component = component
         self._phi_fea = phi_fea
         self._clearance = clearance
-        self._nonmanifold = nonmanifold_vertices(mesh)
         corners = mesh.vertices[mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         self._longest_edge = np.zeros(len(mesh.vertices))
@@ -136,18 +119,18 @@ class LegSearch:
         start, end = self._split.position(source), self._split.position(target)
         apart = np.linalg.norm(self._mesh.vertices - start, axis=1)
         apart += np.linalg.norm(self._mesh.vertices - end, axis=1)
-        reach = FIRST_REACH * float(np.linalg.norm(end - start))
+        reach = 3.0 * float(np.linalg.norm(end - start))
         while True:
             checkpoint()
             near = apart <= reach + 2.0 * (self._clearance + self._longest_edge)
             inside = self._component & near[self._mesh.faces].any(axis=1)
-            whole = inside.sum() >= WHOLE_SHARE * self._component.sum()
+            whole = inside.sum() >= 0.5 * self._component.sum()
             limit = np.inf if whole else self._least_factor * reach
             patch = self._whole() if whole else self._patch(inside)
             leg = self._search(patch, source, target, blocked, limit)
             if leg is not None or whole:
                 return leg
-            reach *= REACH_GROWTH
+            reach *= 2.0
 
     def are_joinable(self, pairs: list[tuple[int, int]], blocked: BlockedElements) -> bool:
         """Whether each pair of vertices, taken alone, can be joined by a leg."""
@@ -169,16 +152,12 @@ class LegSearch:
     ) -> Leg | None:
         """The cheapest leg on a patch, penalties included; None if all exceed the cost limit."""
         lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
-        factor = self._nonmanifold_factor(patch)
-        if factor is not None:
-            lengths *= factor[patch.arcs].mean(axis=1)
         checkpoint()
         avoided = patch.node_indices(np.append(blocked.vertices, source))
         ends = patch.node_indices(np.append(blocked.ends, source))
         beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
         lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
 
-        checkpoint()
         (here,), (there,) = (patch.node_indices(np.array([vertex])) for vertex in (source, target))
         free = self._free(patch, blocked, np.array([here, there]))
         lengths[~free[patch.arcs].all(axis=1)] = np.inf
@@ -208,16 +187,13 @@ class LegSearch:
         separate the surface.
         """
         vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
-        checkpoint()
         faces = faces.reshape(-1, 3)
         edges, count = unique_edges(faces)
         n_vertices = len(vertices)
         corner = self._split.positions(vertices)
         node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
-        checkpoint()
         keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
         side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
-        checkpoint()
         inner = count > 1
         midpoint = n_vertices + np.flatnonzero(inner)
         arcs = np.concatenate(
@@ -239,7 +215,6 @@ class LegSearch:
             vertices=vertices,
             edges=edges,
             on_rim=~inner,
-            nonmanifold_edges=count > 2,
             positions=node_position,
             weight=weight,
             arcs=arcs,
@@ -250,8 +225,7 @@ class LegSearch:
         """Whether a leg may use each node: its ends, and interior nodes that are not blocked."""
         n_vertices = len(patch.vertices)
         free = np.ones(patch.size, dtype=bool)
-        # A boundary vertex at which several fans meet may be the only connection between them.
-        free[np.setdiff1d(patch.edges[patch.on_rim], self._nonmanifold_here(patch))] = False
+        free[patch.edges[patch.on_rim]] = False
         free[n_vertices + np.flatnonzero(patch.on_rim)] = False
         free[patch.node_indices(blocked.vertices)] = False
         if len(blocked.edges):
@@ -262,22 +236,6 @@ class LegSearch:
             free[n_vertices + np.flatnonzero(on_path)] = False
         free[ends] = True
         return free
-
-    def _nonmanifold_factor(self, patch: Patch) -> FloatArray | None:
-        """Factor of lengths at each node, or None on a manifold."""
-        nonmanifold = self._nonmanifold_here(patch)
-        if not (len(nonmanifold) or patch.nonmanifold_edges.any()):
-            return None
-        factor = np.ones(patch.size)
-        factor[nonmanifold] = NONMANIFOLD_FACTOR
-        factor[patch.edges[patch.nonmanifold_edges]] = NONMANIFOLD_FACTOR
-        factor[len(patch.vertices) + np.flatnonzero(patch.nonmanifold_edges)] = NONMANIFOLD_FACTOR
-        return factor
-
-    def _nonmanifold_here(self, patch: Patch) -> IntArray:
-        """Nodes of a patch that are non-manifold vertices of the input mesh."""
-        n_input = int(np.searchsorted(patch.vertices, len(self._mesh.vertices)))
-        return np.flatnonzero(self._nonmanifold[patch.vertices[:n_input]])
 
     def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
         """φ_fea at vertices of the split mesh, interpolated at inserted vertices."""
@@ -319,7 +277,6 @@ def _closeness(
     """
     checkpoint()
     to_taken = csgraph.dijkstra(graph, indices=taken, limit=clearance, min_only=True)
-    checkpoint()
     to_ends = csgraph.dijkstra(graph, indices=ends, min_only=True)
     beside = np.zeros(graph.shape[0])
     near = np.isfinite(to_taken) & (to_taken < to_ends)

@@ -119,6 +119,10 @@ class SplitMesh:
             self._faces_around[vertex] = set(self._mesh.faces_at(np.array([vertex])).tolist())
         return self._faces_around[vertex]
 
+    def input_face_with(self, start: int, end: int) -> int:
+        """An input face that contains the edge between two vertices."""
+        return min(map(self._parent, self.faces_around(start) & self.faces_around(end)))
+
     def position(self, vertex: int) -> FloatArray:
         """Position of a vertex, shape (3,)."""
         n_input = len(self._mesh.vertices)
@@ -225,14 +229,12 @@ class SplitMesh:
         mesh = self._mesh
         kept = np.flatnonzero(self._alive & (mesh.face_component == component))
         new_faces, new_parents = self._living_new_faces()
-        checkpoint()
 
         faces = np.concatenate([mesh.faces[kept], new_faces])
         used = np.unique(faces)
         n_input = len(mesh.vertices)
         renumbered = np.full(n_input + len(self._new_weights), -1, dtype=np.int64)
         renumbered[used] = np.arange(len(used))
-        checkpoint()
         interpolation = self._interpolation(used)
         working = WorkingMesh(
             vertices=interpolation @ mesh.vertices,

@@ -90,7 +90,6 @@ def order_along_boundaries(distance: FloatArray, loops: list[IntArray], closed: 
     chains = [loop for loop in loops if len(loop)] + [np.array([point]) for point in inner]
     tour = chains[0]
     for chain in chains[1:]:
-        checkpoint()
         tour = _insert_chain(distance, tour, chain)
     if not closed:
         legs = distance[tour, np.roll(tour, -1)]
@@ -125,7 +124,6 @@ def _nearest_neighbour(distance: FloatArray) -> IntArray:
     """The tour from point 0 that always goes on to the nearest unvisited point."""
     tour, unvisited = [0], list(range(1, len(distance)))
     while unvisited:
-        checkpoint()
         tour.append(unvisited.pop(int(distance[tour[-1], unvisited].argmin())))
     return np.array(tour, dtype=np.int64)
 
@@ -163,7 +161,6 @@ def _best_move(distance: FloatArray, tour: IntArray) -> tuple[float, IntArray]:
     best, moved = 0.0, tour
     for count in range(1, min(LONGEST_MOVE, k - 3) + 1):
         # Row i is for moving the points i … i + count - 1, column j for the leg after point j.
-        checkpoint()
         before, first = np.roll(tour, 1), tour
         last, after = np.roll(tour, 1 - count), np.roll(tour, -count)
         saved = distance[before, first] + distance[last, after] - distance[before, after]

@@ -21,11 +21,6 @@ from .face_parts import FaceParts
 from .flat_faces import without_flat_faces
 from .t_junctions import without_t_junctions
 
-VERTICES_JOINED = "vertices joined"
-DOUBLED_FACES = "doubled faces left out"
-FLAT_FACES = "faces without area removed"
-T_JUNCTIONS = "T-junctions closed"
-
 
 class Cleaning(IntEnum):
     """How much is cleaned; later values clean less.
@@ -107,10 +102,10 @@ def clean_surface(mesh: Mesh, cleaning: Cleaning) -> CleanSurface | None:
         return None
     checkpoint()
     repairs = {
-        VERTICES_JOINED: int((joined != np.arange(len(joined))).sum()),
-        DOUBLED_FACES: doubled,
-        FLAT_FACES: flat,
-        T_JUNCTIONS: len(joints),
+        "vertices joined": int((joined != np.arange(len(joined))).sum()),
+        "doubled faces left out": doubled,
+        "faces without area removed": flat,
+        "T-junctions closed": len(joints),
     }
     removed = np.ones(len(mesh.faces), dtype=bool)
     removed[parts.parent] = False

@@ -7,7 +7,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components
-from ..geometry.mesh import blocks, edge_lengths, triangle_areas, unique_edges
+from ..geometry.mesh import edge_lengths, triangle_areas, unique_edges
 from ..progress import checkpoint
 
 ATTEMPTS = 4
@@ -36,21 +36,10 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, short: float) -> Boo
     (f,) bool array
         Whether each face is degenerate.
     """
-    flat = np.empty(len(faces), dtype=bool)
-    for block in blocks(len(faces)):
-        corners = [np.take(vertices, corner, axis=0) for corner in faces[block].T]
-        squared = [_squared_lengths(corners[corner - 1] - corners[corner]) for corner in range(3)]
-        shortest = np.sqrt(np.minimum.reduce(squared))
-        longest = np.sqrt(np.maximum.reduce(squared))
-        twice_area = 2.0 * triangle_areas(vertices, faces[block])
-        without = twice_area <= tolerances.DEGENERATE_SINE * shortest * longest
-        flat[block] = without | (shortest <= short)
-    return flat
-
-
-def _squared_lengths(vectors: FloatArray) -> FloatArray:
-    x, y, z = vectors.T
-    return x * x + y * y + z * z
+    lengths = [edge_lengths(vertices, faces[:, [k - 1, k]]) for k in range(3)]
+    shortest, longest = np.minimum.reduce(lengths), np.maximum.reduce(lengths)
+    twice_area = 2.0 * triangle_areas(vertices, faces)
+    return (twice_area <= tolerances.DEGENERATE_SINE * shortest * longest) | (shortest <= short)
 
 
 def perturbed(
@@ -84,7 +73,6 @@ def perturbed(
         New positions.
     """
     start, still = vertices, flat
-    checkpoint()
     reach = tolerances.PERTURBATION * _shortest_edges(vertices, faces, short)
     generator = np.random.default_rng(SEED)
     for _ in range(ATTEMPTS):
@@ -92,7 +80,6 @@ def perturbed(
         moves[faces[still]] = True
         checkpoint()
         move = generator.uniform(-1.0, 1.0, start.shape) * reach[:, None]
-        checkpoint()
         vertices = np.where(moves[:, None], start + move, vertices)
         still = degenerate_faces(vertices, faces, short)
         if not still.any():
@@ -107,10 +94,8 @@ def _shortest_edges(vertices: FloatArray, faces: IntArray, short: float) -> Floa
     """
     edges, _ = unique_edges(faces)
     lengths = edge_lengths(vertices, edges)
-    checkpoint()
     n_places, place = components(len(vertices), *edges[lengths <= short].T)
     shortest = np.full(n_places, np.inf)
     for end in edges[lengths > short].T:
-        checkpoint()
         np.minimum.at(shortest, place[end], lengths[lengths > short])
     return np.where(np.isfinite(shortest), shortest, 0.0)[place]

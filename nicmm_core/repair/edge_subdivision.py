@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
-from ..progress import checkpoint
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,6 @@ def subdivided(
     side = (3 * split[:, None] + np.arange(3)).ravel()
     edge = edge_of_side[side]
     count = np.where(edge >= 0, segments[edge], 1)
-    checkpoint()
     first = np.cumsum(count) - count
     row = np.repeat(np.arange(len(side)), count)
     step = np.arange(len(row)) - first[row]
@@ -86,7 +84,6 @@ def subdivided(
     # Side j runs from corner j + 1 to corner j + 2 in the orientation of the face.
     along = (low[side] % 3 == (side % 3 + 1) % 3)[row]
     (one, one_weights), (other, other_weights) = end(step + ~along), end(step + along)
-    checkpoint()
     first_child = np.full(faces.size, -1)
     first_child[side] = len(whole) + first
     corners = np.stack([one_weights, other_weights, middle_weights], axis=1)

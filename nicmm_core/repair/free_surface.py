@@ -64,12 +64,11 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
 def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArray:
     """Distance of each vertex of the original from obstacles, (V,), computed up to ``farthest``."""
     mesh = mapped.mesh
-    here = mapped.weights(hard.astype(np.float64))
-    assert here is not None  # since weights are given
+    here = mapped.weights_to(hard.astype(np.float64))
     distance = np.where(here >= HARD, 0.0, np.inf)
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
     propagate(surface, distance, farthest)
-    return mapped.field_to_original(distance)
+    return mapped.field_back(distance)
 
 
 def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:

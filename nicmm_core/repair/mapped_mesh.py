@@ -14,7 +14,6 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, curve_on_mesh, weights_in_faces
-from ..geometry.grouping import stable_order
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points, snapped
 from ..progress import checkpoint
@@ -137,12 +136,12 @@ class MappedMesh:
         there = self.mesh.face_component == component
         return joined([point[np.flatnonzero(there[point.faces])[:1]] for point in representations])
 
-    def weights(self, weights: FloatArray | None) -> FloatArray | None:
+    def weights_to(self, weights: FloatArray) -> FloatArray:
         """Map weights at vertices of the original, (V,), to the mesh.
 
         Where vertices are joined, the greatest weight counts.
         """
-        if weights is None or not self.differs:
+        if not self.differs:
             return weights
         checkpoint()
         at_place = np.zeros(self.original_place.max() + 1)
@@ -154,7 +153,7 @@ class MappedMesh:
         np.maximum.at(result, self.mesh.faces, at_corners)
         return result
 
-    def curve_to_original(self, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
+    def curve_back(self, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
         """Map a simple curve on the mesh to a simple curve on the original.
 
         Strands that pass different copies of a vertex, or of a point on an edge, are separated
@@ -203,7 +202,7 @@ class MappedMesh:
             exact[int(passed[rank])] = points[nearest[[rank]]]
         return exact
 
-    def curve_from_original(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+    def curve_to(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve on the original to the mesh; None if the mesh lacks a part of the curve."""
         if not self.differs:
             return curve
@@ -246,7 +245,7 @@ class MappedMesh:
                 faces[place], barycentric[place] = parts[best], start / start.sum()
         return faces, barycentric
 
-    def field_to_original(self, values: FloatArray) -> FloatArray:
+    def field_back(self, values: FloatArray) -> FloatArray:
         """Map level-set values at the vertices of the mesh, (v,), to the original.
 
         Of several copies of a vertex, the one nearest to the curve counts. Vertices that the mesh
@@ -280,7 +279,7 @@ class MappedMesh:
     @cached_property
     def _by_original(self) -> tuple[IntArray, IntArray]:
         """Faces of the mesh sorted by original face, and where each original face begins."""
-        order = stable_order(self.face)
+        order = np.argsort(self.face, kind="stable")
         counts = np.bincount(self.face, minlength=len(self.original.faces))
         return order, np.cumsum([0, *counts])
 

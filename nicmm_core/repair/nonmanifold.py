@@ -29,18 +29,12 @@ from .edge_subdivision import SubdividedFaces, subdivided
 from .face_parts import FaceParts
 from .mapped_mesh import MappedMesh
 
-TURNED_FACES = "faces turned"
-NONMANIFOLD_EDGES = "non-manifold edges separated"
-
 SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
 one pair of faces, so no two edges of the result have the same ends."""
 
 MOST_FACES = 100
 """Number of faces at a vertex up to which `is_manifold` walks around the vertices of a mesh."""
-
-MOST_COMPARED = 32
-"""Number of faces at an edge up to which all pairs are compared to find the straightest one."""
 
 
 def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMesh | None:
@@ -113,10 +107,8 @@ def is_manifold(mesh: Mesh) -> bool:
     # face, and count the faces on the way.
     face = np.zeros(len(mesh.vertices), dtype=np.int64)
     for corner in range(3):
-        checkpoint()
         face[faces[:, corner]] = np.arange(len(faces))
     for corner in range(3):
-        checkpoint()
         last = np.flatnonzero(across[:, corner - 1] < 0)
         face[faces[last, corner]] = last
     vertex = np.flatnonzero(degree)
@@ -163,17 +155,14 @@ class _Sides:
 
     def __init__(self, faces: IntArray) -> None:
         self._faces = faces
-        checkpoint()
         # Corners at the ends of each side, the one with the smaller vertex first.
         corner = 3 * np.arange(len(faces))[:, None]
         first, second = (corner + [1, 2, 0]).ravel(), (corner + [2, 0, 1]).ravel()
         vertices = faces.ravel()
-        checkpoint()
         one, other = vertices[first], vertices[second]
         swapped = one > other
         self._low = np.where(swapped, second, first)
         self._high = np.where(swapped, first, second)
-        checkpoint()
         size = int(vertices.max()) + 1
         self._order, self._first, self._count = grouped(edge_keys(one, other, size))
 
@@ -238,7 +227,8 @@ class _Sides:
         outward -= (outward * edge).sum(axis=1, keepdims=True) / squared * edge
         length = np.linalg.norm(outward, axis=1, keepdims=True)
         outward /= np.maximum(length, tolerances.TINY)
-        if len(sides) > MOST_COMPARED:
+        # Comparing all pairs of many faces would take long.
+        if len(sides) > 32:
             return _opposite(outward)
         straight = outward @ outward.T
         np.fill_diagonal(straight, np.inf)
@@ -267,7 +257,6 @@ class _Sides:
         # One of the copies keeps the index of the vertex.
         order, begin, _ = grouped(source)
         new = np.delete(np.arange(len(source)), order[begin])
-        checkpoint()
         number = source.copy()
         number[new] = n_vertices + np.arange(len(new))
         return number[group], np.concatenate([np.arange(n_vertices), source[new]])
@@ -302,7 +291,6 @@ def _with_areas(
         Number of edges of more than two faces.
     """
     original, mesh = clean.original, clean.mesh
-    checkpoint()
     short = tolerances.SAME_POSITION * original.diagonal
     flat = degenerate_faces(vertices, parts.faces, short)
     same = np.array_equal(parts.faces, mesh.faces)
@@ -311,7 +299,6 @@ def _with_areas(
         doubled[:] = True
         order, first, _ = grouped(place)
         doubled[order[first]] = False
-    checkpoint()
     origin, moved = np.zeros(3), bool(flat.any() or doubled.any())
     if moved:
         # Far from the origin, rounding would remove small moves.
@@ -322,7 +309,11 @@ def _with_areas(
     if which.any():
         parts = parts.turned(which)
         result = Mesh(vertices, parts.faces)
-    repairs = {**clean.repairs, TURNED_FACES: int(which.sum()), NONMANIFOLD_EDGES: separated}
+    repairs = {
+        **clean.repairs,
+        "faces turned": int(which.sum()),
+        "non-manifold edges separated": separated,
+    }
     return MappedMesh(
         original=original,
         mesh=result,

@@ -17,9 +17,6 @@ from ..geometry.grouping import path_between
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, joined, weights_at
 
-WIDEST = 2.0 * tolerances.DEGENERATE_SINE
-"""Greatest distance of a point from an edge that a curve crosses there, in lengths of the edge."""
-
 
 class RemovedFaces:
     """Faces of a mesh that were removed since they have no area.
@@ -83,7 +80,8 @@ class RemovedFaces:
                     back = self._way(after, here)
                     across = [left for left, _ in back[::-1]]
                     face = int(back[-1][1].faces[0]) if back else after
-                    if not np.setdiff1d(self._support(here), self._mesh.faces[face]).size:
+                    support = self._mesh.faces[here.faces[0]][here.barycentric[0] > 0.0]
+                    if not np.setdiff1d(support, self._mesh.faces[face]).size:
                         here = self._in_face(here, face)
             elif leaves[number]:
                 way = [entered for _, entered in self._way(int(before[number]), here)]
@@ -135,7 +133,11 @@ class RemovedFaces:
         if min(share, 1.0 - share) <= tolerances.ROUNDED:
             share = float(round(share))
         rounding = tolerances.rounding(self._mesh.vertices[self._mesh.faces[face]])
-        near = max(WIDEST * np.sqrt(squared), tolerances.GAP * self._mesh.diagonal, rounding)
+        near = max(
+            2.0 * tolerances.DEGENERATE_SINE * np.sqrt(squared),
+            tolerances.GAP * self._mesh.diagonal,
+            rounding,
+        )
         if float(np.linalg.norm(offset - share * way)) > near:
             return None
         weights = np.zeros(3)
@@ -147,10 +149,6 @@ class RemovedFaces:
         corners = self._faces[point.faces]
         weights = weights_at(corners, point.barycentric, self._faces[[face]])
         return SurfacePoints(np.array([face]), weights)
-
-    def _support(self, point: SurfacePoints) -> IntArray:
-        """Vertices of the smallest simplex of the given mesh with a point."""
-        return self._mesh.faces[point.faces[0]][point.barycentric[0] > 0.0]
 
     def _hold(self, faces: IntArray, points: SurfacePoints) -> BoolArray:
         """Whether each face, (n,), has all vertices of the smallest simplex with its point."""

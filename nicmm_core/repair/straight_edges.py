@@ -17,8 +17,13 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, curve_on_mesh, without_small_weights
-from ..geometry.grouping import stable_order
+from ..geometry.curve import (
+    SurfaceCurve,
+    curve_on_mesh,
+    points_of,
+    with_points,
+    without_small_weights,
+)
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, weights_at
 from ..progress import checkpoint
@@ -45,26 +50,27 @@ class StraightenedMesh:
     parent: IntArray
     corners: FloatArray
 
-    def points_to_mesh(self, points: SurfacePoints) -> SurfacePoints:
+    def points_to(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the given mesh to the new one."""
         weights = np.einsum("nc,ncd->nd", points.barycentric, self.corners[points.faces])
         return SurfacePoints(self.parent[points.faces], weights)
 
-    def curve_to_mesh(self, curve: SurfaceCurve) -> SurfaceCurve:
-        """Map a curve on the given mesh to the new one."""
-        points = self.points_to_mesh(SurfacePoints(curve.faces, curve.barycentric))
-        return curve_on_mesh(
-            self.mesh, curve.closed, points.faces, points.barycentric, curve.control_index
-        )
+    def weights_to(self, weights: FloatArray) -> FloatArray:
+        """Map weights at the vertices, (V,), which both meshes have in common."""
+        return weights
 
-    def field_to_original(self, values: FloatArray) -> FloatArray:
+    def curve_to(self, curve: SurfaceCurve) -> SurfaceCurve:
+        """Map a curve on the given mesh to the new one."""
+        return with_points(self.mesh, curve, self.points_to(points_of(curve)))
+
+    def field_back(self, values: FloatArray) -> FloatArray:
         """Map values at the vertices of the new mesh, (V,), to the given mesh, (V,)."""
         at_corners = values[self.mesh.faces[self.parent]]
         result = values.copy()
         result[self.original.faces] = np.einsum("fcd,fd->fc", self.corners, at_corners)
         return result
 
-    def curve_to_original(self, curve: SurfaceCurve) -> SurfaceCurve:
+    def curve_back(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a curve on the new mesh to the given one."""
         n = len(curve.faces)
         following = np.append(np.arange(1, n), 0 if curve.closed else n - 1)
@@ -130,7 +136,7 @@ class StraightenedMesh:
     def _by_parent(self) -> tuple[IntArray, IntArray]:
         """Faces of the given mesh sorted by parent, and where each parent begins."""
         counts = np.bincount(self.parent, minlength=len(self.mesh.faces))
-        return stable_order(self.parent), np.cumsum([0, *counts])
+        return np.argsort(self.parent, kind="stable"), np.cumsum([0, *counts])
 
 
 def straightened(mesh: Mesh, divisions: IntArray) -> StraightenedMesh | None:

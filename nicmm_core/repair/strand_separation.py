@@ -25,9 +25,6 @@ REACH = 0.05
 SHARE = 0.5
 """Greatest such distance, relative to that of the nearest other point of the curve."""
 
-SMALLER = 0.1
-"""Factor on the distance for the next attempt, if the moved strand touches another one."""
-
 ATTEMPTS = 8
 """Maximum number of attempts to move one point."""
 
@@ -151,7 +148,7 @@ def _moved(
         changed, number = move(mesh, polyline, point, share)
         if not len(crossing_segments(mesh.faces, changed, closed)):
             return changed, number
-        share *= SMALLER
+        share *= 0.1
     return polyline, np.arange(len(polyline))
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import grouped, occurrences
-from ..geometry.mesh import Mesh, blocks, edge_keys, side_keys
+from ..geometry.mesh import Mesh, edge_keys, side_keys
 from ..progress import checkpoint
 from .coincident_vertices import open_edges
 from .face_parts import FaceParts
@@ -88,8 +88,7 @@ def _vertices_on_edges(
     middle, radius = 0.5 * (start + end), 0.5 * np.linalg.norm(end - start, axis=1)
     tree = cKDTree(vertices[rim], balanced_tree=False, compact_nodes=False)
     # The ends of an edge are as far from its middle as the radius, so any vertex on it is nearer.
-    nearest = np.concatenate([tree.query(middle[block], k=1)[0] for block in blocks(len(middle))])
-    crossed = np.flatnonzero(nearest < radius - tolerance)
+    crossed = np.flatnonzero(tree.query(middle)[0] < radius - tolerance)
     if not len(crossed):
         return none
     checkpoint()

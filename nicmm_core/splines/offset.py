@@ -11,9 +11,6 @@ from ..geometry.orientation import turned, turned_faces
 from ..geometry.surface_points import SurfacePoints
 from ..repair.clean_surface import joined_surface
 
-VANISHING = 1e-6
-"""Length of an interpolated normal up to which the normals at the corners count as cancelling."""
-
 
 def offset_points(
     mesh: Mesh, faces: IntArray, barycentric: FloatArray, height: float
@@ -48,6 +45,7 @@ def offset_points(
     face_normals = np.where(against[faces, None], -1.0, 1.0) * mesh.face_normals[faces]
     normals = np.einsum("nc,ncd->nd", barycentric, at_corners)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    sound = length > VANISHING
+    # Where the normals at the corners cancel, the normal of the face replaces them.
+    sound = length > 1e-6
     normals = np.where(sound, normals / np.where(sound, length, 1.0), face_normals)
     return SurfacePoints(faces, barycentric).positions(mesh) + height * normals

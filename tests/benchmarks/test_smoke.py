@@ -14,7 +14,7 @@ from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core.courses import attempts
-from nicmm_core.network.finetuning import FinetuningConfig
+from nicmm_core.paper.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
 

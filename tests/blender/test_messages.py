@@ -21,7 +21,7 @@ CORE = (
     "outputs/cut.py",
     "outputs/region.py",
     "path/legs.py",
-    "path/initial_loop.py",
+    "path/initial_path.py",
 )
 KINDS = {
     "ArgumentError",

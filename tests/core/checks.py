@@ -9,6 +9,8 @@ import numpy as np
 import nicmm_core as nicmm
 from nicmm_core.geometry.curve import curve_on_mesh
 from nicmm_core.geometry.tracing import strictly_inside, trace_between
+from nicmm_core.paper.initial_loop import build_initial_loop
+from nicmm_core.path.initial_path import find_initial_path
 from nicmm_core.relaxation.node_traces import crossing_steps
 from tests.oracles.checker import judge_curve
 
@@ -175,3 +177,9 @@ def simple_curves(surface, nodes):
     simple = np.ones(nodes.curves, dtype=bool)
     simple[crossing_steps(surface, nodes)[:, 0] // (len(nodes.positions) // nodes.curves)] = False
     return simple
+
+
+def initial_loop(mesh, points, order, phi_fea=None, closed=True, via_points=None):
+    """Working mesh, and the initial path on it."""
+    path = find_initial_path(mesh, points, order, phi_fea, closed, via_points)
+    return build_initial_loop(int(mesh.face_component[points.faces[0]]), path)

@@ -58,7 +58,7 @@ def surface(request) -> nicmm.Mesh:
 
 @pytest.fixture
 def without_courses(monkeypatch):
-    """Make curves start from the network's level set, as if no course were found."""
+    """Make curves start from the initial path, as if no course were found."""
     monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))
 
 

@@ -8,7 +8,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import improvement, shapes, start_search, surface_designer
 from nicmm_core.courses import attempts
-from nicmm_core.path import band_refinement, legs, simple_path, virtual_splits
+from nicmm_core.path import legs, simple_path, virtual_splits
 from nicmm_core.relaxation import relaxing
 from tests.oracles.checker import judge
 
@@ -108,7 +108,7 @@ def test_forty_points_back_and_forth(monkeypatch):
         assert not judge(mesh, design, chosen).faults
         orders = 1
     of_paths = simple_path.MOST_SPLITS_TO_TRY + 2 * legs.MOST_PATH_SPLITS
-    assert len(splits) <= orders * of_paths + 2 * band_refinement.MOST_SPLITS
+    assert len(splits) <= orders * of_paths
 
 
 def test_repeated_searches_are_bounded(monkeypatch):

@@ -15,7 +15,7 @@ from nicmm_core import shapes
 from nicmm_core.__main__ import main
 from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.io.files import read_mesh, write_mesh
-from nicmm_core.network.weights_file import load_weights
+from nicmm_core.paper.weights_file import load_network
 from tests.core.checks import assert_valid_curve
 
 ROOT = Path(__file__).parents[2]
@@ -168,7 +168,7 @@ def test_pretrain_writes_weights_with_the_switches_asked_for(mesh_file, tmp_path
     output = tmp_path / "weights.npz"
     options = ["--sets", "2", "--epochs", "1", "--no-attention"]
     assert main(["pretrain", str(mesh_file), "-o", str(output), *options]) == 0
-    config = load_weights(output).config
+    config = load_network(output).config
     assert (config.attention, config.gating) == (False, True)
     # The progress bar goes to standard error.
     assert capsys.readouterr().out == ""

@@ -74,7 +74,7 @@ class TestClosedForms:
         assert np.abs(distance / radius - 1.0).max() < 0.06
         assert curve.length == pytest.approx(2 * np.pi * radius, rel=0.03)
 
-    def test_the_network_makes_a_zigzag_fairer(self, ball):
+    def test_the_curve_is_fairer_than_a_zigzag(self, ball):
         """The curve bends less than shortest paths along edges do."""
         chosen = nearest_vertices(ball, circle([0.4, 2.0, 4.0], 0.8) + [0.0, 0.0, 0.6])
         (curve,) = nicmm.design_curve(ball, chosen).curves

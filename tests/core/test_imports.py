@@ -29,7 +29,7 @@ def test_no_package_imports_one_that_imports_it():
     for path in ROOT.rglob("*.py"):
         if path != ROOT / "__init__.py":  # it imports every name on first use
             rooms.setdefault(room(path), set()).update(imported_rooms(path))
-    assert {"geometry", "path", "level_set", "outputs"} < rooms.keys()
+    assert {"geometry", "path", "paper", "outputs"} < rooms.keys()
     assert "geometry" in rooms["path"]
     for name, below in rooms.items():
         below.discard(name)

@@ -23,8 +23,8 @@ from nicmm_core import shapes
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.io.files import MESH_FORMATS, read_mesh, write_curve, write_mesh
-from nicmm_core.network.forward_pass import NetworkConfig
-from nicmm_core.network.weights_file import SHIPPED, load_weights
+from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.weights_file import SHIPPED, load_network
 
 from .checker import judge
 from .untyped import place_of
@@ -264,10 +264,10 @@ def _weights_file(generator: np.random.Generator, result: Answer) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "weights.npz"
         path.write_bytes(data)
-        weights = load_weights(path)
+        network = load_network(path)
     result.outcome = "read"
-    if not isinstance(weights.config, NetworkConfig) or not all(
-        np.isfinite(array).all() for array in weights.parameters.values()
+    if not isinstance(network, CurveNetwork) or not all(
+        tensor.isfinite().all() for tensor in network.parameters()
     ):
         result.faults.append("weights that are not finite")
 

@@ -7,23 +7,26 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening.coarse_mesh import build_coarse_mesh
-from nicmm_core.coarsening.fine_curve import curve_on_fine_mesh
+from nicmm_core.coarsening.fine_curve import nodes_on_fine_mesh
 from nicmm_core.geometry.normals import unsigned_normals
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.relaxation.curve_nodes import CurveSurface
+from nicmm_core.relaxation.discrete_curve import place_nodes
 from tests.core.checks import assert_valid_curve
 
 
 def curves_through(mesh, chosen, closed):
     """Coarse mesh, a curve on it, and the curve mapped to the fine mesh."""
     normals = unsigned_normals(mesh)
-    coarse = build_coarse_mesh(mesh, normals, 0, 600)
+    coarse = build_coarse_mesh(mesh, normals, 600)
     points = locate_control_points(mesh, chosen, closed)
     near = coarse.nearest_points(mesh, points)
     (curve,) = nicmm.design_curve(coarse.mesh, near, closed=closed).curves
     surface = CurveSurface(mesh, normals)
     coarse_surface = CurveSurface(coarse.mesh, unsigned_normals(coarse.mesh))
-    return coarse, curve, curve_on_fine_mesh(surface, coarse, coarse_surface, curve, points)
+    nodes = place_nodes(coarse_surface, curve, 256)
+    result = nodes_on_fine_mesh(surface, coarse, nodes, points)
+    return coarse, curve, None if result is None else result.surface_curve(mesh)
 
 
 def rough_sphere():

@@ -9,7 +9,6 @@ from scipy.spatial import cKDTree
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.coarsening import coarse_start
-from nicmm_core.level_set import sparse_solver
 from tests.core.checks import assert_valid_design, grid
 
 
@@ -19,41 +18,23 @@ def large():
     return shapes.creature(5, faces=400, subdivisions=4)
 
 
-@pytest.fixture
-def unknowns(monkeypatch):
-    """Sizes of all matrices that are factorised."""
-    sizes = []
-    plain = sparse_solver.linalg.splu
-
-    def counted(matrix, *arguments, **named):
-        sizes.append(matrix.shape[0])
-        return plain(matrix, *arguments, **named)
-
-    monkeypatch.setattr(sparse_solver.linalg, "splu", counted)
-    return sizes
-
-
 def chosen_on(mesh, count, seed=0):
     return np.random.default_rng(seed).choice(len(mesh.vertices), size=count, replace=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
-def test_curve_is_valid_and_factorises_only_the_coarse_mesh(
-    large, unknowns, without_courses, closed
-):
+def test_without_courses_the_curve_is_valid(large, without_courses, closed):
     design = nicmm.design_curve(large, chosen_on(large, 5), closed=closed, order="shortest")
     assert_valid_design(large, design, closed=closed)
-    assert max(unknowns) < 1.5 * coarse_start.CELLS
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed, unknowns, without_courses):
+def test_on_a_square_grid_the_coarse_mesh_gives_the_start(seed):
     square = grid(84)
     inner = np.flatnonzero((np.abs(square.vertices[:, :2] - 0.5) < 0.3).all(axis=1))
     points = np.random.default_rng(seed).choice(inner, size=4, replace=False)
     assert_valid_design(square, nicmm.design_curve(square, points, order="shortest"))
-    assert max(unknowns) < len(square.vertices)
 
 
 @pytest.mark.slow
@@ -87,7 +68,7 @@ def test_a_second_curve_uses_the_same_cells(large, monkeypatch):
 
 
 @pytest.mark.slow
-def test_it_is_about_the_curve_of_the_fine_level_set(monkeypatch, without_courses):
+def test_it_is_about_the_curve_without_a_coarse_mesh(monkeypatch):
     mesh = shapes.sphere(5)
     chosen = chosen_on(mesh, 4)
     by_cells = nicmm.design_curve(mesh, chosen, order="shortest").curves[0]

@@ -131,7 +131,7 @@ def test_nodes_are_doubled_until_energies_are_true(windings, doubled):
 
 
 @pytest.mark.slow
-def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
+def test_courses_bend_less_than_the_initial_path(monkeypatch):
     """In the geometric mean over some bodies; on single bodies they may bend more."""
 
     def total(seed):
@@ -144,8 +144,8 @@ def test_courses_bend_less_than_the_start_by_the_network(monkeypatch):
 
     searched = [total(seed) for seed in range(8)]
     monkeypatch.setattr(course_surface, "find_courses", lambda *arguments, **named: iter(()))
-    by_network = [total(seed) for seed in range(8)]
-    assert np.mean(np.log(np.divide(searched, by_network))) < np.log(0.9)
+    by_path = [total(seed) for seed in range(8)]
+    assert np.mean(np.log(np.divide(searched, by_path))) < np.log(0.9)
 
 
 @pytest.mark.parametrize("times", [0, 1, 2])

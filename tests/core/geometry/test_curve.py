@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nicmm_core.geometry.curve import curve_on_mesh, geodesic_curvature, resample
+from nicmm_core.geometry.curve import curve_on_mesh, resample
 from tests.core.checks import circle, random_surface_points
+from tests.oracles.geodesic_curvature import geodesic_curvature
 
 ANGLES = np.arange(60) * 2 * np.pi / 60
 UP = np.tile([0.0, 0.0, 1.0], (60, 1))

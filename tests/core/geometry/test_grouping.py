@@ -9,24 +9,17 @@ from scipy.sparse import csgraph
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.coarsening import coarse_mesh
-from nicmm_core.geometry import grouping, mesh
+from nicmm_core.geometry import mesh
 from nicmm_core.geometry.grouping import (
     components,
     distinct_rows,
     first_of_components,
     grouped,
     occurrences,
-    stable_order,
 )
 from nicmm_core.geometry.surface_points import first_hits, nearest_points
 
 SEEDS = st.integers(0, 10_000)
-
-
-@pytest.fixture(autouse=True)
-def small_parts(monkeypatch):
-    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 7)
 
 
 def some_keys(seed):
@@ -39,12 +32,10 @@ def some_keys(seed):
     return keys if generator.random() < 0.5 else keys * generator.choice([0.0, -0.5, np.pi])
 
 
-@pytest.mark.slow
 @given(SEEDS)
 def test_order_and_groups(seed):
     keys = some_keys(seed)
     expected = np.argsort(keys, kind="stable")
-    np.testing.assert_array_equal(stable_order(keys), expected)
     order, start, count = grouped(keys)
     _, first, counts = np.unique(keys, return_index=True, return_counts=True)
     np.testing.assert_array_equal(order, expected)
@@ -74,58 +65,11 @@ def test_components(seed):
     np.testing.assert_array_equal(label, expected)
 
 
-def test_large_arrays_are_sorted_by_parts(monkeypatch):
-    """A design can be cancelled between the parts."""
-    sorted_at_once, asked = [], []
-    argsort = np.argsort
-
-    def watched_sort(keys, **arguments):
-        if keys.dtype != np.uint8:  # not the sort of the part numbers, which is a radix sort
-            sorted_at_once.append(len(keys))
-        return argsort(keys, **arguments)
-
-    monkeypatch.setattr(np, "argsort", watched_sort)
-    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 1_000)
-    monkeypatch.setattr(grouping, "checkpoint", lambda: asked.append(1))
-    stable_order(np.random.default_rng(0).permutation(50_000))
-    assert len(sorted_at_once) == 50 < len(asked)
-    assert max(sorted_at_once) < 1_600  # the parts have about the same size
-
-
 @pytest.fixture
 def bumpy():
     ball = shapes.sphere(4)
     generator = np.random.default_rng(2)
     return ball.vertices * generator.uniform(0.97, 1.03, (len(ball.vertices), 1)), ball.faces
-
-
-@pytest.mark.slow
-def test_large_meshes_get_the_same_curve(bumpy, monkeypatch):
-    """Forces everything that is done in parts on large meshes, on a mesh with 5,120 faces."""
-    points = [3, 700, 1500, 2400]
-    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 10**9)
-    whole = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
-    monkeypatch.setattr(grouping, "MOST_KEYS_PER_SORT", 700)
-    monkeypatch.setattr(coarse_mesh, "SLAB", 600)
-    in_parts = nicmm.design_curve(nicmm.Mesh(*bumpy), points, order="shortest")
-    np.testing.assert_array_equal(in_parts.curves[0].points, whole.curves[0].points)
-
-
-@pytest.mark.parametrize("margin", [0.2, 1.0])
-def test_a_slab_finds_the_nearest_seeds_within_its_margin(bumpy, monkeypatch, margin):
-    """Up to the margin the nearest seeds are those of the whole mesh; beyond it there are none."""
-    surface = nicmm.Mesh(*bumpy)
-    graph = coarse_mesh._edge_graph(surface, np.zeros(len(surface.vertices)))
-    seed = np.sort(np.random.default_rng(0).choice(len(surface.vertices), 40, replace=False))
-    distance, _, source = csgraph.dijkstra(
-        graph, directed=False, indices=seed, min_only=True, return_predecessors=True
-    )
-    monkeypatch.setattr(coarse_mesh, "SLAB", 600)
-    found = coarse_mesh._nearest_seeds(surface.vertices, graph, seed, margin)
-    near = distance <= margin
-    assert 40 < near.sum() and (near.all() == (margin == 1.0))
-    np.testing.assert_array_equal(seed[found[near]], source[near])
-    assert (found[~near] == -1).all()
 
 
 def test_trees_of_some_faces_find_the_same_as_one_of_all(bumpy, monkeypatch):

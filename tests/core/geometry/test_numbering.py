@@ -68,16 +68,15 @@ def test_points_values_and_curves_are_mapped(surface):
 
     assert there.mesh.face_areas.sum() == pytest.approx(1.0, abs=1e-6)
     points = random_surface_points(surface, 7, 0)
-    mapped = there.points_to_copy(points).positions(there.mesh)
+    mapped = there.points_to(points).positions(there.mesh)
     np.testing.assert_allclose(mapped, in_frame(points.positions(surface)), atol=RESOLUTIONS[0])
     back = there.in_original(mapped)
     atol = 2.0 * RESOLUTIONS[0] * there.unit
     np.testing.assert_allclose(back, points.positions(surface), atol=atol)
-    values = there.values(in_frame(surface.vertices)[:, 0].copy())
+    values = there.weights_to(in_frame(surface.vertices)[:, 0].copy())
     np.testing.assert_allclose(values, there.mesh.vertices[:, 0], atol=RESOLUTIONS[0])
-    assert there.values(None) is None
     inside = there.number >= 0
-    lengths = there.field_to_original(there.mesh.vertices[:, 0])
+    lengths = there.field_back(there.mesh.vertices[:, 0])
     np.testing.assert_array_equal(
         lengths[inside], there.unit * there.mesh.vertices[there.number[inside], 0]
     )
@@ -85,9 +84,9 @@ def test_points_values_and_curves_are_mapped(surface):
     np.testing.assert_allclose(there.mesh.face_normals, normals, atol=1e-4)
     chosen = np.flatnonzero(there.mesh.referenced)[[3, 40, 80]]
     curve = nicmm.design_curve(there.mesh, chosen, order="shortest").curves[0]
-    on_original = there.curve_to_original(curve)
+    on_original = there.curve_back(curve)
     np.testing.assert_allclose(in_frame(on_original.points), curve.points, atol=RESOLUTIONS[0])
-    again = there.curve_to_copy(on_original)
+    again = there.curve_to(on_original)
     np.testing.assert_array_equal(again.faces, curve.faces)
     np.testing.assert_array_equal(again.barycentric, curve.barycentric)
 
@@ -191,5 +190,5 @@ def test_other_components_make_no_difference(body):
     np.testing.assert_allclose(there.mesh.vertices, alone.mesh.vertices, atol=1e-12)
     values = np.arange(len(vertices), dtype=float)
     np.testing.assert_array_equal(
-        there.values(values), alone.values(np.arange(len(far), dtype=float)) + len(far)
+        there.weights_to(values), alone.weights_to(np.arange(len(far), dtype=float)) + len(far)
     )

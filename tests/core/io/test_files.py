@@ -8,7 +8,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.io.files import check_curve_path, read_mesh, write_curve, write_mesh
-from nicmm_core.level_set.contour import extract_curves
+from nicmm_core.paper.contour import extract_curves
 from nicmm_core.path.virtual_splits import SplitMesh
 
 

@@ -62,6 +62,18 @@ def test_ply_as_text_with_other_elements(read):
     assert read("square.ply", content).faces.tolist() == [[0, 1, 2]]
 
 
+@pytest.mark.parametrize("layout", ["ascii", "binary_little_endian"])
+def test_ply_of_quads_with_a_comment_in_another_language(read, layout):
+    text = layout == "ascii"
+    body = b"4 0 1 2 3\n" if text else struct.pack("<B4i", 4, 0, 1, 2, 3)
+    content = ply((POINTS if text else PACKED) + body, layout=layout, faces=FACES)
+    for comment in ("of no use", "aus der Küche"):
+        changed = content.replace(b"comment of no use", f"comment {comment}".encode())
+        mesh = read("quad.ply", changed)
+        np.testing.assert_array_equal(mesh.vertices, SQUARE)
+        assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 def test_triangle_strips(read):
     """Two strips on a grid of four squares; all triangles have the same orientation."""
     positions = [(x, y, 0) for y in range(3) for x in range(3)]

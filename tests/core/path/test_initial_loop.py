@@ -12,9 +12,15 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.path import legs
-from nicmm_core.path.initial_loop import boundary_loops, build_initial_loop, path_curve
+from nicmm_core.path.initial_path import boundary_loops, find_initial_path, path_curve
 from nicmm_core.path.visiting_order import shortest_order
-from tests.core.checks import assert_valid_curve, circle, flipped, random_surface_points
+from tests.core.checks import (
+    assert_valid_curve,
+    circle,
+    flipped,
+    initial_loop,
+    random_surface_points,
+)
 from tests.oracles.named_curves import nearest_vertices
 
 pytestmark = pytest.mark.usefixtures("one_attempt_each")
@@ -62,7 +68,7 @@ def test_loops_through_random_vertices_are_simple(surface, count, order):
         inner = interior_vertices(surface)
         chosen = np.random.default_rng([count, seed]).choice(inner, size=count, replace=False)
         points = locate_control_points(surface, chosen, closed=True)
-        working, loop = build_initial_loop(surface, points, order)
+        working, loop = initial_loop(surface, points, order)
         assert_simple_loop(surface, points, order, working, loop)
 
 
@@ -71,7 +77,7 @@ def test_loops_through_random_vertices_are_simple(surface, count, order):
 def test_loops_through_points_in_faces_are_simple(surface, order):
     for seed in range(3):
         points = random_surface_points(surface, 5, seed)
-        working, loop = build_initial_loop(surface, points, order)
+        working, loop = initial_loop(surface, points, order)
         assert_simple_loop(surface, points, order, working, loop)
 
 
@@ -99,7 +105,7 @@ def test_any_points_of_a_sphere_have_a_simple_loop(places, order):
         points = locate_control_points(BALL, given_points, closed=True)
     except nicmm.ControlPointError:
         return  # two of the points coincide
-    working, loop = build_initial_loop(BALL, points, order)
+    working, loop = initial_loop(BALL, points, order)
     assert_simple_loop(BALL, points, order, working, loop)
 
 
@@ -108,14 +114,14 @@ def test_loops_of_many_strands_are_simple(small_ball, seed):
     """With points in random order, paths wind around one another and split the mesh often."""
     chosen = np.random.default_rng(seed).choice(len(small_ball.vertices), size=12, replace=False)
     points = locate_control_points(small_ball, chosen, closed=True)
-    working, loop = build_initial_loop(small_ball, points, "given")
+    working, loop = initial_loop(small_ball, points, "given")
     assert_simple_loop(small_ball, points, "given", working, loop)
 
 
 def test_shortest_order_is_that_of_the_distances(ball):
     angles = 2 * np.pi * np.array([0.0, 0.6, 0.2, 0.8, 0.4])
     points = locate_control_points(ball, nearest_vertices(ball, circle(angles)), closed=True)
-    _, loop = build_initial_loop(ball, points, "shortest")
+    _, loop = initial_loop(ball, points, "shortest")
     chord = np.linalg.norm(circle(angles)[:, None] - circle(angles)[None], axis=2)
     expected = shortest_order(chord, closed=True).tolist()
     # On the mesh the points are not exactly evenly spaced, so the tour may start elsewhere.
@@ -153,7 +159,7 @@ class TestEveryOrder:
         faces = generator.integers(len(mesh.faces), size=count)
         barycentric = generator.dirichlet([1.0, 1.0, 1.0], size=count)
         points = locate_control_points(mesh, nicmm.SurfacePoints(faces, barycentric), closed)
-        working, loop = build_initial_loop(mesh, points, "given", None, closed)
+        working, loop = initial_loop(mesh, points, "given", None, closed)
         assert_simple_loop(mesh, points, "given", working, loop, closed)
 
     @settings(max_examples=15)
@@ -163,7 +169,7 @@ class TestEveryOrder:
         inner = interior_vertices(flat_disc)
         chosen = np.random.default_rng(seed).choice(inner, count, replace=False)
         points = locate_control_points(flat_disc, chosen, closed)
-        working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        working, loop = initial_loop(flat_disc, points, "given", None, closed)
         assert_simple_loop(flat_disc, points, "given", working, loop, closed)
         assert not working.on_boundary[loop.vertices].any()
 
@@ -172,7 +178,7 @@ class TestEveryOrder:
         """Twenty points back and forth; legs found in this order once made the path too long."""
         chosen = np.random.default_rng(20).choice(len(ball.vertices), 20, replace=False)
         points = locate_control_points(ball, chosen, closed)
-        working, loop = build_initial_loop(ball, points, "given", None, closed)
+        working, loop = initial_loop(ball, points, "given", None, closed)
         assert_simple_loop(ball, points, "given", working, loop, closed)
         onward = np.roll(chosen, -1)
         apart = np.linalg.norm(ball.vertices[chosen] - ball.vertices[onward], axis=1).sum()
@@ -194,14 +200,14 @@ class TestBoundary:
         order = generator.permutation(count)
         points = locate_control_points(flat_disc, rim[places[order]], closed)
         try:
-            working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+            working, loop = initial_loop(flat_disc, points, "given", None, closed)
         except nicmm.UnreachableError as error:
             assert legs_alternate(order, closed)
             named = re.search(r"in the order (\[[\d, ]*\]), which works", str(error))
             assert named, error
             works = json.loads(named.group(1))
             points = locate_control_points(flat_disc, rim[places[order[works]]], closed)
-            working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+            working, loop = initial_loop(flat_disc, points, "given", None, closed)
         else:
             assert not legs_alternate(order, closed)
         assert_simple_loop(flat_disc, points, "given", working, loop, closed)
@@ -215,7 +221,7 @@ class TestBoundary:
         inner = np.setdiff1d(interior_vertices(flat_disc), flat_disc.faces[0])
         chosen = np.random.default_rng(seed).choice(inner, 4, replace=False)
         points = locate_control_points(flat_disc, [*rim, *chosen], closed)
-        working, loop = build_initial_loop(flat_disc, points, "given", None, closed)
+        working, loop = initial_loop(flat_disc, points, "given", None, closed)
         assert_simple_loop(flat_disc, points, "given", working, loop, closed)
 
     def test_strip_one_triangle_wide(self):
@@ -226,11 +232,11 @@ class TestBoundary:
         strip = nicmm.Mesh(vertices, faces)
         middle = np.array([[0.4, 0.5, 0], [5.4, 0.3, 0], [10.6, 0.5, 0], [5.6, 0.7, 0]])
         points = locate_control_points(strip, middle[[0, 1, 2, 3]], closed=True)
-        working, loop = build_initial_loop(strip, points, "given")
+        working, loop = initial_loop(strip, points, "given")
         assert_simple_loop(strip, points, "given", working, loop)
         assert not working.on_boundary[loop.vertices].any()
         corners = locate_control_points(strip, [0, 23, 1], closed=True)
-        working, loop = build_initial_loop(strip, corners, "given")
+        working, loop = initial_loop(strip, corners, "given")
         assert_simple_loop(strip, corners, "given", working, loop)
         assert working.on_boundary[loop.vertices].sum() == 3
 
@@ -238,43 +244,8 @@ class TestBoundary:
         """A face with three boundary edges has to be split before any leg is found."""
         mesh = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         points = locate_control_points(mesh, [0, 1, 2], closed=True)
-        working, loop = build_initial_loop(mesh, points, "given")
+        working, loop = initial_loop(mesh, points, "given")
         assert_simple_loop(mesh, points, "given", working, loop)
-
-
-class TestNoManifold:
-    @pytest.mark.slow
-    def test_spheres_that_touch_have_open_curves_only(self):
-        """A curve may pass the common vertex only once."""
-        ball = shapes.sphere(1)
-        top = int(ball.vertices[:, 2].argmax())
-        other = ball.vertices * [1, 1, -1] + [0, 0, 2 * ball.vertices[top, 2]]
-        count = len(ball.vertices)
-        number = np.arange(count) + count
-        number[top] = top
-        both = np.concatenate([ball.vertices, other])
-        mesh = nicmm.Mesh(both, np.concatenate([ball.faces, number[ball.faces[:, ::-1]]]))
-        lowest = int(ball.vertices[:, 2].argmin())
-        points = locate_control_points(mesh, [lowest, lowest + count], closed=False)
-        working, loop = build_initial_loop(mesh, points, "given", None, False)
-        assert_simple_loop(mesh, points, "given", working, loop, closed=False)
-        chosen = [lowest, lowest + count, int(ball.vertices[:, 0].argmax())]
-        points = locate_control_points(mesh, chosen, closed=True)
-        with pytest.raises(nicmm.UnreachableError, match="no order works"):
-            build_initial_loop(mesh, points, "given")
-
-    def test_a_path_leaves_an_edge_of_three_faces_alone(self):
-        """A fin stands on a sheet; a path between its two sides leads around its end."""
-        x, y = (c.ravel() for c in np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"))
-        corner = np.array([7 * i + j for i in range(6) for j in range(6)])
-        sheet = np.concatenate([corner[:, None] + [0, 7, 8], corner[:, None] + [0, 8, 1]])
-        fin = np.array([[22, 23, 49], [23, 24, 50], [49, 23, 50]])
-        vertices = np.concatenate([np.stack([x, y, 0 * x], axis=1), [[3, 1.5, 1], [3, 2.5, 1]]])
-        mesh = nicmm.Mesh(vertices, np.concatenate([sheet, fin]))
-        points = locate_control_points(mesh, [9, 37, 33], closed=True)
-        working, loop = build_initial_loop(mesh, points, "given")
-        assert_simple_loop(mesh, points, "given", working, loop)
-        assert not set(working.input_vertex[loop.vertices]) & {22, 23, 24}
 
 
 @pytest.mark.slow
@@ -283,7 +254,7 @@ def test_a_path_that_winds_too_often_names_an_order(ball, monkeypatch):
     chosen = np.random.default_rng(0).choice(len(ball.vertices), 24, replace=False)
     points = locate_control_points(ball, chosen, closed=True)
     with pytest.raises(nicmm.UnreachableError, match=r"winds around itself too often.*which works"):
-        build_initial_loop(ball, points, "given")
+        initial_loop(ball, points, "given")
 
 
 def boundary_loop(mesh):
@@ -346,7 +317,7 @@ class TestBoundaries:
         rim = np.unique(mesh.unpaired_edges[0])
         chosen = np.random.default_rng(seed).choice(rim, 9, replace=False)
         points = locate_control_points(mesh, chosen, closed)
-        working, loop = build_initial_loop(mesh, points, "shortest", closed=closed)
+        working, loop = initial_loop(mesh, points, "shortest", closed=closed)
         assert_simple_loop(mesh, points, "shortest", working, loop, closed)
 
 
@@ -356,6 +327,6 @@ def test_the_path_itself_is_a_curve(surface, seed, closed):
     inner = interior_vertices(surface)
     chosen = np.random.default_rng(seed).choice(inner, size=5, replace=False)
     points = locate_control_points(surface, chosen, closed)
-    working, loop = build_initial_loop(surface, points, "shortest", closed=closed)
-    curve = path_curve(surface, working, loop)
-    assert_valid_curve(surface, curve, surface.vertices[chosen][loop.order], closed)
+    path = find_initial_path(surface, points, "shortest", closed=closed)
+    curve = path_curve(surface, path)
+    assert_valid_curve(surface, curve, surface.vertices[chosen][path.order], closed)

@@ -9,8 +9,7 @@ from nicmm_core.__main__ import main
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.io.files import read_mesh, write_mesh
 from nicmm_core.path import legs
-from nicmm_core.path.initial_loop import build_initial_loop
-from tests.core.checks import assert_valid_design, circle, joined
+from tests.core.checks import assert_valid_design, circle, initial_loop, joined
 from tests.oracles.named_curves import nearest_vertices
 
 pytestmark = pytest.mark.usefixtures("one_attempt_each")
@@ -68,7 +67,7 @@ class TestWhichWay:
         chosen = np.random.default_rng(3).choice(len(ball.vertices), 8, replace=False)
         points = locate_control_points(ball, chosen[:4], closed)
         via = {0: chosen[4:6], 2: ball.vertices[chosen[6:]]}
-        working, loop = build_initial_loop(ball, points, "given", None, closed, via)
+        working, loop = initial_loop(ball, points, "given", None, closed, via)
         place = {int(working.input_vertex[v]): i for i, v in enumerate(loop.vertices)}
         expected = chosen[[0, 4, 5, 1, 2, 6, 7, 3]]
         assert (np.diff([place[int(vertex)] for vertex in expected]) > 0).all()
@@ -77,9 +76,9 @@ class TestWhichWay:
     @pytest.mark.slow
     def test_no_via_points_change_nothing(self, small_ball):
         points = locate_control_points(small_ball, [3, 60, 100], closed=True)
-        plain = build_initial_loop(small_ball, points, "given")[1]
+        plain = initial_loop(small_ball, points, "given")[1]
         for nothing in ({}, {1: []}):
-            loop = build_initial_loop(small_ball, points, "given", via_points=nothing)[1]
+            loop = initial_loop(small_ball, points, "given", via_points=nothing)[1]
             np.testing.assert_array_equal(loop.vertices, plain.vertices)
 
     @pytest.mark.slow
@@ -106,7 +105,7 @@ class TestWhichWay:
         chosen = np.random.default_rng(0).choice(len(ball.vertices), 40, replace=False)
         points = locate_control_points(ball, chosen[:3], closed=True)
         with pytest.raises(nicmm.UnreachableError, match=r"leave the via points out.*\[0, 1, 2\]"):
-            build_initial_loop(ball, points, "given", via_points={0: chosen[3:]})
+            initial_loop(ball, points, "given", via_points={0: chosen[3:]})
 
 
 BAD = {

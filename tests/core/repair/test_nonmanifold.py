@@ -6,9 +6,14 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry import tolerances
-from nicmm_core.geometry.mesh import corners_differ, unique_edges
+from nicmm_core.geometry.mesh import (
+    adjacent_sides,
+    corners_differ,
+    joined_corners,
+    side_corners,
+    unique_edges,
+)
 from nicmm_core.geometry.surface_points import locate_points
-from nicmm_core.path.leg_graph import nonmanifold_vertices
 from nicmm_core.repair.clean_surface import Cleaning
 from nicmm_core.repair.nonmanifold import _Sides, is_manifold
 from nicmm_core.repaired_surface import WAYS, CleanSurfaces, RepairedSurface
@@ -34,6 +39,14 @@ OTHER_WAYS = {
     **{f"caps of height {height}": (VERTICES, False) for height in ("1e-13", "1e-10", "1e-07")},
 }
 """The second way in which the manifold of a mesh is made, where cleaning changes the mesh."""
+
+
+def nonmanifold_vertices(mesh):
+    """Vertices whose faces form more than one fan, connected through edges at the vertex."""
+    ends = side_corners(mesh.faces)
+    one, other = adjacent_sides(mesh.faces)
+    _, vertex_of_fan = joined_corners(mesh.faces, ends[one].ravel(), ends[other].ravel())
+    return np.bincount(vertex_of_fan, minlength=len(mesh.vertices)) > 1
 
 
 def repairs_of(mesh):

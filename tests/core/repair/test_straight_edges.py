@@ -44,7 +44,7 @@ def test_corners_of_parts_lie_at_their_vertices(straight):
 
 def test_points_keep_their_positions(straight):
     points = random_surface_points(straight.original, 300, seed=4)
-    moved = straight.points_to_mesh(points)
+    moved = straight.points_to(points)
     np.testing.assert_allclose(
         moved.positions(straight.mesh), points.positions(straight.original), atol=1e-12
     )
@@ -61,21 +61,21 @@ def test_curves_keep_their_course_and_find_back(straight):
     axes = np.stack([each / np.linalg.norm(each) for each in (first, second, tip)])
     circle = circle @ axes / np.linalg.norm(circle, axis=1, keepdims=True)
     curve = curve_through(straight.mesh, circle, [0, 10, 20])
-    back = straight.curve_to_original(curve)
+    back = straight.curve_back(curve)
     assert not judge_curve(straight.original, back).faults
     assert len(back.points) > len(curve.points)
     np.testing.assert_allclose(
         back.points[back.control_index], curve.points[curve.control_index], atol=1e-9
     )
     assert abs(back.length - curve.length) < 1e-9
-    again = straight.curve_to_mesh(back)
+    again = straight.curve_to(back)
     np.testing.assert_allclose(again.points, back.points, atol=1e-9)
 
 
 def test_a_field_is_linear_along_divided_edges(straight):
     height = straight.mesh.vertices[:, 1].copy()
     height[~straight.mesh.referenced] = 100.0
-    there = straight.field_to_original(height)
+    there = straight.field_back(height)
     used = straight.original.referenced
     np.testing.assert_allclose(there[used], straight.original.vertices[used, 1], atol=1e-12)
 

@@ -1,0 +1,73 @@
+"""Computes the level set of a final curve: the distance to it, signed if it bounds a region.
+
+The two ends of an edge lie on different sides if the curve crosses the edge an odd number of times,
+and on the same side otherwise. If these conditions contradict each other, the curve bounds no
+region.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .array_types import FloatArray, IntArray
+from .curve import SurfaceCurve
+from .distances import build_distance_surface, distance_to_segments, propagate
+from .mesh import Mesh, unique_edges
+from .sides import two_sides
+
+
+def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
+    """Distance to a curve at the vertices, in mesh units, shape (V,).
+
+    Negative inside a closed curve that bounds a region, which is the side with the smaller area.
+    Vertices on other components are outside, at the greatest distance found.
+    """
+    surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
+    n_segments = len(curve.points) if curve.closed else len(curve.points) - 1
+    segment = np.arange(n_segments)
+    distance = np.full(len(mesh.vertices), np.inf)
+    for corner in range(3):
+        vertex = mesh.faces[curve.faces[segment], corner]
+        start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
+        to_segment = distance_to_segments(mesh.vertices[vertex], start, end)
+        np.minimum.at(distance, vertex, to_segment)
+    propagate(surface, distance, np.inf)
+    reached = np.isfinite(distance)
+    side = _side(mesh, curve) if curve.closed else None
+    field = distance if side is None else side * distance
+    field[~reached] = distance[reached].max()
+    return field
+
+
+def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
+    """-1 inside a closed curve, +1 outside and 0 on it, (V,); None if it bounds no region."""
+    n_vertices = len(mesh.vertices)
+    edges, _ = unique_edges(mesh.faces)
+    corners = mesh.faces[curve.faces]
+    weights = curve.barycentric > 0.0
+    on_curve = np.zeros(n_vertices, dtype=bool)
+    at_vertex = weights.sum(axis=1) == 1
+    on_curve[corners[at_vertex][weights[at_vertex]]] = True
+    # At a point on an edge, the curve crosses the edge if it passes from one face to another.
+    changes = (weights.sum(axis=1) == 2) & (curve.faces != np.roll(curve.faces, 1))
+    crossed = np.sort(corners[changes][weights[changes]].reshape(-1, 2), axis=1)
+    size = np.array([n_vertices, 1])
+    parity = np.zeros(len(edges), dtype=np.int64)
+    np.add.at(parity, np.searchsorted(edges @ size, crossed @ size), 1)
+    parity %= 2
+    off = ~on_curve[edges].any(axis=1)
+    part, side = two_sides(n_vertices, edges[off], parity[off] == 1)
+    if (side == 0)[~on_curve].any():
+        return None
+    # Parts connected to the rest only through vertices on the curve count as outside.
+    here = np.zeros(n_vertices, dtype=bool)
+    here[mesh.faces[mesh.face_component == mesh.face_component[curve.faces[0]]]] = True
+    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n_vertices)
+    largest = np.bincount(part, np.where(here & ~on_curve, area, 0.0)).argmax()
+    here &= part == largest
+    side = np.where(here, side, 1)
+    inside, outside = (area[here & (side == sign)].sum() for sign in (-1, 1))
+    if inside > outside:
+        side[here] *= -1
+    side[on_curve] = 0
+    return side

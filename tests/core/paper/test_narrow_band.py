@@ -1,0 +1,89 @@
+"""Tests the energy of the narrow band against the losses, and its derivatives."""
+
+import numpy as np
+import pytest
+
+from nicmm_core.geometry.surface_points import locate_control_points
+from nicmm_core.paper.losses import LossWeights, energy_surface, loss_terms, total_loss
+from nicmm_core.paper.narrow_band import build_narrow_band, evaluate, gauss_newton_system
+from nicmm_core.paper.problem import build_problem
+
+WEIGHTS = LossWeights(smooth=0.02, feature=0.4)
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["plain", "guided"])
+def problem(request, ball):
+    obstacles = (ball.vertices[:, 0] > 0.7).astype(float) if request.param else None
+    points = locate_control_points(ball, [3, 200, 400, 600], closed=True)
+    return build_problem(ball, points, "shortest", obstacles)
+
+
+def test_whole_surface_has_the_energy_of_the_losses(problem):
+    """A band that contains the whole surface has the energy of Eq. 2."""
+    phi = problem.initial_distance
+    band = build_narrow_band(problem, phi, np.inf)
+    assert len(band.unknowns) == len(phi) - len(problem.loop.control_vertices)
+    expected = total_loss(loss_terms(energy_surface(problem), phi), WEIGHTS)
+    found = evaluate(band, WEIGHTS, phi[band.unknowns]).energy
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("half_width_in_edges", [3.0, np.inf])
+def test_gradient_is_the_derivative(problem, half_width_in_edges):
+    """Compared with central differences along random directions."""
+    phi = problem.initial_distance
+    band = build_narrow_band(problem, phi, half_width_in_edges * problem.edge_length)
+    values = phi[band.unknowns]
+    _, gradient = gauss_newton_system(band, WEIGHTS, evaluate(band, WEIGHTS, values))
+    generator = np.random.default_rng(0)
+    for _ in range(4):
+        direction = generator.normal(size=len(values))
+        step = 1e-6 * problem.edge_length * direction
+        rise = evaluate(band, WEIGHTS, values + step).energy
+        rise -= evaluate(band, WEIGHTS, values - step).energy
+        assert rise / 2.0 == pytest.approx(gradient @ step, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_hessian_is_symmetric_and_positive_semidefinite(problem):
+    band = build_narrow_band(problem, problem.initial_distance, 3.0 * problem.edge_length)
+    values = problem.initial_distance[band.unknowns]
+    hessian, _ = gauss_newton_system(band, WEIGHTS, evaluate(band, WEIGHTS, values))
+    dense = hessian.toarray()
+    np.testing.assert_allclose(dense, dense.T, rtol=0, atol=1e-12 * np.abs(dense).max())
+    eigenvalues = np.linalg.eigvalsh(dense)
+    assert eigenvalues[0] > -1e-10 * eigenvalues[-1]
+
+
+def test_hessian_is_that_of_a_perfect_fit(ball):
+    """Up to the known terms of nonzero residuals, the Gauss–Newton Hessian is the exact one."""
+    points = locate_control_points(ball, [3, 200, 400], closed=True)
+    problem = build_problem(ball, points, "shortest")
+    weights = LossWeights(smooth=0.0)
+    band = build_narrow_band(problem, problem.initial_distance, np.inf)
+    values = problem.initial_distance[band.unknowns]
+    residuals = evaluate(band, weights, values)
+    hessian, _ = gauss_newton_system(band, weights, residuals)
+    generator = np.random.default_rng(1)
+    direction = generator.normal(size=len(values))
+    step = 1e-5 * problem.edge_length * direction
+    _, before = gauss_newton_system(band, weights, evaluate(band, weights, values - step))
+    _, after = gauss_newton_system(band, weights, evaluate(band, weights, values + step))
+    # Gauss–Newton leaves out 2 (|∇φ|² - 1) |∇δ|² in faces where the slope is below 1.
+    left_out = 2.0 * weights.sdf * band.face_areas * np.minimum(residuals.slope, 0.0)
+    exact = direction @ (after - before) / 2e-5 / problem.edge_length
+    missing = left_out @ ((band.gradient @ direction).reshape(3, -1) ** 2).sum(axis=0)
+    assert direction @ (hessian @ direction) + missing == pytest.approx(exact, rel=1e-5)
+
+
+def test_band_follows_the_curve_and_not_the_mesh(problem):
+    """Half the width gives about half the unknowns; bending needs complete one-rings."""
+    h = problem.edge_length
+    narrow = build_narrow_band(problem, problem.distance, 2.0 * h)
+    wide = build_narrow_band(problem, problem.distance, 4.0 * h)
+    assert 1.4 < len(wide.unknowns) / len(narrow.unknowns) < 2.6
+    assert 0 < len(wide.inner_areas) < len(wide.face_areas)
+    # A Laplacian with complete one-rings vanishes on constants.
+    constant = wide.laplacian @ np.ones(len(wide.unknowns))
+    beside_controls = wide.centroid @ np.ones(len(wide.unknowns)) < 1.0 - 1e-9
+    assert np.abs(constant[~beside_controls]).max() < np.abs(wide.laplacian).max()
