@@ -74,7 +74,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
         (course_candidates, "course_nodes"),
     ],
     "legs recombined": [(course_search, "recombined")],
-    "crossings removed": [(course_search, "uncrossed")],
+    "crossings removed": [(course_search, "remove_crossings")],
     "courses relaxed together": [(course_search, "relax_batch")],
     "courses compared, denser": [(course_search, "_best"), (course_search, "_resampled")],
     "course traced": [(start_search, "simple_curve")],

@@ -28,7 +28,7 @@ from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
 from .request import Request
-from .start_search import Start, StartSearch, is_new
+from .start_search import InitialCurve, StartSearch, is_new
 
 MAX_COURSES_RELAXED = 10
 """Courses relaxed for alternatives, in addition to two for each alternative.
@@ -57,28 +57,28 @@ class Improvement:
         Relaxes a start with some settings; raises `CancelledError` if the caller stops it.
     attempts : Attempts
         The results, and whether another attempt is worth its work.
-    starts : list of Start
+    starts : list of InitialCurve
         The start of each attempt.
     """
 
     search: StartSearch
     request: Request
-    relax: Callable[[Start, RelaxationConfig], Relaxed]
+    relax: Callable[[InitialCurve, RelaxationConfig], Relaxed]
     attempts: Attempts
-    starts: list[Start] = field(default_factory=list)
+    starts: list[InitialCurve] = field(default_factory=list)
 
-    def attempt(self, start: Start, config: RelaxationConfig) -> None:
+    def attempt(self, start: InitialCurve, config: RelaxationConfig) -> None:
         """Relax a start."""
         relaxed = self.relax(start, config)
         self.starts.append(start)
         self.attempts.relaxed.append(relaxed)
 
-    def improve(self, courses: Iterator[Start], by_course: bool) -> None:
+    def improve(self, courses: Iterator[InitialCurve], by_course: bool) -> None:
         """Make all attempts that follow the first one.
 
         Parameters
         ----------
-        courses : iterator of Start
+        courses : iterator of InitialCurve
             Other courses of the first search. Those that remain are for alternatives.
         by_course : bool
             Whether the first start is a course. If no course was simple, further searches would
@@ -111,7 +111,7 @@ class Improvement:
         """Settings with at most the work that is left."""
         return self.attempts.limited(relaxation_config(self.request))
 
-    def _search_again(self, further: list[Iterator[Start]]) -> None:
+    def _search_again(self, further: list[Iterator[InitialCurve]]) -> None:
         """Try the courses of one repeated search, other parts, and the courses of more searches."""
         found = True
         for courses in further[:1]:
@@ -125,7 +125,7 @@ class Improvement:
             if self.attempts.searches_without_gain == 0:
                 self._try_other_parts()
 
-    def _try_courses(self, courses: Iterator[Start]) -> bool:
+    def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.
 
         On rough meshes hardly any course is simple, and each failure takes long.
@@ -139,7 +139,7 @@ class Improvement:
         self.attempts.end_search()
         return True
 
-    def _try_other_courses(self, courses: Iterator[Start]) -> None:
+    def _try_other_courses(self, courses: Iterator[InitialCurve]) -> None:
         """Try the next courses of a search as long as its best curve is strongly bent."""
         first = len(self.starts) - 1
         while (

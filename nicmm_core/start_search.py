@@ -28,7 +28,7 @@ from .request import Request, same_maps
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialCurve:
     """A simple curve on the mesh from which relaxation begins.
 
     Attributes
@@ -69,7 +69,7 @@ class StartSearch:
 
     def courses(
         self, request: Request, seed: int = 0, most_failures: int | None = None
-    ) -> Iterator[Start]:
+    ) -> Iterator[InitialCurve]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
 
         The search ends after `most_failures` courses in a row that are not simple.
@@ -83,8 +83,8 @@ class StartSearch:
                 break
 
     def with_other_part(
-        self, request: Request, start: Start, curve: DiscreteCurve, part: BentPart
-    ) -> Iterator[Start]:
+        self, request: Request, start: InitialCurve, curve: DiscreteCurve, part: BentPart
+    ) -> Iterator[InitialCurve]:
         """A curve with other courses of one part that are apart from each other, the best first."""
         found: list[DiscreteCurve] = []
         part_request = request_for_part(request, curve, part)
@@ -97,7 +97,7 @@ class StartSearch:
                 found.append(course.curve)
                 yield replace(start, curve=changed)
 
-    def by_path(self, request: Request) -> Start:
+    def by_path(self, request: Request) -> InitialCurve:
         """The initial path."""
         surface = self.surface(request)
         path = find_initial_path(
@@ -108,7 +108,7 @@ class StartSearch:
             request.closed,
             request.via_points,
         )
-        return Start(path_curve(self.mesh, path), path.order, surface, self.unit)
+        return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.unit)
 
     def surface(self, request: Request) -> CurveSurface:
         """The surface for relaxation, with the maps of a request."""
@@ -126,12 +126,12 @@ class StartSearch:
         """Square root of the area of the mesh."""
         return component_unit(self.mesh, 0)
 
-    def _joined_courses(self, request: Request, seed: int) -> Iterator[Start | None]:
+    def _joined_courses(self, request: Request, seed: int) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
         there, unit = self.surface(request), self.unit
         if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, seed):
-                yield None if found is None else Start(*found, there, unit)
+                yield None if found is None else InitialCurve(*found, there, unit)
             return
         for course in self._courses.courses(request, seed):
             checkpoint()
@@ -142,7 +142,7 @@ class StartSearch:
                 request.points[course.visited],
                 request.closed,
             )
-            yield None if curve is None else Start(curve, course.visited, there, unit)
+            yield None if curve is None else InitialCurve(curve, course.visited, there, unit)
 
     @cached_property
     def _surface(self) -> CurveSurface:
@@ -157,7 +157,7 @@ class StartSearch:
         return CoarseStarts(self._surface)
 
 
-def is_new(start: Start, curves: list[DiscreteCurve]) -> bool:
+def is_new(start: InitialCurve, curves: list[DiscreteCurve]) -> bool:
     """Whether a course is somewhere apart from each of some curves."""
     assert isinstance(start.curve, DiscreteCurve)
     return is_apart(start.surface, start.curve, curves)

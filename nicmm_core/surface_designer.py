@@ -23,7 +23,7 @@ from .relaxation.relaxing import RelaxationConfig, Relaxed, relax
 from .relaxation.warm_start import WARM, movable_near
 from .request import Request
 from .start import Resumable, moved_start, unsettled_vertices
-from .start_search import Start, StartSearch
+from .start_search import InitialCurve, StartSearch
 from .status import Status
 
 START_FRACTION = 0.6
@@ -101,7 +101,7 @@ class SurfaceDesigner:
             collisions, unsettled = start.collisions, unsettled_vertices(start, request, visited)
         # If strands collide, an attempt without tracing every iteration would fail.
         config = replace(WARM, defer_tracing=not collisions)
-        begin = Start(
+        begin = InitialCurve(
             curve,
             visited,
             surface,
@@ -146,7 +146,7 @@ class SurfaceDesigner:
         return replace(best, status=status, alternatives=others)
 
     def _relaxed_design(
-        self, request: Request, start: Start, relaxed: Relaxed, started: float
+        self, request: Request, start: InitialCurve, relaxed: Relaxed, started: float
     ) -> Design:
         """The design whose curve has been relaxed from a start."""
         unit = start.unit
@@ -175,7 +175,10 @@ class SurfaceDesigner:
 
 
 def _relaxed(
-    request: Request, start: Start, config: RelaxationConfig, max_iterations: int | None = None
+    request: Request,
+    start: InitialCurve,
+    config: RelaxationConfig,
+    max_iterations: int | None = None,
 ) -> Relaxed:
     """Relax a start."""
     if max_iterations is not None:
@@ -191,7 +194,9 @@ def _relaxed(
     return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
 
 
-def _relaxed_unless_cancelled(request: Request, start: Start, config: RelaxationConfig) -> Relaxed:
+def _relaxed_unless_cancelled(
+    request: Request, start: InitialCurve, config: RelaxationConfig
+) -> Relaxed:
     """Relax a start; raises CancelledError if that is cancelled."""
     relaxed = _relaxed(request, start, config)
     if relaxed.status is Status.CANCELLED:

@@ -22,7 +22,7 @@ from ..request import Request, mapped_request
 from .coarse_mesh import CoarseMesh, build_coarse_mesh
 from .fine_curve import nodes_on_fine_mesh
 
-CELLS = 4_000
+COARSE_CELLS = 4_000
 """Greatest number of cells of a coarse mesh."""
 
 SMALL, LARGE = 3_000, 6_000
@@ -92,7 +92,7 @@ class CoarseStarts:
     def _coarse(self) -> _CoarseSurface:
         """The coarse mesh, built on first use."""
         # At least two fine vertices for each cell.
-        count = min(CELLS, np.count_nonzero(self._mesh.referenced) // 2)
+        count = min(COARSE_CELLS, np.count_nonzero(self._mesh.referenced) // 2)
         coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, count)
         return _CoarseSurface(coarse, curve_surface(coarse.mesh))
 

@@ -26,7 +26,7 @@ from .course_candidates import candidates
 from .hop_graph import HopGraph, with_control_points
 from .leg_orders import legs_of_order
 from .recombination import recombined
-from .uncrossing import uncrossed
+from .uncrossing import remove_crossings
 
 TENSIONS = (2.0, 1.0)
 """τ of the graph relative to (2π / L)², where L is the length of the shortest path.
@@ -54,8 +54,8 @@ Short waves are almost independent at neighbouring cells, which gives the most d
 MOST_LEGS = 60
 """Number of legs above which no courses are searched for; hardly any combination is simple then."""
 
-TRUE_ENERGY = 1.5
-"""Growth of the elastic energy when nodes are doubled from which it counts as false.
+UNDER_RESOLVED = 1.5
+"""Growth of the elastic energy when nodes are doubled from which a course is under-resolved.
 
 Straight lines between nodes that are far apart pass through thin limbs, so courses around limbs
 seem to bend less than they do.
@@ -131,17 +131,17 @@ def find_courses(
     nodes, point = found
     # Indices of control points do not count via points.
     number = np.append(np.where(fixed, np.cumsum(fixed) - 1, -1), -1)
-    nodes, visit, _ = uncrossed(surface, nodes, number[point], any_order)
+    nodes, visit, _ = remove_crossings(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
-        nodes, visit, doublings = _with_true_energies(surface, nodes, visit, smoothness)
-    nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
+        nodes, visit, doublings = _resolved(surface, nodes, visit, smoothness)
+    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
     combined = recombined(surface, nodes, visit, simple, smoothness, RECOMBINED)
     if combined is not None:
-        new, new_visit, _ = uncrossed(surface, *combined, any_order)
+        new, new_visit, _ = remove_crossings(surface, *combined, any_order)
         with subrange(0.6, 0.7):
             new, new_visit = _relaxed(surface, new, new_visit, smoothness, OF_RECOMBINED)
-        new, new_visit, new_simple = uncrossed(surface, new, new_visit, any_order)
+        new, new_visit, new_simple = remove_crossings(surface, new, new_visit, any_order)
         places = joined([nodes.places, new.places])
         nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
@@ -150,7 +150,7 @@ def find_courses(
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
-    nodes, visit, simple = uncrossed(surface, nodes, visit, any_order)
+    nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
     for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
         own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
         for _ in range(2):
@@ -200,7 +200,7 @@ def _relaxed(
     return nodes, visit
 
 
-def _with_true_energies(
+def _resolved(
     surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float
 ) -> tuple[Nodes, IntArray, int]:
     """Relaxed courses with as many nodes as their energies need, and how often these were doubled.
@@ -213,7 +213,7 @@ def _with_true_energies(
         best = np.argsort(_energies(surface, nodes, smoothness), kind="stable")[:FINALISTS]
         before, after = (_energies(unpainted, each, smoothness) for each in (nodes, doubled))
         growth = after[best] / np.maximum(before[best], tolerances.TINY)
-        if np.median(growth) < TRUE_ENERGY:
+        if np.median(growth) < UNDER_RESOLVED:
             return nodes, visit, doublings
         nodes, visit = _relaxed(surface, doubled, visit_doubled, smoothness, OF_DOUBLED)
     return nodes, visit, MOST_DOUBLINGS

@@ -20,7 +20,7 @@ from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
 from ..request import Request
 from .course_search import find_courses
-from .hop_graph import CELLS, HopGraph, build_hop_graph, distances_along_edges
+from .hop_graph import SEARCH_CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
 """Value of `edges_crossed` above which no courses are searched for.
@@ -68,7 +68,7 @@ def edges_crossed(mesh: Mesh, component: int) -> float:
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     area = float(mesh.face_areas[inside].sum())
     # Every edge is a side of two faces.
-    return float(sides.sum()) / np.pi * np.sqrt(area / CELLS) / area
+    return float(sides.sum()) / np.pi * np.sqrt(area / SEARCH_CELLS) / area
 
 
 class CourseSurface:

@@ -32,7 +32,7 @@ from ..geometry.vectors import dot
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
 
-CELLS = 700
+SEARCH_CELLS = 700
 """Number of cells per component. More cells would refine a course, which relaxation does better."""
 
 NORMAL_WEIGHT = 1.2
@@ -126,14 +126,14 @@ def build_hop_graph(surface: CurveSurface) -> HopGraph:
     areas = np.zeros(len(mesh.vertices))
     np.add.at(areas, mesh.faces, mesh.face_areas[:, None] / 3.0)
     vertex = np.flatnonzero(areas > 0.0)
-    spacing = float(np.sqrt(areas.sum() / min(CELLS, len(vertex))))
-    if len(vertex) > CELLS:
+    spacing = float(np.sqrt(areas.sum() / min(SEARCH_CELLS, len(vertex))))
+    if len(vertex) > SEARCH_CELLS:
         # The numbering depends only on the surface (`geometry.numbering`), so the sample does too.
         chance = 1.0 - np.random.default_rng(0).random(len(mesh.vertices))
         normals = surface.vertex_normals
         distance = PACKING * spacing
         vertex = spread_vertices(
-            mesh, normals, areas, chance, CANDIDATES * CELLS, distance, NORMAL_WEIGHT
+            mesh, normals, areas, chance, CANDIDATES * SEARCH_CELLS, distance, NORMAL_WEIGHT
         )
     checkpoint()
     start, end, along = nicmm_kernels.nearest_cells(

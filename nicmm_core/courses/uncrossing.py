@@ -24,7 +24,7 @@ MOST_CROSSINGS = 200
 """Number of crossings of a curve above which the curve is left unchanged."""
 
 
-def uncrossed(
+def remove_crossings(
     surface: CurveSurface, nodes: Nodes, visit: IntArray, any_order: bool
 ) -> tuple[Nodes, IntArray, BoolArray]:
     """Remove crossings of curves by joining their nodes in another order.

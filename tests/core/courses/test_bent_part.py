@@ -132,7 +132,7 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
     controls = curve.nodes.places[curve.control_nodes]
     design = nicmm.design_curve(surface.mesh, controls, closed=closed)
     request = design.resumable.request
-    start = start_search.Start(curve, np.arange(4), surface, 1.0)
+    start = start_search.InitialCurve(curve, np.arange(4), surface, 1.0)
     part = bent_part(curve, [])
     changed = next(search.with_other_part(request, start, curve, part))
     assert scaled_bending(changed.curve) < 0.5 * scaled_bending(curve)

@@ -123,11 +123,11 @@ def test_nodes_are_doubled_until_energies_are_true(windings, doubled):
         before, after = (course_search._energies(surface, each, 1.0) for each in (nodes, twice))
         return after[0] / before[0]
 
-    assert (growth(nodes, visit) > course_search.TRUE_ENERGY) == doubled
-    found, visit, doublings = course_search._with_true_energies(surface, nodes, visit, 1.0)
+    assert (growth(nodes, visit) > course_search.UNDER_RESOLVED) == doubled
+    found, visit, doublings = course_search._resolved(surface, nodes, visit, 1.0)
     assert (doublings > 0) == doubled
     assert found.per_curve == count * 2**doublings
-    assert growth(found, visit) < course_search.TRUE_ENERGY
+    assert growth(found, visit) < course_search.UNDER_RESOLVED
 
 
 @pytest.mark.slow

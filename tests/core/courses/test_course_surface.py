@@ -6,7 +6,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.courses.course_surface import MOST_CROSSED, CourseSurface, edges_crossed
-from nicmm_core.courses.hop_graph import CELLS
+from nicmm_core.courses.hop_graph import SEARCH_CELLS
 from nicmm_core.design import Designer
 from tests.core.checks import assert_valid_design
 
@@ -17,7 +17,7 @@ def test_edges_crossed_are_counted_by_random_lines():
     n = 40
     disc = shapes.disc(n)
     generator = np.random.default_rng(1)
-    length = np.sqrt(disc.face_areas.sum() / CELLS)
+    length = np.sqrt(disc.face_areas.sum() / SEARCH_CELLS)
     angle = generator.uniform(0.0, 2.0 * np.pi, 500)
     start = generator.uniform(-0.6, 0.6, (500, 2))
     end = start + length * np.column_stack([np.cos(angle), np.sin(angle)])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nicmm_core import shapes
-from nicmm_core.courses.uncrossing import reordered, uncrossed
+from nicmm_core.courses.uncrossing import remove_crossings, reordered
 from nicmm_core.relaxation.curve_nodes import curve_surface, nodes_at
 from nicmm_core.relaxation.node_traces import crossing_steps
 from tests.core.checks import points_near, simple_curves
@@ -54,15 +54,15 @@ def test_a_figure_of_eight_becomes_a_loop(surface):
     assert not simple_curves(surface, nodes)[0]
     # With one control point in each half, the order does not change.
     visit = with_controls(40, [0, 25])
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=False)
     assert simple_curves(surface, found)[0] and simple[0]
     assert passed[passed >= 0].tolist() == [0, 1]
     # With two in each half, no loop can be passed in the other direction.
     visit = with_controls(40, [0, 8, 25, 33])
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=False)
     np.testing.assert_array_equal(passed, visit)
     assert not simple_curves(surface, found)[0] and not simple[0]
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=True)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=True)
     assert simple_curves(surface, found)[0] and simple[0]
     assert passed[passed >= 0].tolist() != [0, 1, 2, 3]
 
@@ -83,12 +83,12 @@ def test_strands_that_cross_twice_exchange_their_parts(surface, opposite):
     n = len(curve)
     assert len(crossing_steps(surface, nodes)) == 2
     visit = with_controls(n, [0, 1, 28, 29, n - 2, n - 1])
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=False)
     assert simple_curves(surface, found)[0] and simple[0]
     assert passed[passed >= 0].tolist() == list(range(6))
     # A control point on each part between the crossings prevents the exchange.
     visit = with_controls(n, [0, 1, 14, 28, 29, n - 15, n - 2, n - 1])
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=False)
     np.testing.assert_array_equal(passed, visit)
 
 
@@ -134,7 +134,7 @@ def test_curves_of_a_stack_are_independent(surface):
     )
     nodes = nodes_at(surface, points, True, 3)
     visit = np.tile(with_controls(40, [0, 25]), 3)
-    found, passed, simple = uncrossed(surface, nodes, visit, any_order=False)
+    found, passed, simple = remove_crossings(surface, nodes, visit, any_order=False)
     assert simple_curves(surface, nodes).tolist() == [True, False, True]
     assert simple_curves(surface, found).all() and simple.all()
     for part in (slice(0, 40), slice(80, 120)):
