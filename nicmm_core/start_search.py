@@ -18,7 +18,7 @@ from .courses.course_surface import CourseSurface
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .maps.guidance import component_unit
+from .maps.guidance import surface_unit
 from .path.initial_path import find_initial_path, path_curve
 from .progress import checkpoint
 from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
@@ -124,7 +124,7 @@ class StartSearch:
     @cached_property
     def unit(self) -> float:
         """Square root of the area of the mesh."""
-        return component_unit(self.mesh, 0)
+        return surface_unit(self.mesh)
 
     def _joined_courses(self, request: Request, seed: int) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""

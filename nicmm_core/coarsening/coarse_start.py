@@ -85,7 +85,7 @@ class CoarseStarts:
         """Whether the mesh needs a coarse mesh."""
         count = np.count_nonzero(self._mesh.referenced)
         # A mesh of medium size needs a coarse mesh if it has needles.
-        needles = SMALL < count <= LARGE and edges_crossed(self._mesh, 0) > 7.0
+        needles = SMALL < count <= LARGE and edges_crossed(self._mesh) > 7.0
         return count > LARGE or needles
 
     @cached_property

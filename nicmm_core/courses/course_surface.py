@@ -14,7 +14,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.normals import unsigned_normals
 from ..geometry.refinement import Refined, refined
 from ..geometry.surface_points import SurfacePoints, in_first_faces, joined
-from ..maps.guidance import component_unit
+from ..maps.guidance import surface_unit
 from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
@@ -57,16 +57,15 @@ class Course:
     visited: IntArray
 
 
-def edges_crossed(mesh: Mesh, component: int) -> float:
+def edges_crossed(mesh: Mesh) -> float:
     """Mean number of edges that a straight line crosses over the width of a hop-graph cell.
 
     By Crofton's formula it is 2 / π times the length of the line times the total edge length per
     area: about 5 on a mesh of 4,000 vertices whose faces are nearly equilateral.
     """
-    inside = mesh.face_component == component
-    corners = mesh.vertices[mesh.faces[inside]]
+    corners = mesh.vertices[mesh.faces]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    area = float(mesh.face_areas[inside].sum())
+    area = float(mesh.face_areas.sum())
     # Every edge is a side of two faces.
     return float(sides.sum()) / np.pi * np.sqrt(area / SEARCH_CELLS) / area
 
@@ -138,7 +137,7 @@ class CourseSurface:
         else:
             fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
             along = along[visited][:, np.append(np.arange(size), size + visited)]
-        if edges_crossed(self._refined.mesh, 0) > MOST_CROSSED:
+        if edges_crossed(self._refined.mesh) > MOST_CROSSED:
             return
         found = find_courses(
             self._graph,
@@ -167,8 +166,7 @@ class CourseSurface:
             return None if values is None else self._refined.interpolation @ values
 
         obstacles, alignment = at_vertices(request.obstacles), at_vertices(request.alignment)
-        unit = component_unit(self._refined.mesh, 0)
-        return with_maps(self._surface, obstacles, alignment, unit)
+        return with_maps(self._surface, obstacles, alignment, surface_unit(self._refined.mesh))
 
 
 def _with_rounded_points(mesh: Mesh, request: Request) -> Request:

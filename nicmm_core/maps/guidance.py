@@ -69,9 +69,10 @@ LEVELS = 5
 """Number of levels to which weights are rounded up; each level has one width."""
 
 
-def component_unit(mesh: Mesh, component: int) -> float:
-    """Square root of the area of a component: the unit of widths."""
-    return float(np.sqrt(mesh.face_areas[mesh.face_component == component].sum()))
+def surface_unit(mesh: Mesh, component: int | None = None) -> float:
+    """Square root of the area of a mesh, or of one of its components: the unit of widths."""
+    faces = slice(None) if component is None else mesh.face_component == component
+    return float(np.sqrt(mesh.face_areas[faces].sum()))
 
 
 def feature_map(
@@ -85,7 +86,7 @@ def feature_map(
     obstacles, alignment : (V,) float array of weights in [0, 1], or None
         Weights of the vertices. A weight scales both the height and the width of its Gaussian.
     unit : float
-        Unit of the widths, in mesh units; see `component_unit`.
+        Unit of the widths, in mesh units; see `surface_unit`.
     """
     squared = np.full(len(mesh.vertices), BASELINE**2)
     if obstacles is not None:

@@ -15,7 +15,7 @@ from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import vertex_normals
 from ..geometry.surface_points import SurfacePoints
-from ..maps.guidance import component_unit, feature_map
+from ..maps.guidance import feature_map, surface_unit
 from ..path.initial_path import find_initial_path
 from ..path.via_points import ViaPoints
 from ..path.virtual_splits import WorkingMesh
@@ -140,7 +140,7 @@ def build_problem(
     component = int(mesh.face_component[points.faces[0]])
     phi_fea = None
     if obstacles is not None or alignment is not None:
-        phi_fea = feature_map(mesh, obstacles, alignment, component_unit(mesh, component))
+        phi_fea = feature_map(mesh, obstacles, alignment, surface_unit(mesh, component))
     with subrange(0.0, PATH_SHARE):
         path = find_initial_path(mesh, points, order, phi_fea, closed, via_points)
         working, loop = build_initial_loop(component, path)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
+from nicmm_core import repaired_surface, shapes
 from nicmm_core.geometry.curve import point_on_segment
 from nicmm_core.splines.even_spacing import even_curve
 from tests.core.checks import apart
@@ -121,3 +121,19 @@ def test_a_cube_of_twelve_faces_has_one_energy():
         for one in (same_surface.changed(cube, name, 1) for name in same_surface.SAME_CURVE)
     ]
     np.testing.assert_allclose(energies, energies[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_loose_vertices_of_a_mesh_that_is_not_copied(monkeypatch, closed):
+    """A mesh as if it were too large for a copy, so that loose vertices stay, with maps."""
+    monkeypatch.setattr(repaired_surface, "LARGEST_COPY", 0)
+    body = shapes.creature(0, faces=500, subdivisions=2)
+    loose = nicmm.Mesh(np.concatenate([np.zeros((3, 3)), body.vertices]), body.faces + 3)
+    points = np.array([12, 800, 1641, 2500]) + 3
+    weights = np.zeros(len(loose.vertices))
+    weights[np.linalg.norm(loose.vertices - loose.vertices[900], axis=1) < 0.1] = 1.0
+    for obstacles in (None, weights):
+        design = nicmm.design_curve(
+            loose, points, closed=closed, order="shortest", obstacles=obstacles
+        )
+        assert not judge(loose, design, points, closed, "shortest").faults

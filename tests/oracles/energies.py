@@ -17,7 +17,7 @@ import nicmm_core as nicmm
 from nicmm_core import shapes
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
-from nicmm_core.maps.guidance import component_unit
+from nicmm_core.maps.guidance import surface_unit
 from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface, with_maps
 
@@ -70,7 +70,7 @@ class NamedRequest:
         assert design.resumable is not None
         mesh, request = design.resumable.mesh, design.resumable.request
         surface = with_maps(
-            curve_surface(mesh), request.obstacles, request.alignment, component_unit(mesh, 0)
+            curve_surface(mesh), request.obstacles, request.alignment, surface_unit(mesh, 0)
         )
         return energies_of(surface, [design.resumable.curve], request.smoothness)[0]
 

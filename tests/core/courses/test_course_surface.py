@@ -28,7 +28,7 @@ def test_edges_crossed_are_counted_by_random_lines():
 
     p, q = start[:, None], end[:, None]
     crossed = (side(p, q, a) * side(p, q, b) < 0.0) & (side(a, b, p) * side(a, b, q) < 0.0)
-    assert edges_crossed(disc, 0) == pytest.approx(crossed.sum(axis=1).mean(), rel=0.05)
+    assert edges_crossed(disc) == pytest.approx(crossed.sum(axis=1).mean(), rel=0.05)
 
 
 @pytest.mark.slow
@@ -44,7 +44,7 @@ def test_no_courses_are_sought_on_needles():
         np.column_stack([ring, onward + count, ring + count]),
     ]
     tube = nicmm.Mesh(np.concatenate([low, low + [0.0, 0.0, 40.0]]), np.concatenate(sides))
-    assert edges_crossed(tube, 0) > MOST_CROSSED
+    assert edges_crossed(tube) > MOST_CROSSED
     designer = Designer(tube)
     points = [0, count + count // 3, 2 * count // 3]
     assert_valid_design(tube, designer.design(points, order="shortest"))
