@@ -17,6 +17,7 @@ from ..geometry.curve import SurfaceCurve, curve_on_mesh, weights_in_faces
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points, snapped
 from ..progress import checkpoint
+from .backtracking import without_backtracking
 from .removed_faces import RemovedFaces
 from .strand_separation import separated
 
@@ -185,6 +186,9 @@ class MappedMesh:
         else:
             for place, point in exact.items():
                 polyline = joined([polyline[:place], point, polyline[place + 1 :]])
+        passed = index[index >= 0]
+        polyline, number = without_backtracking(self.original, polyline, passed, curve.closed)
+        index = np.where(index >= 0, number[index], -1)
         return curve_on_mesh(
             self.original, curve.closed, polyline.faces, polyline.barycentric, index
         )
