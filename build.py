@@ -80,11 +80,13 @@ def say(text: str) -> None:
     print(f"-- {text}", flush=True)
 
 
-def run(arguments: Sequence[str | Path], environment: dict[str, str] | None = None) -> int:
-    """Run a command in the repository's root, show its output and return its exit status."""
+def run(
+    arguments: Sequence[str | Path], environment: dict[str, str] | None = None, folder: Path = ROOT
+) -> int:
+    """Run a command in a folder, show its output and return its exit status."""
     return subprocess.run(
         [str(argument) for argument in arguments],
-        cwd=ROOT,
+        cwd=folder,
         env={**os.environ, **(environment or {})},
         check=False,
     ).returncode
@@ -317,20 +319,29 @@ def command_test(arguments: argparse.Namespace) -> int:
         return test_sanitized(arguments.pytest_arguments)
     if arguments.platforms:
         return run([VENV_PYTHON, "-m", "tests.kernels.platforms.compare"], ONE_THREAD)
-    checks = {
-        "ruff check": ["ruff", "check"],
-        "ruff format": ["ruff", "format", "--check"],
-        "mypy": ["mypy"],
-        "pytest": [
-            *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
-            *(("-m", "not slow") if arguments.quick else ()),
-            *arguments.pytest_arguments,
-        ],
-    }
+    extension = DIST / "checked" / manifest()["id"]  # in the zip's layout, its imports are valid
+    shutil.rmtree(extension, ignore_errors=True)
+    stage(extension)
+    typed = ("mypy", "--config-file", ROOT / "pyproject.toml", "--cache-dir", ROOT / ".mypy_cache")
+    checks: tuple[tuple[str, Path, Sequence[str | Path]], ...] = (
+        ("ruff check", ROOT, ("ruff", "check")),
+        ("ruff format", ROOT, ("ruff", "format", "--check")),
+        ("mypy", ROOT, ("mypy",)),
+        ("mypy of the extension", extension, (*typed, "__init__.py", "nicmm_blender")),
+        (
+            "pytest",
+            ROOT,
+            (
+                *("pytest", "--durations=10", "--numprocesses=auto", "--dist=worksteal"),
+                *(("-m", "not slow") if arguments.quick else ()),
+                *arguments.pytest_arguments,
+            ),
+        ),
+    )
     failed = []
-    for name, command in checks.items():
+    for name, folder, command in checks:
         say(name)
-        if run([VENV_PYTHON, "-m", *command], ONE_THREAD) != 0:
+        if run([VENV_PYTHON, "-m", *command], ONE_THREAD, folder) != 0:
             failed.append(name)
     if failed:
         say(f"Failed: {', '.join(failed)}")

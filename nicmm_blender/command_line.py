@@ -119,7 +119,7 @@ def parser() -> argparse.ArgumentParser:
     return command_parser
 
 
-def _option(described) -> dict:
+def _option(described: bpy.types.Property) -> dict:
     """The argparse keywords for a Blender property."""
     # argparse expands % in help texts.
     words = {"help": described.description.replace("%", "%%"), "default": None}

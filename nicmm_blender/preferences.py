@@ -4,12 +4,15 @@
 import functools
 import importlib.metadata
 import importlib.util
+from typing import TypeVar
 
 import bpy
 from bpy.props import FloatProperty, IntProperty
 
 PACKAGE = __package__.rpartition(".")[0]
 """Module name under which Blender knows the extension."""
+
+Number = TypeVar("Number", int, float)
 
 PATIENCE = 0.4
 KEPT_MESHES = 2
@@ -22,7 +25,10 @@ class _Limits:
     kept_meshes = KEPT_MESHES
 
 
-def _note_limits(_preferences=None, _context=None) -> None:
+def _note_limits(
+    _preferences: bpy.types.AddonPreferences | None = None,
+    _context: bpy.types.Context | None = None,
+) -> None:
     _Limits.kept_meshes = _get("kept_meshes", KEPT_MESHES)
 
 
@@ -56,7 +62,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
         subtype="TIME_ABSOLUTE",
     )
 
-    def draw(self, _context):
+    def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -96,7 +102,7 @@ def _version(module: str, distribution: str) -> str:
         return "of unknown version"
 
 
-def _get(name: str, default):
+def _get(name: str, default: Number) -> Number:
     """The value of a preference, or its default if the extension is not registered as an add-on."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     found = None if addon is None else addon.preferences

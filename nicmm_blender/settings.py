@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Defines and draws the settings of a curve for operators and sidebar: core options and outputs."""
 
+from collections.abc import Iterable
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -11,7 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..nicmm_core.options import OPTIONS, Kind
+from ..nicmm_core.options import OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
 from .scene import curve_record
 
@@ -32,7 +34,7 @@ CURVE = StringProperty(
 """The property of operators that names a designed curve."""
 
 
-def properties_of(options) -> dict:
+def properties_of(options: Iterable[Option]) -> dict:
     """Blender properties for core options, by property name; options for points are left out."""
     return {
         curve_record.property_name(option): _property(option)
@@ -41,7 +43,7 @@ def properties_of(options) -> dict:
     }
 
 
-def _property(option):
+def _property(option: Option) -> bpy.props._PropertyDeferred:
     """The Blender property for a core option."""
     words = {"name": option.label, "description": option.description}
     if option.kind is Kind.SWITCH:
@@ -54,7 +56,9 @@ def _property(option):
         if option.name == "order":
             items.insert(0, AUTOMATIC)
             return EnumProperty(**words, items=items, default="AUTO")
-        return EnumProperty(**words, items=items, default=curve_record.identifier(option.default))
+        return EnumProperty(
+            **words, items=items, default=curve_record.identifier(str(option.default))
+        )
     if option.kind is Kind.WEIGHTS:
         words["description"] += ". Choose a vertex group, or leave empty for none"
         return StringProperty(**words)
@@ -98,7 +102,7 @@ class EditingProperties:
     )
 
 
-def _tube_property(default: bool):
+def _tube_property(default: bool) -> bpy.props._PropertyDeferred:
     return BoolProperty(
         name="Tube",
         description="Show the sticky curve as a tube mesh. Before Blender 5.0 the viewport "
@@ -251,13 +255,18 @@ class OutputProperties:
     )
 
 
+def output_property(name: str) -> bpy.props._PropertyDeferred:
+    """The property of an output setting."""
+    return OutputProperties.__annotations__[name]
+
+
 APPEARANCE = ("spline", "radius", "offset", "thickness")
 """Output settings of curve objects; a conversion takes them from the converted curve."""
 
 PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotations__)
 
 
-def with_options(given, options: set):
+def with_options(given: bpy.props._PropertyDeferred, options: set) -> bpy.props._PropertyDeferred:
     """A copy of a property of Blender with other options."""
     return given.function(**{**given.keywords, "options": options})
 
@@ -275,14 +284,14 @@ class NICMM_PG_settings(bpy.types.PropertyGroup):
     }
 
 
-def take_from_sidebar(operator, properties) -> None:
+def take_from_sidebar(operator: bpy.types.Operator, properties: bpy.types.PropertyGroup) -> None:
     """Give an operator the settings of the sidebar, except those that its caller has set."""
     for name in PROPERTY_NAMES:
         if not operator.properties.is_property_set(name):
             setattr(operator, name, getattr(properties, name))
 
 
-def choose_tube(operator) -> None:
+def choose_tube(operator: bpy.types.Operator) -> None:
     """Enable *Tube* in Blender versions that draw strands coarsely; for calls from the window.
 
     A value that the caller has set, or that the user chose last time, is kept.
@@ -291,7 +300,11 @@ def choose_tube(operator) -> None:
         operator.tube = not sticky_curves.are_drawn_with_all_points()
 
 
-def draw(layout, properties, mesh_object) -> None:
+def draw(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    mesh_object: bpy.types.Object | None,
+) -> None:
     """Draw all settings in the redo panel; `mesh_object` may be None."""
     draw_design(layout, properties)
     for name in ("obstacle_group", "alignment_group"):
@@ -303,7 +316,9 @@ def draw(layout, properties, mesh_object) -> None:
     draw_output(layout, properties)
 
 
-def draw_design(layout, properties) -> None:
+def draw_design(
+    layout: bpy.types.UILayout, properties: bpy.types.Operator | bpy.types.PropertyGroup
+) -> None:
     """Draw the settings of the curve itself, without its maps."""
     layout.use_property_split = True
     layout.use_property_decorate = False
@@ -315,14 +330,20 @@ def draw_design(layout, properties) -> None:
     layout.prop(properties, "use_modifiers")
 
 
-def draw_clearance(layout, properties) -> None:
+def draw_clearance(
+    layout: bpy.types.UILayout, properties: bpy.types.Operator | bpy.types.PropertyGroup
+) -> None:
     """Draw the clearance, greyed out if there are no obstacles."""
     row = layout.row()
     row.active = bool(properties.obstacle_group)
     row.prop(properties, "clearance")
 
 
-def draw_output(layout, properties, appearance: bool = True) -> None:
+def draw_output(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.Operator | bpy.types.PropertyGroup,
+    appearance: bool = True,
+) -> None:
     """Draw the output and its settings; `appearance` tells whether to draw APPEARANCE too."""
     layout.use_property_split = True
     layout.use_property_decorate = False

@@ -18,7 +18,16 @@ UPDATE_ICON = "FILE_REFRESH"
 class NICMM_UL_curves(bpy.types.UIList):
     """List of the curves designed on the mesh, filtered from all objects of the file"""
 
-    def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_name):
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: bpy.types.BlendData,
+        item: bpy.types.Object,
+        _icon: int,
+        _active_data: bpy.types.WindowManager,
+        _active_name: str,
+    ) -> None:
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False, icon=ICONS.get(item.type, "OBJECT_DATA"))
         buttons = row.row(align=True)
@@ -36,7 +45,9 @@ class NICMM_UL_curves(bpy.types.UIList):
         update.curve = item.name
         row.prop(item, "hide_viewport", text="", emboss=False)
 
-    def filter_items(self, context, data, name):
+    def filter_items(
+        self, context: bpy.types.Context, data: bpy.types.BlendData, name: str
+    ) -> tuple[list[int], list[int]]:
         shown = set(curve_record.designed_on(curve_record.mesh_of_context(context)))
         objects = getattr(data, name)
         wanted = self.filter_name.casefold()
@@ -50,7 +61,7 @@ class NICMM_UL_curves(bpy.types.UIList):
         return flags, []
 
 
-def _active_index(_window_manager) -> int:
+def _active_index(_window_manager: bpy.types.WindowManager) -> int:
     """The index of the active curve among all objects, so that the list follows the viewport."""
     active = edited_curve.active(bpy.context)
     if active is None:
@@ -58,7 +69,7 @@ def _active_index(_window_manager) -> int:
     return next(index for index, each in enumerate(bpy.data.objects) if each == active)
 
 
-def _activate(_window_manager, index: int) -> None:
+def _activate(_window_manager: bpy.types.WindowManager, index: int) -> None:
     """Make a curve active in a mode of the tool; in Edit Mode control points are vertices."""
     context = bpy.context
     if context.mode in modes.TOOLS and index < len(bpy.data.objects):
@@ -68,7 +79,7 @@ def _activate(_window_manager, index: int) -> None:
             bpy.ops.ed.undo_push(message="Select Curve")  # as a click in the viewport does
 
 
-def draw(layout, context) -> None:
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the list and its buttons."""
     layout.template_list(
         NICMM_UL_curves.__name__, "", bpy.data, "objects", context.window_manager,

@@ -6,7 +6,13 @@ import bpy
 from ..operators import maps
 
 
-def draw_row(layout, properties, role: str, context, mesh_object) -> None:
+def draw_row(
+    layout: bpy.types.UILayout,
+    properties: bpy.types.PropertyGroup,
+    role: str,
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+) -> None:
     """Draw the vertex group field of a map, with buttons that create and paint the group."""
     field = maps.FIELDS[role]
     row = layout.row(align=True)
@@ -21,7 +27,7 @@ def draw_row(layout, properties, role: str, context, mesh_object) -> None:
     row.menu(MENUS[role].__name__, text="", icon="ADD")
 
 
-def _draw_menu(menu, role: str) -> None:
+def _draw_menu(menu: bpy.types.Menu, role: str) -> None:
     for identifier, name, _description, icon, _number in maps.SOURCES:
         entry = menu.layout.operator(maps.NICMM_OT_new_map.bl_idname, text=name, icon=icon)
         entry.role, entry.source = role, identifier
@@ -30,14 +36,14 @@ def _draw_menu(menu, role: str) -> None:
 class NICMM_MT_new_obstacles(bpy.types.Menu):
     bl_label = "New Obstacles"
 
-    def draw(self, _context):
+    def draw(self, _context: bpy.types.Context) -> None:
         _draw_menu(self, "OBSTACLES")
 
 
 class NICMM_MT_new_alignment(bpy.types.Menu):
     bl_label = "New Alignment"
 
-    def draw(self, _context):
+    def draw(self, _context: bpy.types.Context) -> None:
         _draw_menu(self, "ALIGNMENT")
 
 

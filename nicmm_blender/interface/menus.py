@@ -12,13 +12,13 @@ from ..tool.edit_operator import NICMM_OT_edit_curve
 from . import icons
 
 
-def draw_in_menu(menu, context) -> None:
+def draw_in_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     _begin(menu)
     menu.layout.operator(NICMM_OT_design_curve.bl_idname, icon=icons.DESIGN)
     draw_edit(menu.layout, context)
 
 
-def draw_edit(layout, context) -> None:
+def draw_edit(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the menu entry of the tool, labelled by what it does with the active object.
 
     In Edit Mode the entry is left out, because the tool does not work there.
@@ -30,19 +30,19 @@ def draw_edit(layout, context) -> None:
     layout.operator(NICMM_OT_edit_curve.bl_idname, text=text, icon=icons.EDIT)
 
 
-def draw_next_course(layout, context) -> None:
+def draw_next_course(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the entry for another course of the active curve, in the modes in which it works."""
     if context.mode in modes.TOOLS:
         layout.operator(NICMM_OT_next_course.bl_idname, icon=icons.NEXT_COURSE)
 
 
-def draw_in_context_menu(menu, context) -> None:
+def draw_in_context_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     """Draw the entries in vertex select mode only; all select modes share one context menu."""
     if context.tool_settings.mesh_select_mode[0]:
         draw_in_menu(menu, context)
 
 
-def draw_conversions(menu, context) -> None:
+def draw_conversions(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     """Draw a submenu with all outputs if a designed curve is active."""
     if not curve_record.has_record(context.active_object):
         return
@@ -55,7 +55,7 @@ def draw_conversions(menu, context) -> None:
     )
 
 
-def draw_for_curve(menu, context) -> None:
+def draw_for_curve(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     """Draw all entries for the active designed curve."""
     if not curve_record.has_record(context.active_object):
         return
@@ -64,7 +64,7 @@ def draw_for_curve(menu, context) -> None:
     draw_next_course(menu.layout, context)
 
 
-def _begin(menu) -> None:
+def _begin(menu: bpy.types.Menu) -> None:
     menu.layout.separator()
     # Some of Blender's menus set EXEC_REGION_WIN, which would skip `invoke`.
     menu.layout.operator_context = "INVOKE_REGION_WIN"

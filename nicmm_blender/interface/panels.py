@@ -26,7 +26,7 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
 
     bl_label = "NICMM Curves"
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         properties = context.scene.nicmm_curves
         layout = self.layout
         curve = edited_curve.active(context)
@@ -47,7 +47,9 @@ class NICMM_PT_design_curve(SidebarPanel, bpy.types.Panel):
         if context.mode == "EDIT_MESH":
             layout.label(text="The Surface Curve tool does not work in Edit Mode", icon="INFO")
 
-    def _draw_conversion(self, layout, properties) -> None:
+    def _draw_conversion(
+        self, layout: bpy.types.UILayout, properties: bpy.types.PropertyGroup
+    ) -> None:
         layout.separator()
         settings.draw_output(layout, properties, appearance=False)
         convert = layout.operator(NICMM_OT_convert_curve.bl_idname, icon=icons.CONVERT)
@@ -63,10 +65,10 @@ class NICMM_PT_maps(SidebarPanel, bpy.types.Panel):
     bl_parent_id = "NICMM_PT_design_curve"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return curve_record.mesh_of_context(context) is not None
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         properties = maps.settings_of(context)
         layout = self.layout
         layout.use_property_split = True
@@ -84,10 +86,10 @@ class NICMM_PT_curves(SidebarPanel, bpy.types.Panel):
     bl_parent_id = "NICMM_PT_design_curve"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return curve_record.mesh_of_context(context) is not None
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         curve_list.draw(self.layout, context)
         for message in live_update.messages(curve_record.mesh_of_context(context)):
             draw_message(self.layout, message)

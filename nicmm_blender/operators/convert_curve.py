@@ -11,8 +11,6 @@ from ..scene.messages import InputError
 from . import polls
 from .error_reports import with_error_reports
 
-_OUTPUT = settings.OutputProperties.__annotations__
-
 
 class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
     """Convert a designed curve to another object, or to edges, a region or parts of its mesh.
@@ -29,10 +27,10 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     # Not remembered for the next curve, which has an appearance of its own.
-    spline: settings.with_options(_OUTPUT["spline"], {"SKIP_SAVE"})
-    radius: settings.with_options(_OUTPUT["radius"], {"SKIP_SAVE"})
-    offset: settings.with_options(_OUTPUT["offset"], {"SKIP_SAVE"})
-    thickness: settings.with_options(_OUTPUT["thickness"], {"SKIP_SAVE"})
+    spline: settings.with_options(settings.output_property("spline"), {"SKIP_SAVE"})
+    radius: settings.with_options(settings.output_property("radius"), {"SKIP_SAVE"})
+    offset: settings.with_options(settings.output_property("offset"), {"SKIP_SAVE"})
+    thickness: settings.with_options(settings.output_property("thickness"), {"SKIP_SAVE"})
     keep_original: BoolProperty(
         name="Keep Original",
         description="Keep the original curve object",
@@ -40,25 +38,25 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         # Outputs that change the mesh make it active. The redo panel exists only if the operator
         # could run then, although Blender undoes it first.
         active = context.active_object
         can_run = curve_record.has_record(active) or mesh_data.mesh_object(context) is not None
         return polls.usable(cls, context, can_run, polls.NO_CURVE, polls.OBJECT)
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         settings.draw_output(self.layout, self)
         self.layout.prop(self, "keep_original")
 
-    def invoke(self, context, _event):
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         settings.choose_tube(self)
         return self.execute(context)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         original = context.active_object
         if not curve_record.has_record(original):
             raise InputError(polls.NO_CURVE)
@@ -85,12 +83,14 @@ class NICMM_OT_convert_curve(settings.OutputProperties, bpy.types.Operator):
         self.report({"INFO"}, f'"{name}": {summary}')
         return {"FINISHED"}
 
-    def _take_appearance(self, original, mesh_object) -> None:
+    def _take_appearance(self, original: bpy.types.Object, mesh_object: bpy.types.Object) -> None:
         """Take the settings of the appearance that are not given from the curve."""
         drawn = curve_record.drawn_as(original)
         radius = tube_radius.radius_of(original)
         radius *= curve_object.scale_in_scene(original, mesh_object)
-        found = {**({} if drawn is None else drawn), "radius": radius}
+        found: dict[str, str | float] = {"radius": radius}
+        if drawn is not None:
+            found |= {"spline": drawn["spline"], "offset": drawn["offset"]}
         if not radius:
             found["thickness"] = 0.0  # it would be used instead of a radius of zero
         is_set = self.properties.is_property_set

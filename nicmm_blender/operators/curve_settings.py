@@ -5,8 +5,10 @@ They are read from the record of the curve. A change designs the curve again; if
 the curve and its settings stay as they were, and the reason is shown below the settings.
 """
 
+from __future__ import annotations
+
 import functools
-from dataclasses import replace
+from collections.abc import Callable
 
 import bpy
 from bpy.props import PointerProperty
@@ -14,10 +16,14 @@ from bpy.props import PointerProperty
 from .. import settings
 from ..outputs import curve_object, edited_curve, tube_radius, writing
 from ..scene import curve_record, surface_cache
+from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError, check_finite
 from ..scene.surface import vertex_group
 from .long_solves import answer_now
 from .message_labels import draw_message
+
+Value = bool | float | str
+"""A setting of a curve."""
 
 COURSE = ("closed", "smoothness", "use_modifiers", "obstacle_group", "alignment_group", "clearance")
 DRAWING = ("spline", "offset")
@@ -38,13 +44,13 @@ Each is stored with the digest of the curve at that time, and is out of date if 
 """
 
 
-def problem_of(curve) -> str:
+def problem_of(curve: bpy.types.Object) -> str:
     """Why the last change of a curve's settings was impossible; empty if it was not."""
     digest, message = _problems.get(curve.session_uid, ("", ""))
     return message if curve_record.is_current(curve, digest) else ""
 
 
-def _read(group, name: str, default):
+def _read(group: bpy.types.PropertyGroup, name: str, default: Value) -> Value:
     """A setting of a curve, or the default if its record cannot be read."""
     curve = group.id_data
     if not curve_record.has_record(curve):
@@ -52,21 +58,23 @@ def _read(group, name: str, default):
     try:
         if name in DRAWING:
             drawn = curve_record.drawn_as(curve)
-            return default if drawn is None else drawn[name]
+            if drawn is None:
+                return default
+            return drawn["spline"] if name == "spline" else drawn["offset"]
         return getattr(curve_record.settings_of(curve), name)
     except InputError:
         return default
 
 
-def _write(group, name: str, value) -> None:
-    """Change a setting of a curve, or store the reason why that is impossible."""
+def _write(group: bpy.types.PropertyGroup, change: Callable[[bpy.types.Object], None]) -> None:
+    """Change a curve, or store the reason why that is impossible."""
     from ... import nicmm_core as nicmm
 
     curve = group.id_data
     if not curve_record.has_record(curve):
         return
     try:
-        _change(curve, name, value)
+        change(curve)
     except (InputError, nicmm.NicmmError, ImportError) as error:
         _problems[curve.session_uid] = curve_record.digest_of(curve), str(error)
     else:
@@ -99,13 +107,9 @@ def _cancel_undo() -> None:
         bpy.app.timers.unregister(_push_undo)
 
 
-def _change(curve, name: str, value) -> None:
+def _change(curve: bpy.types.Object, name: str, value: Value) -> None:
     context = bpy.context
     check_finite(name, value)
-    if name == "radius":
-        writing.check_replaceable(curve)
-        _set_radius(context, curve, value)
-        return
     curve_settings = curve_record.settings_of(curve)
     if name in DRAWING:
         opened = edited_curve.open_curve(context, curve)
@@ -126,23 +130,23 @@ def _change(curve, name: str, value) -> None:
             raise
         surface_cache.note_change()
         return
-    wanted = replace(curve_settings, **{name: value})
+    wanted = curve_settings.with_value(name, value)
     if value or name not in edited_curve.MAPS:
         _check_maps(curve_record.mesh_in_view_layer(context, curve), wanted)
     opened = edited_curve.open_curve(context, curve, wanted, keeps_course=True)
     requests = edited_curve.request(opened, opened.points)
     curves = edited_curve.curves_of(answer_now(context, requests))
-    edited_curve.write(context, opened, opened.points, curves, None)
+    edited_curve.rewrite(opened, opened.points, curves)
 
 
-def _check_maps(mesh_object, wanted) -> None:
+def _check_maps(mesh_object: bpy.types.Object, wanted: CurveSettings) -> None:
     """Raise an error if a map no longer exists; another setting would drop it otherwise."""
     for name in edited_curve.MAPS:
         if getattr(wanted, name):
             vertex_group(mesh_object, getattr(wanted, name))
 
 
-def _get_radius(group) -> float:
+def _get_radius(group: bpy.types.PropertyGroup) -> float:
     curve = group.id_data
     mesh_object = curve_record.mesh_of(curve) if curve_record.has_record(curve) else None
     if mesh_object is None:
@@ -150,14 +154,16 @@ def _get_radius(group) -> float:
     return tube_radius.radius_of(curve) * curve_object.scale_in_scene(curve, mesh_object)
 
 
-def _set_radius(context, curve, value: float) -> None:
-    mesh_object = curve_record.mesh_in_view_layer(context, curve)
+def _set_radius(curve: bpy.types.Object, value: float) -> None:
+    check_finite("radius", value)
+    writing.check_replaceable(curve)
+    mesh_object = curve_record.mesh_in_view_layer(bpy.context, curve)
     tube_radius.set_radius(curve, value / curve_object.scale_in_scene(curve, mesh_object))
     curve.data.update_tag()
     surface_cache.note_change()
 
 
-def _property(name: str, given):
+def _property(name: str, given: bpy.props._PropertyDeferred) -> bpy.props._PropertyDeferred:
     """A property that reads a setting from the record of its curve and writes it there."""
     words = {**given.keywords, "options": set()}  # not animatable: a change designs the curve
     default = words.get("default", "")
@@ -172,15 +178,17 @@ def _property(name: str, given):
     return given.function(**words, get=lambda group: get(group), set=put)
 
 
-def _setter(name: str):
-    return lambda group, value: _write(group, name, value)
+def _setter(name: str) -> Callable[[bpy.types.PropertyGroup, Value], None]:
+    return lambda group, value: _write(group, lambda curve: _change(curve, name, value))
 
 
-def _radius_property():
+def _radius_property() -> bpy.props._PropertyDeferred:
     words = dict(settings.OutputProperties.__annotations__["radius"].keywords)
     words |= {"description": "Radius of the curve. Set to zero for a line", "options": set()}
     return bpy.props.FloatProperty(
-        **words, get=_get_radius, set=lambda group, value: _write(group, "radius", value)
+        **words,
+        get=_get_radius,
+        set=lambda group, value: _write(group, lambda curve: _set_radius(curve, value)),
     )
 
 
@@ -196,7 +204,7 @@ class NICMM_PG_curve_settings(bpy.types.PropertyGroup):
     }
 
 
-def draw_in_header(layout, curve) -> None:
+def draw_in_header(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings that users change most often while drawing."""
     values = curve.nicmm_settings
     mesh_object = curve_record.mesh_of(curve)
@@ -209,7 +217,7 @@ def draw_in_header(layout, curve) -> None:
         layout.label(text="See Sidebar", icon="ERROR")  # the header is too narrow for the reason
 
 
-def draw(layout, curve) -> None:
+def draw(layout: bpy.types.UILayout, curve: bpy.types.Object) -> None:
     """Draw the settings of a curve, without its maps."""
     values = curve.nicmm_settings
     layout.use_property_split = True

@@ -2,17 +2,23 @@
 """The operator that designs a curve through the selected vertices."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 from bpy.props import StringProperty
 
 from .. import settings
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data, selection
+from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError, counted
-from ..scene.surface import active_modifiers_text, read
+from ..scene.surface import Surface, active_modifiers_text, read
 from . import polls
 from .long_solves import LongSolves
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Design, SurfacePoints
 
 # For reports, by the core's name of the order and whether the points are the selected vertices.
 ORDER_NAMES = {
@@ -46,18 +52,18 @@ class NICMM_OT_design_curve(
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         has_mesh = mesh_data.mesh_object(context) is not None
         return polls.usable(cls, context, has_mesh, polls.NO_MESH, polls.OBJECT_OR_EDIT)
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         settings.draw(self.layout, self, mesh_data.mesh_object(context))
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         settings.take_from_sidebar(self, context.scene.nicmm_curves)
         return super().invoke(context, event)
 
-    def requests(self, context) -> list:
+    def requests(self, context: bpy.types.Context) -> list:
         mesh_object = mesh_data.mesh_object(context)
         mesh_data.synchronise(mesh_object)
         surface = read(mesh_object, self.use_modifiers)
@@ -72,7 +78,9 @@ class NICMM_OT_design_curve(
             )
         return [replace(request, options={**request.options, "alternatives": alternatives})]
 
-    def _control_points(self, mesh_object, surface):
+    def _control_points(
+        self, mesh_object: bpy.types.Object, surface: Surface
+    ) -> "tuple[np.ndarray | SurfacePoints, str]":
         if self.points and self.point_group:
             raise InputError(
                 "points and point_group both define the control points. Give only one of them"
@@ -85,7 +93,7 @@ class NICMM_OT_design_curve(
             vertices, order = selection.selected_points(mesh_object, self.order)
         return selection.points_at(surface, vertices), order
 
-    def finish(self, context, requests: list, answers: list) -> set:
+    def finish(self, context: bpy.types.Context, requests: list, answers: list) -> set:
         from ... import nicmm_core as nicmm
 
         (request,), (design,) = requests, answers
@@ -116,12 +124,14 @@ class NICMM_OT_design_curve(
         return {"FINISHED"}
 
 
-def _alternatives(operator) -> int:
+def _alternatives(operator: NICMM_OT_design_curve) -> int:
     """Number of alternatives; the setting has no effect with other methods."""
     return operator.alternatives if operator.method == "NICMM" else 0
 
 
-def _summary(mesh_object, design, order: str, curve_settings) -> str:
+def _summary(
+    mesh_object: bpy.types.Object, design: "Design", order: str, curve_settings: CurveSettings
+) -> str:
     curve = design.curves[0]
     points = counted(len(curve.control_index), "control point")
     summary = f"Curve through {points} {order}, {design.seconds:.1f} s"

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Turns expected errors into reports of operators."""
 
+from __future__ import annotations
+
 import sys
+from collections.abc import Callable
+
+import bpy
 
 from ..scene.messages import InputError, user_message
 
 
-def with_error_reports(operator, work):
+def with_error_reports(operator: bpy.types.Operator, work: Callable[[], set[str]]) -> set[str]:
     """Run the work of an operator and turn expected errors into reports."""
     from ... import nicmm_core as nicmm
 
@@ -32,6 +37,6 @@ def with_error_reports(operator, work):
         return _cancelled(operator, str(error))
 
 
-def _cancelled(operator, message: str):
+def _cancelled(operator: bpy.types.Operator, message: str) -> set[str]:
     operator.report({"ERROR"}, message)
     return {"CANCELLED"}

@@ -8,9 +8,13 @@ Neither reading a surface nor writing a curve changes a mesh object, and undo re
 together with its digest, so an update never triggers another one.
 """
 
+from __future__ import annotations
+
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.app.handlers import persistent
@@ -19,12 +23,16 @@ from bpy.props import BoolProperty
 from .. import preferences
 from ..outputs import writing
 from ..scene import curve_record, design_request
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
-from ..scene.surface import read
+from ..scene.surface import Surface, read
 from ..scene.viewports import redraw
 from . import time_slices
 from .long_solves import answer_all
 from .sliced_operator import TIME_SLICE
+
+if TYPE_CHECKING:
+    from ..scene.design_request import Answer
 
 PAUSE = 0.01
 """Seconds between two time slices, in which Blender handles events."""
@@ -59,16 +67,16 @@ class _Updates:
 
     def reset(self) -> None:
         """Discard all recorded changes and all work."""
-        self.changed: set = set()  # session_uids of mesh objects
+        self.changed: set[int] = set()  # session_uids of mesh objects
         self.everything = False
         self.last_change = 0.0
-        self.work = None
-        self.requests: list = []
-        self.curves: list = []  # session_uid and digest of a curve, for each request
-        self.failed: dict = {}  # _Failure by the session_uid of the curve
+        self.work: time_slices.Work[list[Answer]] | None = None
+        self.requests: list[DesignRequest] = []
+        self.curves: list[tuple[int, str]] = []  # session_uid and digest, for each request
+        self.failed: dict[int, _Failure] = {}  # by the session_uid of the curve
         self.is_reading = False
 
-    def note(self, objects: set, everything: bool = False) -> None:
+    def note(self, objects: set[int], everything: bool = False) -> None:
         """Record a change and start the timer."""
         self.changed |= objects
         self.everything |= everything
@@ -102,12 +110,12 @@ def tick(seconds: float = TIME_SLICE) -> float | None:
     if _has_to_wait():
         return WAIT
     if _updates.work.run_slice(seconds):
-        _write()
+        _write(_updates.work.result())
         return PAUSE if _updates.changed else None
     return PAUSE
 
 
-def messages(mesh_object) -> list:
+def messages(mesh_object: bpy.types.Object) -> list[str]:
     """Messages about the curves on a mesh that could not be updated."""
     if not _live_scenes():
         return []
@@ -123,11 +131,11 @@ def _begin() -> None:
     """Start work on the outdated curves."""
     changed, everything = _updates.changed, _updates.everything
     _updates.changed, _updates.everything = set(), False
-    surfaces: dict = {}
+    surfaces: dict[tuple[bpy.types.Object, bool], Surface] = {}
     with _unnoticed():
         for designed in _live_curves():
             mesh_object = curve_record.mesh_of(designed)
-            if everything or mesh_object.session_uid in changed:
+            if mesh_object is not None and (everything or mesh_object.session_uid in changed):
                 _add_request(designed, mesh_object, surfaces)
     if _updates.requests:
         requests = _updates.requests
@@ -135,7 +143,7 @@ def _begin() -> None:
 
 
 @contextmanager
-def _unnoticed():
+def _unnoticed() -> Iterator[None]:
     """Ignore changes inside the block: reading surfaces makes and removes temporary objects."""
     bpy.context.view_layer.update()  # report pending changes of the user before ignoring any
     _updates.is_reading = True
@@ -146,7 +154,7 @@ def _unnoticed():
         _updates.is_reading = False
 
 
-def _add_request(designed, mesh_object, surfaces: dict) -> None:
+def _add_request(designed: bpy.types.Object, mesh_object: bpy.types.Object, surfaces: dict) -> None:
     """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
     from ... import nicmm_core as nicmm
 
@@ -176,14 +184,14 @@ def _add_request(designed, mesh_object, surfaces: dict) -> None:
     _updates.curves.append((uid, curve_record.digest_of(designed)))
 
 
-def _write() -> None:
+def _write(answers: list[Answer]) -> None:
     """Write the new curves into their objects."""
     from ... import nicmm_core as nicmm
 
-    work, requests, curves = _updates.work, _updates.requests, _updates.curves
+    requests, curves = _updates.requests, _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
-    for request, (uid, before), answer in zip(requests, curves, work.result(), strict=True):
+    for request, (uid, before), answer in zip(requests, curves, answers, strict=True):
         designed, mesh_object = objects.get(uid), request.mesh_object()
         if designed is None or mesh_object is None:
             continue
@@ -201,7 +209,7 @@ def _write() -> None:
             _note_failure(designed, now, error)
 
 
-def _note_failure(designed, digest: str, error) -> None:
+def _note_failure(designed: bpy.types.Object, digest: str, error: Exception) -> None:
     """Record why a curve could not be updated, and show it in the sidebar."""
     _updates.failed[designed.session_uid] = _Failure(
         digest, curve_record.digest_of(designed), f"{designed.name}: {error}"
@@ -226,19 +234,18 @@ def _plays() -> bool:
     return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
 
 
-def _live_scenes() -> list:
+def _live_scenes() -> list[bpy.types.Scene]:
     return [scene for scene in bpy.data.scenes if scene.nicmm_live_update]
 
 
-def _live_curves() -> list:
+def _live_curves() -> list[bpy.types.Object]:
     found = {designed for scene in _live_scenes() for designed in scene.objects}
     designed = [each for each in found if curve_record.has_record(each)]
-    usable = [each for each in designed if curve_record.mesh_of(each) is not None]
-    return sorted(usable, key=lambda each: each.name)
+    return sorted(designed, key=lambda each: each.name)
 
 
 @persistent
-def note_changes(scene, depsgraph) -> None:
+def note_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Record changed mesh objects after an update of the dependency graph.
 
     In Sculpt Mode changes of shading count too, because Blender reports strokes as such.
@@ -261,14 +268,14 @@ def note_changes(scene, depsgraph) -> None:
 
 
 @persistent
-def note_frame(scene, _depsgraph=None) -> None:
+def note_frame(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """Check all curves after a frame change, but not during a render."""
     if scene.nicmm_live_update and not bpy.app.is_job_running("RENDER"):
         _updates.note(set(), everything=True)
 
 
 @persistent
-def note_other_state(*_arguments) -> None:
+def note_other_state(*_arguments: object) -> None:
     """Check all curves after undo, redo, or opening a file."""
     _updates.stop()
     if _live_scenes():
@@ -276,13 +283,13 @@ def note_other_state(*_arguments) -> None:
 
 
 @persistent
-def forget(*_arguments) -> None:
+def forget(*_arguments: object) -> None:
     """Drop all state before another file is opened."""
     _updates.stop()
     _updates.reset()
 
 
-def _switched(_scene, _context) -> None:
+def _switched(_scene: bpy.types.Scene, _context: bpy.types.Context) -> None:
     note_other_state()
 
 

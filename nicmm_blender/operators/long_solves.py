@@ -5,16 +5,25 @@ Scripts, the redo panel and background Blender run `execute`, which returns when
 done. In the window a long computation continues in time slices and shows the unfinished curve.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import bpy
 
 from ..scene import design_request
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
 from .error_reports import with_error_reports
 from .partial_curve import PartialCurve
 from .sliced_operator import SlicedOperator
 
+if TYPE_CHECKING:
+    from ...nicmm_core.progress import Progress
+    from ..scene.design_request import Answer
 
-class LongSolves(SlicedOperator):
+
+class LongSolves(SlicedOperator[list["Answer"]]):
     """A mixin for operators with `requests(context)` and `finish(context, requests, answers)`.
 
     Each answer is a `Design` of the core or an exception.
@@ -22,30 +31,42 @@ class LongSolves(SlicedOperator):
 
     _partial: PartialCurve | None = None
 
-    def execute(self, context):
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
+        """The requests for the curves to design."""
+        raise NotImplementedError
+
+    def finish(
+        self, context: bpy.types.Context, requests: list[DesignRequest], answers: list[Answer]
+    ) -> set[str]:
+        """Use the answers to the requests."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._all_at_once(context))
 
-    def invoke(self, context, _event):
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
             return self.execute(context)
         return with_error_reports(self, lambda: self.answer(context, self.requests(context)))
 
-    def _all_at_once(self, context):
+    def _all_at_once(self, context: bpy.types.Context) -> set[str]:
         requests = self.requests(context)
         return self.end(context, requests, answer_now(context, requests))
 
-    def answer(self, context, requests: list):
+    def answer(self, context: bpy.types.Context, requests: list[DesignRequest]) -> set[str]:
         """Answer requests and finish, immediately if they are quick, otherwise in time slices."""
         self._requests = requests
         return self.work_on(context, lambda progress: answer_all(requests, progress))
 
-    def done(self, context, answers: list) -> set:
+    def done(self, context: bpy.types.Context, answers: list[Answer]) -> set[str]:
         if self.is_sliced:
             for request in self._requests:
                 request.check_unchanged()
         return self.end(context, self._requests, answers)
 
-    def end(self, context, requests: list, answers: list) -> set:
+    def end(
+        self, context: bpy.types.Context, requests: list[DesignRequest], answers: list[Answer]
+    ) -> set[str]:
         """Finish, and drop everything that was kept during the work.
 
         Blender keeps the last operators for the redo panel, and so would keep their meshes.
@@ -60,7 +81,7 @@ class LongSolves(SlicedOperator):
     def progress_text(self) -> str:
         return f"{round(100 * self._work.fraction)}%"
 
-    def show_progress(self, context) -> None:
+    def show_progress(self, context: bpy.types.Context) -> None:
         super().show_progress(context)
         if self._partial is None:
             self._partial = PartialCurve()
@@ -69,9 +90,10 @@ class LongSolves(SlicedOperator):
             line = request.in_world(self._work.polyline)
             self._partial.show(line, request.settings.closed)
 
-    def tidy(self, context) -> None:
+    def tidy(self, context: bpy.types.Context) -> None:
         super().tidy(context)
-        self._partial.remove()
+        if self._partial is not None:
+            self._partial.remove()
 
 
 def _include_all_data_in_undo() -> None:
@@ -82,7 +104,7 @@ def _include_all_data_in_undo() -> None:
     bpy.data.meshes.remove(bpy.data.meshes.new("NICMM"))
 
 
-def answer_now(context, requests: list) -> list:
+def answer_now(context: bpy.types.Context, requests: list[DesignRequest]) -> list[Answer]:
     """Answer requests, and show the progress at the mouse pointer."""
     window_manager = context.window_manager
     window_manager.progress_begin(0.0, 1.0)
@@ -94,28 +116,26 @@ def answer_now(context, requests: list) -> list:
         window_manager.progress_end()
 
 
-def answer_all(requests: list, progress) -> list:
+def answer_all(requests: list[DesignRequest], progress: Progress) -> list[Answer]:
     """Answer requests one after another, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 
-    answers: list = []
+    answers: list[Answer] = []
     for request in requests:
-        done = len(answers)
         try:
-            answers.append(
-                design_request.answer(
-                    request,
-                    lambda fraction, polyline, done=done: progress(
-                        (done + fraction) / len(requests), polyline
-                    ),
-                )
-            )
+            design = design_request.answer(request, _part(progress, len(answers), len(requests)))
         except (InputError, nicmm.NicmmError) as error:
             answers.append(error)
         else:
-            if answers[-1].status == nicmm.Status.CANCELLED:
+            answers.append(design)
+            if design.status == nicmm.Status.CANCELLED:
                 break
     return answers
+
+
+def _part(progress: Progress, done: int, total: int) -> Progress:
+    """The progress function of one part of the work, as many parts of which are done."""
+    return lambda fraction, polyline: progress((done + fraction) / total, polyline)
 
 
 def _current_index(fraction: float, count: int) -> int:

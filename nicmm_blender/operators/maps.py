@@ -69,10 +69,10 @@ class NICMM_OT_new_map(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return _poll(cls, context)
 
-    def draw(self, _context):
+    def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -84,10 +84,10 @@ class NICMM_OT_new_map(bpy.types.Operator):
             layout.prop(self, "strength")
         layout.prop(self, "show")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         mesh_object, curve = _mesh_to_change(context), edited_curve.active(context)
         mesh_data.synchronise(mesh_object)
         weights = self.strength * _weights(mesh_object, self.source, self.angle)
@@ -121,14 +121,16 @@ class NICMM_OT_paint_map(bpy.types.Operator):
     role: EnumProperty(name="Map", description="Map to paint", items=ROLES)
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return _poll(cls, context)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         mesh_object = curve_record.mesh_of_context(context)
+        if mesh_object is None:
+            raise InputError(polls.NO_MESH_OR_CURVE)
         name = getattr(settings_of(context), FIELDS[self.role])
         if is_painting(context, mesh_object, name):
             curve = edited_curve.active(context)
@@ -145,16 +147,18 @@ class NICMM_OT_paint_map(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def settings_of(context):
+def settings_of(context: bpy.types.Context) -> bpy.types.PropertyGroup:
     """The settings that name the maps: those of the active curve, or of a new curve."""
     return _settings(context, edited_curve.active(context))
 
 
-def _settings(context, curve):
+def _settings(
+    context: bpy.types.Context, curve: bpy.types.Object | None
+) -> bpy.types.PropertyGroup:
     return context.scene.nicmm_curves if curve is None else curve.nicmm_settings
 
 
-def _mesh_to_change(context):
+def _mesh_to_change(context: bpy.types.Context) -> bpy.types.Object:
     """The active mesh, or the mesh of the active curve; an error if its weights cannot change."""
     active = context.active_object
     if curve_record.has_record(active):
@@ -167,19 +171,21 @@ def _mesh_to_change(context):
     return mesh_object
 
 
-def is_painting(context, mesh_object, name: str) -> bool:
+def is_painting(
+    context: bpy.types.Context, mesh_object: bpy.types.Object | None, name: str
+) -> bool:
     """Whether Weight Paint mode is active and paints this group."""
     active = None if mesh_object is None else mesh_object.vertex_groups.active
     return context.mode == "PAINT_WEIGHT" and active is not None and active.name == name
 
 
-def _poll(cls, context) -> bool:
+def _poll(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     has_mesh = curve_record.mesh_of_context(context) is not None
     missing = polls.NO_MESH_OR_CURVE
     return polls.usable(cls, context, has_mesh, missing, polls.OBJECT_EDIT_OR_WEIGHTS)
 
 
-def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
+def _weights(mesh_object: bpy.types.Object, source: str, angle: float) -> np.ndarray:
     """The weight of every vertex, (V,)."""
     from ... import nicmm_core as nicmm
 
@@ -205,7 +211,7 @@ def _weights(mesh_object, source: str, angle: float) -> np.ndarray:
     return nicmm.edge_map(mesh, edges)
 
 
-def _enter(context, mesh_object, mode: str) -> None:
+def _enter(context: bpy.types.Context, mesh_object: bpy.types.Object, mode: str) -> None:
     """Make the mesh active and switch it to a mode."""
     if context.view_layer.objects.active != mesh_object:
         context.view_layer.objects.active = mesh_object
@@ -213,7 +219,7 @@ def _enter(context, mesh_object, mode: str) -> None:
         bpy.ops.object.mode_set(mode=mode)
 
 
-def _keep_active(context, curve) -> None:
+def _keep_active(context: bpy.types.Context, curve: bpy.types.Object | None) -> None:
     """Make the curve that a map is for active again, if the mode is Object Mode."""
     if curve is not None and context.mode == "OBJECT":
         curve_object.select_only(context, curve)

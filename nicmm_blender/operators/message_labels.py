@@ -15,7 +15,7 @@ FEWEST = 20
 """Least number of letters in a line."""
 
 
-def draw_message(layout, message: str) -> None:
+def draw_message(layout: bpy.types.UILayout, message: str) -> None:
     """Draw an error message on as many lines as the region needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8

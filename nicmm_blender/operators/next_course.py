@@ -12,6 +12,7 @@ from bpy.app.handlers import persistent
 from bpy.props import IntProperty
 
 from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
 from ..scene import curve_record, surface_cache
 from ..scene.messages import InputError
 from ..settings import CURVE
@@ -43,11 +44,11 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         has_curve = edited_curve.active(context) is not None
         return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
-    def requests(self, context) -> list:
+    def requests(self, context: bpy.types.Context) -> list:
         if self.options.is_repeat_last:
             self.course = 0  # it holds the number that was selected last
         edited = edited_curve.chosen(context, self.curve)
@@ -63,7 +64,7 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
         options = {**request.options, "alternatives": ALTERNATIVES}
         return [replace(request, start=None, options=options)]
 
-    def finish(self, context, _requests: list, answers: list) -> set:
+    def finish(self, context: bpy.types.Context, _requests: list, answers: list) -> set:
         opened = self._opened
         if answers:
             edited_curve.curves_of(answers)  # raises an answer that is an error
@@ -79,19 +80,19 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
             return {"CANCELLED"}
         following = 1 if current is None else 1 + (current + 1) % len(courses)
         self.course = min(self.course, len(courses)) or following
-        edited_curve.write(context, opened, opened.points, [courses[self.course - 1]], None)
+        edited_curve.rewrite(opened, opened.points, [courses[self.course - 1]])
         self.report({"INFO"}, f'"{name}": course {self.course} of {len(courses)}{opened.remark}')
         return {"FINISHED"}
 
 
-def _key(opened) -> tuple:
+def _key(opened: Opened) -> tuple:
     """Everything that the courses of a curve depend on."""
     points = opened.points
     on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
     return on, points.faces.tobytes(), points.barycentric.tobytes()
 
 
-def _current(opened, courses: list) -> int | None:
+def _current(opened: Opened, courses: list) -> int | None:
     """The index of the course that a curve takes; None if it takes none of them."""
     from ...nicmm_core.courses.comparison import current_course
 
@@ -101,7 +102,7 @@ def _current(opened, courses: list) -> int | None:
 
 
 @persistent
-def forget(*_arguments) -> None:
+def forget(*_arguments: object) -> None:
     """Drop the courses found before another file is opened."""
     _found.clear()
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shows an unfinished curve in every 3D viewport."""
 
+from __future__ import annotations
+
 import bpy
+import numpy as np
 
 from ..scene import viewports
 
@@ -17,7 +20,7 @@ class PartialCurve:
         self._positions: list = []
         self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
-    def show(self, points, closed: bool) -> None:
+    def show(self, points: np.ndarray, closed: bool) -> None:
         """Replace the points, (n, 3)."""
         positions = points.tolist()
         self._positions = positions + positions[:1] if closed else positions

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks whether an operator can run, with the messages that disabled buttons show."""
 
+from __future__ import annotations
+
+import bpy
+
 OBJECT = ({"OBJECT"}, "Switch to Object Mode")
 OBJECT_OR_EDIT = ({"OBJECT", "EDIT_MESH"}, "Switch to Object Mode or Edit Mode")
 OBJECT_EDIT_OR_WEIGHTS = (
@@ -23,7 +27,13 @@ NO_MESH_OR_CURVE = "Make a mesh or a designed curve active"
 """Messages for an active object of the wrong type."""
 
 
-def usable(operator, context, has_object: bool, missing: str, modes: tuple) -> bool:
+def usable(
+    operator: type[bpy.types.Operator],
+    context: bpy.types.Context,
+    has_object: bool,
+    missing: str,
+    modes: tuple,
+) -> bool:
     """Whether an operator can run; if not, set its message.
 
     Parameters

@@ -7,20 +7,29 @@ at the end of each time slice. Caller and thread never run at the same time, so 
 of them uses Blender's Python. The work must not access Blender's data.
 """
 
+from __future__ import annotations
+
 import atexit
 import threading
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ...nicmm_core.progress import Progress
+
+Result = TypeVar("Result")
 
 STACK = 64 * 1024 * 1024
 """Stack size in bytes. Except on Linux, threads get far less than the main thread by default."""
 
 # Work whose thread exists and is blocked; `stop_all` ends these threads.
-_parked: set = set()
+_parked: set[Work[Any]] = set()
 
 
-class Work:
+class Work(Generic[Result]):
     """A function that takes a progress function, run in time slices.
 
     Attributes
@@ -33,31 +42,31 @@ class Work:
         Whether the function has returned, raised an error or been cancelled.
     """
 
-    def __init__(self, function) -> None:
+    def __init__(self, function: Callable[[Progress], Result]) -> None:
         self._function = function
-        self._thread = None
+        self._thread: threading.Thread | None = None
         self._go, self._stop = threading.Semaphore(0), False
         self._back = threading.Semaphore(0)
         self._until = 0.0
-        self._result, self._error = None, None
+        self._result: Result
+        self._error: BaseException | None = None
         self.fraction, self.polyline = 0.0, np.zeros((0, 3))
         self.done = False
 
     def run_slice(self, seconds: float) -> bool:
         """Continue for about this many seconds; return whether the work is done."""
-        if self.done:
-            return True
         if self._thread is None:
-            self._start()
-        self._until = time.perf_counter() + seconds
-        self._go.release()
-        self._back.acquire()
+            self._thread = self._start()
+        if not self.done:
+            self._until = time.perf_counter() + seconds
+            self._go.release()
+            self._back.acquire()
         if self.done:
             _parked.discard(self)
             self._thread.join()
         return self.done
 
-    def result(self):
+    def result(self) -> Result:
         """Return the result of the function or raise its error. Call only when the work is done."""
         if self._error is not None:
             raise self._error
@@ -71,15 +80,16 @@ class Work:
         while not self.done:
             self.run_slice(0.0)
 
-    def _start(self) -> None:
+    def _start(self) -> threading.Thread:
         before = threading.stack_size(STACK)
         try:
             # A daemon thread, so that Blender can always quit; `stop_all` joins it before that.
-            self._thread = threading.Thread(target=self._run, name="nicmm", daemon=True)
-            self._thread.start()
+            thread = threading.Thread(target=self._run, name="nicmm", daemon=True)
+            thread.start()
         finally:
             threading.stack_size(before)
         _parked.add(self)
+        return thread
 
     def _run(self) -> None:
         self._go.acquire()
@@ -90,7 +100,7 @@ class Work:
         self.done = True
         self._back.release()
 
-    def _progress(self, fraction: float, polyline) -> bool:
+    def _progress(self, fraction: float, polyline: np.ndarray) -> bool:
         self.fraction = fraction
         if len(polyline):
             self.polyline = polyline

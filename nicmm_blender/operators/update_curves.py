@@ -6,6 +6,8 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data
+from ..scene.curve_record import CurveSettings
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
 from ..scene.surface import read
 from . import polls
@@ -32,13 +34,13 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if curve_record.mesh_of_context(context) is None:
             cls.poll_message_set(polls.NO_MESH_OR_CURVE)
             return False
         return True
 
-    def requests(self, context) -> list:
+    def requests(self, context: bpy.types.Context) -> list:
         chosen = None
         if self.use_panel:
             chosen = curve_record.settings_from(context.scene.nicmm_curves)
@@ -54,11 +56,13 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
             raise InputError("; ".join(message for _, message in self._failed))
         return requests
 
-    def _curves(self, context) -> list:
+    def _curves(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """The curve with the given name, or all curves on the mesh without unfinished drawings."""
         if self.curve:
             return [named(self.curve)]
         mesh_object = curve_record.mesh_of_context(context)
+        if mesh_object is None:
+            raise InputError(polls.NO_MESH_OR_CURVE)
         curves = curve_record.designed_on(mesh_object)
         if not curves:
             raise InputError(
@@ -67,7 +71,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
             )
         return [each for each in curves if not curve_record.is_unfinished(each)] or curves
 
-    def finish(self, _context, requests: list, answers: list) -> set:
+    def finish(self, _context: bpy.types.Context, requests: list, answers: list) -> set:
         total = len(requests) + len(self._failed)
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:
@@ -91,7 +95,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def named(name: str):
+def named(name: str) -> bpy.types.Object:
     """Return the designed curve with a name, or raise an error if there is none."""
     found = bpy.data.objects.get(name)
     if not curve_record.has_record(found):
@@ -99,7 +103,7 @@ def named(name: str):
     return found
 
 
-def request_again(designed, chosen=None):
+def request_again(designed: bpy.types.Object, chosen: CurveSettings | None = None) -> DesignRequest:
     """A request to design a curve again, with its recorded settings or with `chosen`."""
     mesh_object = curve_record.mesh_in_any_scene(designed)
     mesh_data.synchronise(mesh_object)

@@ -5,11 +5,18 @@ The core does the fitting, in a space with the proportions of the scene. Whateve
 its record holds the exact curve.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..scene import surface_cache
+from ..scene.surface import Surface
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Mesh, SurfaceCurve
 
 EVEN, EXACT, BEZIER = "EVEN", "EXACT", "BEZIER"
 
@@ -48,7 +55,10 @@ class Knots:
     smooth: np.ndarray
 
 
-def splines(surface, curves, drawing: Drawing) -> list:
+Spline = Polyline | Knots
+
+
+def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list:
     """The splines that show curves, each a `Polyline` or `Knots`."""
     if drawing.spline == BEZIER:
         return [_knots(surface, curve, drawing) for curve in curves]
@@ -58,7 +68,7 @@ def splines(surface, curves, drawing: Drawing) -> list:
     ]
 
 
-def on_surface(surface, curves, drawing: Drawing) -> list:
+def on_surface(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list:
     """Curves of the core whose points are those of the polylines to draw."""
     if drawing.spline == EXACT:
         return curves
@@ -68,12 +78,12 @@ def on_surface(surface, curves, drawing: Drawing) -> list:
     return [even_curve(mesh, curve, _tolerance(surface, mesh, drawing)) for curve in curves]
 
 
-def automatic_radius(surface, radius: float, thickness: float) -> float:
+def automatic_radius(surface: Surface, radius: float, thickness: float) -> float:
     """The radius in scene units; if it is zero, the given fraction of the surface's diagonal."""
     return radius or thickness * surface.diagonal * surface.scale
 
 
-def _knots(surface, curve, drawing: Drawing) -> Knots:
+def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing) -> Knots:
     from ...nicmm_core.splines.bezier import fit_bezier
 
     mesh = surface_cache.core_mesh(surface)
@@ -88,7 +98,7 @@ def _knots(surface, curve, drawing: Drawing) -> Knots:
     return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
 
 
-def _offset_points(surface, curve, offset: float) -> np.ndarray:
+def _offset_points(surface: Surface, curve: SurfaceCurve, offset: float) -> np.ndarray:
     """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)
@@ -100,7 +110,7 @@ def _offset_points(surface, curve, offset: float) -> np.ndarray:
     return points @ np.linalg.inv(surface.local_to_core).T
 
 
-def _tolerance(surface, mesh, drawing: Drawing) -> float:
+def _tolerance(surface: Surface, mesh: Mesh, drawing: Drawing) -> float:
     from ...nicmm_core.geometry.tolerances import of_clean_curve
 
     return of_clean_curve(mesh.diagonal, drawing.radius / surface.unit)

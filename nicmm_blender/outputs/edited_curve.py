@@ -4,18 +4,27 @@
 An opened curve holds no references to Blender objects, since undo replaces them.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_OPEN
 from ..scene import curve_record, design_request, mesh_data, surface_cache
-from ..scene.curve_record import CurveSettings
+from ..scene.curve_record import CurveSettings, Drawn
+from ..scene.design_request import DesignRequest
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError, counted, sentence
 from ..scene.surface import Surface, active_modifiers_text
 from . import curve_object, writing
+from .writing import ObjectSettings
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
 
@@ -46,17 +55,17 @@ class Opened:
     mesh_uid: int
     surface: Surface
     settings: CurveSettings
-    points: object
-    curve: object
+    points: SurfacePoints
+    curve: SurfaceCurve | None
     remark: str
 
     @property
-    def mesh_object(self):
+    def mesh_object(self) -> bpy.types.Object | None:
         """The mesh object."""
         return by_uid(self.mesh_uid)
 
     @property
-    def curve_object(self):
+    def curve_object(self) -> bpy.types.Object | None:
         """The curve object; None for a new curve."""
         return by_uid(self.curve_uid) if self.curve_uid else None
 
@@ -69,7 +78,7 @@ class Opened:
         return polyline_of(self.surface, self.curve)
 
 
-def polyline_of(surface, curve) -> np.ndarray:
+def polyline_of(surface: Surface, curve: SurfaceCurve | None) -> np.ndarray:
     """Points of a curve in the object's local space, (n, 3); a closed curve repeats the first."""
     if curve is None:
         return np.zeros((0, 3))
@@ -77,7 +86,7 @@ def polyline_of(surface, curve) -> np.ndarray:
     return np.concatenate([line, line[:1]]) if curve.closed else line
 
 
-def chosen(context, name: str):
+def chosen(context: bpy.types.Context, name: str) -> bpy.types.Object | None:
     """The designed curve with a name; for an empty name the active curve, or None without one."""
     if not name:
         return active(context)
@@ -90,7 +99,7 @@ def chosen(context, name: str):
     return found
 
 
-def active(context):
+def active(context: bpy.types.Context) -> bpy.types.Object | None:
     """The designed curve that is being drawn, or None.
 
     It is the active object. In Sculpt Mode and Weight Paint, where the mesh has to be active, it is
@@ -110,7 +119,10 @@ def active(context):
 
 
 def open_curve(
-    context, edited, settings: CurveSettings | None = None, keeps_course: bool = False
+    context: bpy.types.Context,
+    edited: bpy.types.Object | None,
+    settings: CurveSettings | None = None,
+    keeps_course: bool = False,
 ) -> Opened:
     """Read a curve and its surface, or the active mesh for a new curve.
 
@@ -147,7 +159,7 @@ def open_curve(
     for name in MAPS:
         group = getattr(settings, name)
         if edited is not None and group and group not in mesh_object.vertex_groups:
-            settings = replace(settings, **{name: ""})
+            settings = settings.with_value(name, "")
             remarks.append(f'without the vertex group "{group}", which no longer exists')
     points = nicmm.SurfacePoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
     curve = None
@@ -157,15 +169,17 @@ def open_curve(
             points_moved = f"{counted(moved, 'point')} moved to the nearest positions"
             remarks.append(f"the mesh has changed: {points_moved}")
         else:
-            kept = {"smoothness": before.smoothness} if keeps_course else {}
-            if replace(settings, method=before.method, **kept) == before:
+            kept = replace(settings, method=before.method)
+            if keeps_course:
+                kept = replace(kept, smoothness=before.smoothness)
+            if kept == before:
                 curve = _curve_of(edited, surface)
     remark = "".join(f"; {each}" for each in remarks)
     uid = 0 if edited is None else edited.session_uid
     return Opened(uid, mesh_object.session_uid, surface, settings, points, curve, remark)
 
 
-def request(edited: Opened, points) -> list:
+def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:
         return []
@@ -174,40 +188,62 @@ def request(edited: Opened, points) -> list:
     return [replace(found, start=edited.curve)]
 
 
-def curves_of(answers: list) -> list:
+def curves_of(answers: list[Answer]) -> list[SurfaceCurve]:
     """The curves in the answers to `request`; an answer that is an error is raised."""
+    curves: list[SurfaceCurve] = []
     for answer in answers:
         if isinstance(answer, Exception):
             raise answer
         if not answer.curves:
             raise InputError(sentence(str(answer.status)))
-    return [curve for answer in answers for curve in answer.curves]
+        curves += answer.curves
+    return curves
 
 
-def write(context, edited: Opened, points, curves: list, settings):
+def write(
+    context: bpy.types.Context,
+    edited: Opened,
+    points: SurfacePoints,
+    curves: list[SurfaceCurve],
+    settings: ObjectSettings,
+) -> bpy.types.Object:
     """Write curves through points to the curve object, or to a new one; return the object.
 
     `settings` holds the output settings of a new object.
     """
-    mesh_object, result = edited.mesh_object, edited.curve_object
-    if edited.curve_uid and result is None:
-        raise InputError(DELETED)
-    if result is None:
-        result = writing.as_object(mesh_object, edited.surface, curves, settings)
-        drawn = writing.drawn_as(settings)
-    else:
-        writing.redraw(result, edited.surface, curves)
-        drawn = curve_record.drawn_as(result)
-    curve_settings = replace(edited.settings, method="NICMM")
-    curve_record.write_record(
-        result, mesh_object, edited.surface, curves, curve_settings, drawn, points
-    )
-    if not edited.curve_uid:
-        curve_object.place(context, mesh_object, result)
+    if edited.curve_uid:
+        return rewrite(edited, points, curves)
+    mesh_object = edited.mesh_object
+    result = writing.as_object(mesh_object, edited.surface, curves, settings)
+    _record(result, edited, points, curves, writing.drawn_as(settings))
+    curve_object.place(context, mesh_object, result)
     return result
 
 
-def surface_points_at(edited: Opened, positions: np.ndarray, name: str):
+def rewrite(edited: Opened, points: SurfacePoints, curves: list[SurfaceCurve]) -> bpy.types.Object:
+    """Write curves through points to the curve object, and return it."""
+    result = edited.curve_object
+    if result is None:
+        raise InputError(DELETED)
+    writing.redraw(result, edited.surface, curves)
+    _record(result, edited, points, curves, curve_record.drawn_as(result))
+    return result
+
+
+def _record(
+    result: bpy.types.Object,
+    edited: Opened,
+    points: SurfacePoints,
+    curves: list[SurfaceCurve],
+    drawn: Drawn | None,
+) -> None:
+    curve_settings = replace(edited.settings, method="NICMM")
+    curve_record.write_record(
+        result, edited.mesh_object, edited.surface, curves, curve_settings, drawn, points
+    )
+
+
+def surface_points_at(edited: Opened, positions: np.ndarray, name: str) -> SurfacePoints:
     """SurfacePoints of the core at positions (k, 3) on the surface, in the object's local space.
 
     `name` is the name of the argument in error messages.
@@ -219,7 +255,7 @@ def surface_points_at(edited: Opened, positions: np.ndarray, name: str):
     return locate_points(mesh, positions @ surface.local_to_core.T, name)
 
 
-def nearest_surface_points(edited: Opened, positions: np.ndarray):
+def nearest_surface_points(edited: Opened, positions: np.ndarray) -> SurfacePoints:
     """SurfacePoints of the core nearest to positions (k, 3) in the object's local space."""
     from ...nicmm_core.geometry.surface_points import nearest_points
 
@@ -228,7 +264,9 @@ def nearest_surface_points(edited: Opened, positions: np.ndarray):
     return nearest_points(mesh, positions @ surface.local_to_core.T)[0]
 
 
-def with_point(points, number: int, place, replaced: bool = False):
+def with_point(
+    points: SurfacePoints, number: int, place: SurfacePoints, replaced: bool = False
+) -> SurfacePoints:
     """Points with the single point `place` inserted at an index, or replacing the point there."""
     from ... import nicmm_core as nicmm
 
@@ -241,12 +279,12 @@ def with_point(points, number: int, place, replaced: bool = False):
     )
 
 
-def without_point(points, number: int):
+def without_point(points: SurfacePoints, number: int) -> SurfacePoints:
     """Points without the one at an index."""
     return points[np.delete(np.arange(len(points)), number)]
 
 
-def _curve_of(edited, surface):
+def _curve_of(edited: bpy.types.Object, surface: Surface) -> SurfaceCurve | None:
     """The recorded curve of an object, or None if it has to be designed again."""
     if not curve_record.lies_on(edited, surface):
         return None

@@ -6,17 +6,27 @@ mesh at new vertices, corners and edges: weights, shape keys, colours and each U
 interpolated within one face, so values do not mix across seams.
 """
 
-from contextlib import contextmanager
+from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import bpy
 import numpy as np
 
 import bmesh
 
 from ..scene.messages import InputError
+from ..scene.surface import Surface
+
+if TYPE_CHECKING:
+    from ...nicmm_core import CutMesh
+    from ...nicmm_core.outputs.polygons import CutPolygons
 
 
 @contextmanager
-def editable(mesh_object):
+def editable(mesh_object: bpy.types.Object) -> Iterator[bmesh.types.BMesh]:
     """Yield the mesh as a BMesh and write it back at the end, in Object Mode or Edit Mode."""
     mesh = mesh_object.data
     if mesh_object.mode == "EDIT":
@@ -34,7 +44,7 @@ def editable(mesh_object):
     mesh.update()
 
 
-def check_editable(mesh_object, cuts: bool) -> None:
+def check_editable(mesh_object: bpy.types.Object, cuts: bool) -> None:
     """Raise an error if the mesh cannot be changed, or if a change would affect other objects."""
     mesh = mesh_object.data
     name = mesh_object.name
@@ -72,7 +82,7 @@ class CornerNormals:
     if these faces are nearly flat.
     """
 
-    def __init__(self, mesh_object) -> None:
+    def __init__(self, mesh_object: bpy.types.Object) -> None:
         mesh = mesh_object.data
         self.has_values = mesh.has_custom_normals and mesh_object.mode == "OBJECT"
         if self.has_values:
@@ -80,7 +90,9 @@ class CornerNormals:
             mesh.corner_normals.foreach_get("vector", self.values.ravel())
             self.loop_starts = _loop_starts(mesh)
 
-    def after_cut(self, surface, cut, polygons, weights) -> np.ndarray:
+    def after_cut(
+        self, surface: Surface, cut: CutMesh, polygons: CutPolygons, weights: np.ndarray
+    ) -> np.ndarray:
         """Normals of all corners (n, 3): first the unchanged faces in order, then the new faces."""
         counts = np.diff(self.loop_starts, append=len(self.values))
         stays = np.ones(len(counts), dtype=bool)
@@ -96,17 +108,24 @@ class CornerNormals:
         return np.concatenate([old, new])
 
 
-def _integers(values) -> np.ndarray:
+def _integers(values: list[int]) -> np.ndarray:
     return np.asarray(values, dtype=np.int64)
 
 
-def _loop_starts(mesh) -> np.ndarray:
+def _loop_starts(mesh: bpy.types.Mesh) -> np.ndarray:
     starts = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
     return starts
 
 
-def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
+def apply(
+    edited: bmesh.types.BMesh,
+    mesh: bpy.types.Mesh,
+    surface: Surface,
+    cut: CutMesh,
+    polygons: CutPolygons,
+    weights: np.ndarray,
+) -> tuple[list, list]:
     """Cut a BMesh.
 
     Parameters
@@ -162,7 +181,9 @@ def apply(edited, mesh, surface, cut, polygons, weights) -> tuple[list, list]:
     return vertices, faces
 
 
-def _new_vertices(edited, surface, cut, vertices: list) -> list:
+def _new_vertices(
+    edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list
+) -> list:
     new_vertices = []
     for face, weight in zip(cut.new_face.tolist(), cut.new_barycentric, strict=True):
         around = [
@@ -184,7 +205,7 @@ def _new_vertices(edited, surface, cut, vertices: list) -> list:
     return new_vertices
 
 
-def _split_edges(edited, surface, cut, vertices: list) -> list:
+def _split_edges(edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list) -> list:
     """Add the parts of the cut edges, with their attributes; return the old edges."""
     along: dict = {}
     n_input = len(surface.local_positions)
@@ -211,13 +232,17 @@ def _split_edges(edited, surface, cut, vertices: list) -> list:
 class _SourceTriangles:
     """Temporary faces for the triangles of polygons, as sources for interpolated corners."""
 
-    def __init__(self, edited, mesh, surface, old_faces: dict) -> None:
+    def __init__(
+        self, edited: bmesh.types.BMesh, mesh: bpy.types.Mesh, surface: Surface, old_faces: dict
+    ) -> None:
         self.edited, self.surface, self.old_faces = edited, surface, old_faces
         self.loop_starts = _loop_starts(mesh)
         self.faces: dict = {}
         self.helper_vertices: list = []
 
-    def interpolate(self, face, place: int, triangle: int, weight) -> None:
+    def interpolate(
+        self, face: bmesh.types.BMFace, place: int, triangle: int, weight: np.ndarray
+    ) -> None:
         """Interpolate the layers at a corner of a face from the corners of a triangle."""
         polygon = int(self.surface.polygons[triangle])
         source = self.old_faces[polygon]
@@ -228,7 +253,7 @@ class _SourceTriangles:
             loop = face.loops[place]
             loop.copy_from_face_interp(self._face(triangle, source, places), False, False)
 
-    def _face(self, triangle: int, source, places: list):
+    def _face(self, triangle: int, source: bmesh.types.BMFace, places: list) -> bmesh.types.BMFace:
         if len(source.loops) == 3:
             return source
         if triangle not in self.faces:

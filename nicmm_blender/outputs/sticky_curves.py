@@ -6,12 +6,20 @@ coordinates. A Geometry Nodes group (`sticky_nodes`) reads the positions of thes
 modifiers.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import bpy
 import numpy as np
 
+from ..scene.surface import Surface
 from . import sticky_nodes
-from .clean_curves import on_surface
+from .clean_curves import Drawing, on_surface
 from .curve_object import parent_to_mesh, scale_of, to_object_space
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve
 
 RADIUS = "nicmm_radius"
 """Custom property that keeps the radius of a drawing while it has no curve."""
@@ -27,7 +35,13 @@ def are_drawn_with_all_points() -> bool:
     return "CYLINDER" in shapes
 
 
-def add(mesh_object, surface, curves, drawing, tube: bool):
+def add(
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    drawing: Drawing,
+    tube: bool,
+) -> bpy.types.Object:
     """Create the hair curves object without linking it to a collection."""
     name = f"{mesh_object.name} Curve"
     curve_object = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
@@ -47,7 +61,9 @@ def add(mesh_object, surface, curves, drawing, tube: bool):
     return curve_object
 
 
-def write(curve_object, surface, curves, drawing) -> None:
+def write(
+    curve_object: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve], drawing: Drawing
+) -> None:
     """Replace the curves of a hair curves object; the radii along them are kept."""
     data = curve_object.data
     radii = _radii(data)
@@ -80,12 +96,12 @@ def write(curve_object, surface, curves, drawing) -> None:
         _set(data, sticky_nodes.CAGE_CORNERS[corner], "INT", "POINT", cage_corners[:, corner])
 
 
-def radius_of(data) -> float:
+def radius_of(data: bpy.types.Curves) -> float:
     """The largest radius of the points; without points, the radius that was kept."""
     return float(_radii(data)[1].max()) if len(data.points) else float(data.get(RADIUS, 0.0))
 
 
-def set_radius(data, radius: float) -> None:
+def set_radius(data: bpy.types.Curves, radius: float) -> None:
     """Scale the radii of the points so that the largest has this value."""
     if not len(data.points):
         data[RADIUS] = radius
@@ -96,7 +112,7 @@ def set_radius(data, radius: float) -> None:
     _set(data, "radius", "FLOAT", "POINT", values)
 
 
-def _radii(data) -> tuple[np.ndarray, np.ndarray]:
+def _radii(data: bpy.types.Curves) -> tuple[np.ndarray, np.ndarray]:
     """Radii along all curves: position of each point as a fraction of all points, and its radius.
 
     Without points, both are a single zero.
@@ -109,7 +125,9 @@ def _radii(data) -> tuple[np.ndarray, np.ndarray]:
     return (np.arange(len(values)) + 0.5) / len(values), values
 
 
-def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:
+def on_cage(
+    surface: Surface, faces: np.ndarray, barycentric: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Express points relative to three vertices of the cage.
 
     Parameters
@@ -148,7 +166,9 @@ def on_cage(surface, faces, barycentric) -> tuple[np.ndarray, np.ndarray]:
     return np.where(in_front[:, None], corners, -1), places
 
 
-def _set(data, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
+def _set(
+    data: bpy.types.Curves, name: str, data_type: str, domain: str, values: np.ndarray
+) -> None:
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
     kinds = {"INT": np.int32, "BOOLEAN": bool}
     values = np.ascontiguousarray(values, dtype=kinds.get(data_type, np.float32))

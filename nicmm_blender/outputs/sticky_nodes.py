@@ -9,6 +9,8 @@ vertex list, and then moved to the nearest point of the surface.
 A file keeps the group that it was saved with.
 """
 
+from __future__ import annotations
+
 import bpy
 
 GROUP_NAME = "NICMM Surface Curve"
@@ -35,7 +37,9 @@ SIDES = 12
 """Number of sides of the tube, the same as for Blender's default bevel of curves."""
 
 
-def add_modifier(curves_object, mesh_object, tube: bool) -> None:
+def add_modifier(
+    curves_object: bpy.types.Object, mesh_object: bpy.types.Object, tube: bool
+) -> None:
     """Add the modifier that makes a hair curves object follow a mesh object."""
     modifier = curves_object.modifiers.new(GROUP_NAME, "NODES")
     modifier.node_group = node_group()
@@ -43,13 +47,13 @@ def add_modifier(curves_object, mesh_object, tube: bool) -> None:
     _set_input(modifier, TUBE, tube)
 
 
-def node_group():
+def node_group() -> bpy.types.NodeTree:
     """The node group of the file, created if it is missing or incomplete."""
     group = bpy.data.node_groups.get((GROUP_NAME, None))  # None: no group linked from a library
     return group if group is not None and _is_complete(group) else _new_group()
 
 
-def _new_group():
+def _new_group() -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(GROUP_NAME, "GeometryNodeTree")
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -80,7 +84,7 @@ def _new_group():
     return group
 
 
-def _in_triangle(column, surface) -> tuple:
+def _in_triangle(column: _Column, surface: bpy.types.NodeSocket) -> tuple:
     """The position and normal of each point in its triangle."""
     position = column.node("GeometryNodeInputPosition", 1)
     normal = column.node("GeometryNodeInputNormal", 1)
@@ -98,7 +102,7 @@ def _in_triangle(column, surface) -> tuple:
     return tuple(found)
 
 
-def _is_unchanged(column, surface):
+def _is_unchanged(column: _Column, surface: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Whether the surface has the same number of vertices as when the curve was drawn."""
     size = column.node("GeometryNodeAttributeDomainSize", 2)
     column.link(surface, size.inputs["Geometry"])
@@ -109,7 +113,7 @@ def _is_unchanged(column, surface):
     return same.outputs["Result"]
 
 
-def _nearest(column, surface):
+def _nearest(column: _Column, surface: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """The point of the surface nearest to the position estimated from the cage."""
     position = _output(column.node("GeometryNodeInputPosition", 1), "Position")
     corners = [column.attribute(name, "INT") for name in CAGE_CORNERS]
@@ -137,7 +141,9 @@ def _nearest(column, surface):
     return nearest.outputs["Position"]
 
 
-def _with_tube(column, curves, inputs):
+def _with_tube(
+    column: _Column, curves: bpy.types.NodeSocket, inputs: bpy.types.Node
+) -> bpy.types.NodeSocket:
     """The curves, or the tube if that is chosen."""
     radius = _output(column.node("GeometryNodeInputRadius", 8), "Radius")
     widest = column.node("GeometryNodeAttributeStatistic", 8)
@@ -157,23 +163,23 @@ def _with_tube(column, curves, inputs):
     return column.switch(10, _output(inputs, TUBE), curves, _output(mesh, "Mesh"))
 
 
-def _is_complete(group) -> bool:
+def _is_complete(group: bpy.types.NodeTree) -> bool:
     """Whether a group has the parts that the modifier needs."""
     return (
         group.bl_idname == "GeometryNodeTree"
-        and _interface_input(group, SURFACE) is not None
+        and {SURFACE, TUBE} <= _input_identifiers(group).keys()
         and _output_source(group) is not None
     )
 
 
-def _output_source(group):
+def _output_source(group: bpy.types.NodeTree) -> bpy.types.NodeSocket | None:
     """The socket linked to the output of a group, or None."""
     outputs = _group_output(group)
     links = () if outputs is None else outputs.inputs[0].links
     return links[0].from_socket if links else None
 
 
-def _group_output(group):
+def _group_output(group: bpy.types.NodeTree) -> bpy.types.Node | None:
     found = [node for node in group.nodes if node.bl_idname == "NodeGroupOutput"]
     return next((node for node in found if node.is_active_output), None)
 
@@ -181,11 +187,11 @@ def _group_output(group):
 class _Column:
     """Adds nodes and links to a group, and places the nodes in columns from left to right."""
 
-    def __init__(self, group) -> None:
+    def __init__(self, group: bpy.types.NodeTree) -> None:
         self.group = group
-        self.heights: dict = {}
+        self.heights: dict[int, int] = {}
 
-    def node(self, kind: str, column: int):
+    def node(self, kind: str, column: int) -> bpy.types.Node:
         node = self.group.nodes.new(kind)
         self.heights[column] = self.heights.get(column, 0) + 1
         node.location = (self.x(column), -220 * self.heights[column])
@@ -195,16 +201,21 @@ class _Column:
     def x(column: int) -> float:
         return 220.0 * column
 
-    def link(self, source, target) -> None:
+    def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
         self.group.links.new(source, target)
 
-    def attribute(self, name: str, data_type: str):
+    def attribute(self, name: str, data_type: str) -> bpy.types.NodeSocket:
         node = self.node("GeometryNodeInputNamedAttribute", 1)
         node.data_type = data_type
         node.inputs["Name"].default_value = name
         return _output(node, "Attribute")
 
-    def sample(self, geometry, field, index):
+    def sample(
+        self,
+        geometry: bpy.types.NodeSocket,
+        field: bpy.types.NodeSocket,
+        index: bpy.types.NodeSocket,
+    ) -> bpy.types.NodeSocket:
         """The value of a vector field at one vertex of a geometry."""
         node = self.node("GeometryNodeSampleIndex", 2)
         node.data_type, node.domain = "FLOAT_VECTOR", "POINT"
@@ -213,7 +224,14 @@ class _Column:
         self.link(index, _input(node, "Index"))
         return _output(node, "Value")
 
-    def switch(self, column: int, condition, if_false, if_true, kind: str = "GEOMETRY"):
+    def switch(
+        self,
+        column: int,
+        condition: bpy.types.NodeSocket,
+        if_false: bpy.types.NodeSocket | None,
+        if_true: bpy.types.NodeSocket | None,
+        kind: str = "GEOMETRY",
+    ) -> bpy.types.NodeSocket:
         """Switch between two values; None leaves an input empty."""
         node = self.node("GeometryNodeSwitch", column)
         node.input_type = kind
@@ -222,11 +240,16 @@ class _Column:
                 self.link(source, _input(node, name))
         return _output(node, "Output")
 
-    def choose(self, condition, if_false, if_true):
+    def choose(
+        self,
+        condition: bpy.types.NodeSocket,
+        if_false: bpy.types.NodeSocket,
+        if_true: bpy.types.NodeSocket,
+    ) -> bpy.types.NodeSocket:
         """Switch between two vectors."""
         return self.switch(5, condition, if_false, if_true, "VECTOR")
 
-    def vectors(self, operation: str, *operands):
+    def vectors(self, operation: str, *operands: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
         """The result of a vector operation."""
         node = self.node("ShaderNodeVectorMath", 3)
         node.operation = operation
@@ -234,7 +257,9 @@ class _Column:
             self.link(operand, socket)
         return node.outputs[0]
 
-    def scaled(self, vector, factor):
+    def scaled(
+        self, vector: bpy.types.NodeSocket, factor: bpy.types.NodeSocket
+    ) -> bpy.types.NodeSocket:
         """A vector times a factor."""
         node = self.node("ShaderNodeVectorMath", 4)
         node.operation = "SCALE"
@@ -242,29 +267,34 @@ class _Column:
         self.link(factor, node.inputs["Scale"])
         return node.outputs[0]
 
-    def added(self, vector, other, factor):
+    def added(
+        self,
+        vector: bpy.types.NodeSocket,
+        other: bpy.types.NodeSocket,
+        factor: bpy.types.NodeSocket,
+    ) -> bpy.types.NodeSocket:
         """A vector plus a multiple of another vector."""
         return self.vectors("ADD", vector, self.scaled(other, factor))
 
 
-def _output(node, name: str):
+def _output(node: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
     """The enabled output with a name; before Blender 5 a node has one for each data type."""
     return next(socket for socket in node.outputs if socket.name == name and socket.enabled)
 
 
-def _input(node, name: str):
+def _input(node: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
     """The enabled input with a name."""
     return next(socket for socket in node.inputs if socket.name == name and socket.enabled)
 
 
-def _interface_input(group, name: str):
-    """An input of a group by its name, or None."""
+def _input_identifiers(group: bpy.types.NodeTree) -> dict[str, str]:
+    """The identifiers of the inputs of a group, by their names."""
     sockets = [item for item in group.interface.items_tree if item.item_type == "SOCKET"]
-    return next((item for item in sockets if item.name == name and item.in_out == "INPUT"), None)
+    return {item.name: item.identifier for item in sockets if item.in_out == "INPUT"}
 
 
-def _set_input(modifier, name: str, value) -> None:
-    identifier = _interface_input(modifier.node_group, name).identifier
+def _set_input(modifier: bpy.types.Modifier, name: str, value: bpy.types.Object | bool) -> None:
+    identifier = _input_identifiers(modifier.node_group)[name]
     if hasattr(modifier, "properties"):  # since Blender 5.2
         getattr(modifier.properties.inputs, identifier).value = value
     else:

@@ -1,16 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes a curve as a separate object, or as cut edges, a region or separate parts of its mesh."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import bpy
 import numpy as np
 
 import bmesh
 
 from ..scene import curve_record
+from ..scene.curve_record import CurveSettings, Drawn
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, check_finite, counted, sentence
+from ..scene.surface import Surface
 from . import curve_object, mesh_cut, sticky_curves, tube_radius
 from .clean_curves import EXACT, Drawing, automatic_radius, splines
+
+if TYPE_CHECKING:
+    from ...nicmm_core import CutMesh, Design, Mesh, Region, SurfaceCurve
+    from ...nicmm_core.outputs.polygons import CutPolygons
 
 SEPARATE = ("CURVE", "STICKY")
 """Outputs that are separate objects."""
@@ -28,19 +39,50 @@ INSIDE = ".nicmm_inside"
 REGION_NAME = "Region"
 
 
+class ObjectSettings(Protocol):
+    """The output settings of a new object, as properties of an operator or the sidebar."""
+
+    output: str
+    spline: str
+    radius: float
+    offset: float
+    thickness: float
+    tube: bool
+
+
+class OutputSettings(ObjectSettings, Protocol):
+    """All output settings."""
+
+    mark_seam: bool
+    mark_sharp: bool
+    cut_faces: str
+    simplify: float
+    region_as: str
+    region_cut: bool
+    other_side: bool
+    parts_as: str
+
+
 @dataclass
 class _Cutting:
     """A mesh object whose surface the core has cut along a curve, before Blender's mesh is cut."""
 
-    mesh_object: object
-    surface: object
-    core_mesh: object
-    cut: object
-    polygons: object
+    mesh_object: bpy.types.Object
+    surface: Surface
+    core_mesh: Mesh
+    cut: CutMesh
+    polygons: CutPolygons
     weights: np.ndarray
 
 
-def apply(context, mesh_object, surface, curves, settings, curve_settings) -> str:
+def apply(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    settings: OutputSettings,
+    curve_settings: CurveSettings,
+) -> str:
     """Create the chosen output and return a summary for the report.
 
     `settings` holds the output settings, `curve_settings` the settings of the curves.
@@ -68,7 +110,12 @@ def apply(context, mesh_object, surface, curves, settings, curve_settings) -> st
     return changes_mesh[settings.output](context, mesh_object, surface, curves[0], settings)
 
 
-def as_object(mesh_object, surface, curves, settings):
+def as_object(
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
+    settings: ObjectSettings,
+) -> bpy.types.Object:
     """Create an object that shows curves, without linking it to a collection."""
     for name in ("radius", "thickness", "offset"):
         check_finite(name, getattr(settings, name))
@@ -79,7 +126,7 @@ def as_object(mesh_object, surface, curves, settings):
     return curve_object.new_object(mesh_object, surface, splines(surface, curves, drawing), radius)
 
 
-def redraw(drawn, surface, curves) -> None:
+def redraw(drawn: bpy.types.Object, surface: Surface, curves: list[SurfaceCurve]) -> None:
     """Replace the curves in a curve object; its radius, materials and modifiers are kept.
 
     A linked duplicate gets data of its own, since its record describes only its own curve.
@@ -99,7 +146,7 @@ def redraw(drawn, surface, curves) -> None:
         curve_object.write_splines(drawn, splines(surface, curves, drawing))
 
 
-def _parent_again(drawn, surface) -> None:
+def _parent_again(drawn: bpy.types.Object, surface: Surface) -> None:
     """Put a child of the mesh in its place again; its radius in the scene is kept.
 
     The place depends on the scale of the mesh. Applying transforms of the mesh changes it, too.
@@ -111,7 +158,7 @@ def _parent_again(drawn, surface) -> None:
         tube_radius.set_radius(drawn, tube_radius.radius_of(drawn) * before / after)
 
 
-def show_unfinished(drawn, surface, curve) -> None:
+def show_unfinished(drawn: bpy.types.Object, surface: Surface, curve: SurfaceCurve) -> None:
     """Show a curve that is being changed in its object, with all points of the exact curve."""
     kind = curve_record.drawn_as(drawn) or {"offset": 0.0}
     drawing = Drawing(EXACT, 0.0, kind["offset"])
@@ -121,12 +168,12 @@ def show_unfinished(drawn, surface, curve) -> None:
         curve_object.write_splines(drawn, splines(surface, [curve], drawing))
 
 
-def drawn_as(settings) -> dict:
+def drawn_as(settings: ObjectSettings) -> Drawn:
     """The settings of a drawing that a record stores."""
     return {"spline": settings.spline, "offset": settings.offset}
 
 
-def check_replaceable(designed) -> None:
+def check_replaceable(designed: bpy.types.Object) -> None:
     """Raise an error if the points of a curve object cannot be replaced."""
     library = designed.library or designed.data.library
     if library is not None:
@@ -154,7 +201,7 @@ def check_replaceable(designed) -> None:
         )
 
 
-def replace(designed, request, answer) -> None:
+def replace(designed: bpy.types.Object, request: DesignRequest, answer: Design | Exception) -> None:
     """Replace the curve in a curve object with the curve of an answer."""
     if isinstance(answer, Exception):
         raise InputError(str(answer)) from answer
@@ -171,7 +218,13 @@ def replace(designed, request, answer) -> None:
     )
 
 
-def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cutting:
+def _cutting(
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curve: SurfaceCurve,
+    settings: OutputSettings,
+    joined: bool = True,
+) -> _Cutting:
     from ... import nicmm_core as nicmm
     from ...nicmm_core.outputs.polygons import cut_polygons
 
@@ -184,7 +237,13 @@ def _cutting(mesh_object, surface, curve, settings, joined: bool = True) -> _Cut
     return _Cutting(mesh_object, surface, core_mesh, cut, polygons, weights)
 
 
-def _cut_edges(context, mesh_object, surface, curve, settings) -> str:
+def _cut_edges(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curve: SurfaceCurve,
+    settings: OutputSettings,
+) -> str:
     cutting = _cutting(mesh_object, surface, curve, settings)
     normals = mesh_cut.CornerNormals(mesh_object)
     context.tool_settings.mesh_select_mode = (False, True, False)
@@ -199,11 +258,16 @@ def _cut_edges(context, mesh_object, surface, curve, settings) -> str:
     return f"mesh cut along the curve, {along}{_custom_normals_note(mesh_object)}"
 
 
-def _region(context, mesh_object, surface, curve, settings) -> str:
+def _region(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curve: SurfaceCurve,
+    settings: OutputSettings,
+) -> str:
     cutting = _cutting(mesh_object, surface, curve, settings)
     region = _enclosed(cutting, settings.other_side)
     normals = mesh_cut.CornerNormals(mesh_object) if settings.region_cut else None
-    group = None
     if settings.region_as == "VERTEX_GROUP":
         group = mesh_object.vertex_groups.new(name=REGION_NAME)
     if settings.region_as == "SELECTION":
@@ -230,38 +294,53 @@ def _region(context, mesh_object, surface, curve, settings) -> str:
                 vertices[index][layer][group.index] = 1.0
     if normals is not None:
         _set_normals(mesh_object, normals, cutting)
-    what = {"SELECTION": "selected", "FACE_SET": "now a face set"}.get(
-        settings.region_as, f'in the vertex group "{group.name}"' if group else ""
-    )
+    what = {"SELECTION": "selected", "FACE_SET": "now a face set"}.get(settings.region_as)
+    what = what or f'in the vertex group "{group.name}"'
     words = _custom_normals_note(mesh_object) if settings.region_cut else ""
     return f"{counted(len(chosen), 'face')} of the region {_are(len(chosen))} {what}{words}"
 
 
-def _parts(context, mesh_object, surface, curve, settings) -> str:
+def _parts(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curve: SurfaceCurve,
+    settings: OutputSettings,
+) -> str:
     cutting = _cutting(mesh_object, surface, curve, settings)
-    as_objects = settings.parts_as == "OBJECTS"
-    region = _enclosed(cutting, settings.other_side) if as_objects else None
     normals = mesh_cut.CornerNormals(mesh_object)
-    other_data = mesh_object.data.copy() if as_objects else None
+    if settings.parts_as == "OBJECTS":
+        return _part_as_object(context, cutting, normals, _enclosed(cutting, settings.other_side))
     with mesh_cut.editable(mesh_object) as edited:
-        layer = edited.faces.layers.int.new(INSIDE) if as_objects else None
+        vertices, _ = _cut_in_blender(edited, cutting)
+        edges = _chain_edges(edited, cutting, vertices)
+        bmesh.ops.split_edges(edited, edges=edges)
+    _set_normals(mesh_object, normals, cutting)
+    return f"separated along {len(edges)} edges{_custom_normals_note(mesh_object)}"
+
+
+def _part_as_object(
+    context: bpy.types.Context,
+    cutting: _Cutting,
+    normals: mesh_cut.CornerNormals,
+    region: Region,
+) -> str:
+    mesh_object = cutting.mesh_object
+    other_data = mesh_object.data.copy()
+    inside = _faces_inside(cutting, region)
+    with mesh_cut.editable(mesh_object) as edited:
+        layer = edited.faces.layers.int.new(INSIDE)
         vertices, faces = _cut_in_blender(edited, cutting)
         edges = _chain_edges(edited, cutting, vertices)
-        if as_objects:
-            inside = _faces_inside(cutting, region)
-            for index in np.flatnonzero(inside).tolist():
-                faces[index][layer] = 1
+        for index in np.flatnonzero(inside).tolist():
+            faces[index][layer] = 1
         bmesh.ops.split_edges(edited, edges=edges)
-        if as_objects:
-            _take_inside(edited, other_data)
-    if not as_objects:
-        _set_normals(mesh_object, normals, cutting)
-        return f"separated along {len(edges)} edges{_custom_normals_note(mesh_object)}"
+        _take_inside(edited, other_data)
     other = mesh_object.copy()
     other.data = other_data
     curve_object.link(context, mesh_object, other)
     if normals.has_values:
-        values = normals.after_cut(surface, cutting.cut, cutting.polygons, cutting.weights)
+        values = normals.after_cut(cutting.surface, cutting.cut, cutting.polygons, cutting.weights)
         sizes = _corner_counts(normals, cutting)
         mesh_object.data.normals_split_custom_set(values[np.repeat(~inside, sizes)].tolist())
         other_data.normals_split_custom_set(values[np.repeat(inside, sizes)].tolist())
@@ -273,7 +352,7 @@ def _are(count: int) -> str:
     return "is" if count == 1 else "are"
 
 
-def _take_inside(edited, other_data) -> None:
+def _take_inside(edited: bmesh.types.BMesh, other_data: bpy.types.Mesh) -> None:
     """Move the faces marked as inside to another mesh."""
     other = edited.copy()
     try:
@@ -289,7 +368,7 @@ def _take_inside(edited, other_data) -> None:
         other.free()
 
 
-def _cut_in_blender(edited, cutting: _Cutting) -> tuple[list, list]:
+def _cut_in_blender(edited: bmesh.types.BMesh, cutting: _Cutting) -> tuple[list, list]:
     return mesh_cut.apply(
         edited,
         cutting.mesh_object.data,
@@ -300,19 +379,19 @@ def _cut_in_blender(edited, cutting: _Cutting) -> tuple[list, list]:
     )
 
 
-def _chain_edges(edited, cutting: _Cutting, vertices: list) -> list:
+def _chain_edges(edited: bmesh.types.BMesh, cutting: _Cutting, vertices: list) -> list:
     pairs = cutting.cut.chain_edges.tolist()
     return [edited.edges.get((vertices[a], vertices[b])) for a, b in pairs]
 
 
-def _enclosed(cutting: _Cutting, other_side: bool):
+def _enclosed(cutting: _Cutting, other_side: bool) -> Region:
     from ... import nicmm_core as nicmm
 
     region = nicmm.enclosed_region(cutting.core_mesh, cutting.cut)
     return region.complement(cutting.core_mesh, cutting.cut) if other_side else region
 
 
-def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
+def _faces_inside(cutting: _Cutting, region: Region) -> np.ndarray:
     """Which faces of the cut Blender mesh are inside: first the unchanged faces, then the new."""
     n_polygons = int(cutting.surface.polygons.max()) + 1
     by_polygon = np.zeros(n_polygons, dtype=bool)
@@ -323,14 +402,14 @@ def _faces_inside(cutting: _Cutting, region) -> np.ndarray:
     return np.concatenate([by_polygon[stays], np.array(new, dtype=bool)])
 
 
-def _mostly_inside(cutting: _Cutting, region) -> np.ndarray:
+def _mostly_inside(cutting: _Cutting, region: Region) -> np.ndarray:
     """Which faces of the uncut Blender mesh have more than half of their area inside."""
     polygons, areas = cutting.surface.polygons, cutting.core_mesh.face_areas
     within = np.bincount(polygons, areas * region.share)
     return within > 0.5 * np.bincount(polygons, areas)
 
 
-def _region_layer(edited, region_as: str):
+def _region_layer(edited: bmesh.types.BMesh, region_as: str) -> bmesh.types.BMLayerItem | None:
     if region_as == "VERTEX_GROUP":
         return edited.verts.layers.deform.verify()
     if region_as == "SELECTION":
@@ -343,7 +422,7 @@ def _region_layer(edited, region_as: str):
     return layer
 
 
-def _select_only(edited, mode: str, elements: list) -> None:
+def _select_only(edited: bmesh.types.BMesh, mode: str, elements: list) -> None:
     edited.select_history.clear()
     for sequence in (edited.faces, edited.edges, edited.verts):
         for element in sequence:
@@ -354,13 +433,15 @@ def _select_only(edited, mode: str, elements: list) -> None:
     edited.select_flush_mode()
 
 
-def _set_normals(mesh_object, normals, cutting: _Cutting) -> None:
+def _set_normals(
+    mesh_object: bpy.types.Object, normals: mesh_cut.CornerNormals, cutting: _Cutting
+) -> None:
     if normals.has_values:
         values = normals.after_cut(cutting.surface, cutting.cut, cutting.polygons, cutting.weights)
         mesh_object.data.normals_split_custom_set(values.tolist())
 
 
-def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
+def _corner_counts(normals: mesh_cut.CornerNormals, cutting: _Cutting) -> np.ndarray:
     """Number of corners of each face of the cut Blender mesh."""
     counts = np.diff(normals.loop_starts, append=len(normals.values))
     stays = np.ones(len(counts), dtype=bool)
@@ -368,7 +449,7 @@ def _corner_counts(normals, cutting: _Cutting) -> np.ndarray:
     return np.concatenate([counts[stays], [len(c) for c in cutting.polygons.corners]]).astype(int)
 
 
-def _custom_normals_note(mesh_object) -> str:
+def _custom_normals_note(mesh_object: bpy.types.Object) -> str:
     if mesh_object.data.has_custom_normals and mesh_object.mode == "EDIT":
         return (
             ". Custom normals near the cut are approximate; cut in Object Mode to interpolate them"

@@ -6,13 +6,22 @@ modifiers carry these attributes over to the surface. The user's mesh is never w
 would report it as changed, and a mesh linked from another file cannot be written to at all.
 """
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
 import numpy as np
 
 from .isolation import evaluated_in_isolation
 from .mesh_arrays import corner_vertices, read, triangle_faces
 from .mesh_arrays import positions as positions_of
+
+if TYPE_CHECKING:
+    from .surface import Surface
 
 VERTEX, FACE, FACE_COORDINATES = "nicmm_vertex", "nicmm_face", "nicmm_place"
 """Names of the attributes of the copy."""
@@ -52,7 +61,7 @@ class CageTrace:
 
     positions: np.ndarray
     vertices: np.ndarray
-    sizes: tuple
+    sizes: tuple[int, int, int]
     corners: np.ndarray
     faces: np.ndarray
     face_coordinates: np.ndarray
@@ -78,7 +87,12 @@ class CagePoints:
     copies: np.ndarray
 
 
-def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
+def trace(
+    mesh_object: bpy.types.Object,
+    shown: bpy.types.Mesh,
+    loops: np.ndarray,
+    cage_mesh: Callable[[bpy.types.Object], AbstractContextManager[bpy.types.Mesh]],
+) -> CageTrace | None:
     """Trace the cage of an object through its modifiers.
 
     Returns None if the modifiers leave the faces as they are, since then vertices and faces of the
@@ -104,14 +118,14 @@ def trace(mesh_object, shown, loops: np.ndarray, cage_mesh) -> CageTrace | None:
         return _Copy(mesh_object, cage).trace(shown, loops)
 
 
-def with_identity_trace(surface):
+def identity_trace(surface: Surface) -> CageTrace:
     """Describe the surface of a cage as generated from itself, each face being its own source."""
     polygons, loops = surface.polygons, surface.loops
     totals = np.bincount(polygons) + 2
     starts = np.full(len(totals), np.iinfo(np.int64).max)
     np.minimum.at(starts, polygons, loops.min(axis=1))
     number = loops - starts[polygons][:, None]
-    identity = CageTrace(
+    return CageTrace(
         positions=surface.local_positions,
         vertices=np.arange(len(surface.local_positions)),
         sizes=(len(surface.local_positions), len(totals), int(loops.max()) + 1),
@@ -119,7 +133,6 @@ def with_identity_trace(surface):
         faces=polygons,
         face_coordinates=_on_circle(number, totals[polygons][:, None]),
     )
-    return replace(surface, cage=identity)
 
 
 def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
@@ -128,22 +141,25 @@ def _on_circle(number: np.ndarray, total: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def to_cage_points(surface, faces: np.ndarray, barycentric: np.ndarray) -> CagePoints:
+def to_cage_points(
+    surface: Surface, cage: CageTrace, faces: np.ndarray, barycentric: np.ndarray
+) -> CagePoints:
     """Find points of a generated surface in faces of the cage.
 
     Parameters
     ----------
     surface : Surface
-        A surface with a `cage`.
+        The generated surface.
+    cage : CageTrace
+        Its relation to the cage.
     faces : (k,) int array
         Triangle of each point.
     barycentric : (k, 3) float array
         Barycentric coordinates of each point in its triangle.
     """
-    cage = surface.cage
     coordinates = np.einsum("nj,njk->nk", barycentric, cage.face_coordinates[faces])
     found = CagePoints(cage.faces[faces], coordinates, np.zeros(len(faces), dtype=np.int64))
-    triangles = _TrianglesOf(surface, found.faces)
+    triangles = _TrianglesOf(surface, cage, found.faces)
     for number, position in enumerate(surface.points(faces, barycentric)):
         copies = triangles.at(int(found.faces[number]), coordinates[number])
         away = [np.linalg.norm(surface.points(*copy)[0] - position) for copy in copies]
@@ -154,7 +170,9 @@ def to_cage_points(surface, faces: np.ndarray, barycentric: np.ndarray) -> CageP
     return found
 
 
-def to_surface_points(surface, cage_points: CagePoints) -> tuple[np.ndarray, np.ndarray]:
+def to_surface_points(
+    surface: Surface, cage: CageTrace, cage_points: CagePoints
+) -> tuple[np.ndarray, np.ndarray]:
     """Find points in faces of the cage on a generated surface.
 
     Returns
@@ -165,7 +183,7 @@ def to_surface_points(surface, cage_points: CagePoints) -> tuple[np.ndarray, np.
         Barycentric coordinates of each point in its triangle.
     """
     faces, barycentric = np.full(len(cage_points.faces), -1), np.zeros((len(cage_points.faces), 3))
-    triangles = _TrianglesOf(surface, cage_points.faces)
+    triangles = _TrianglesOf(surface, cage, cage_points.faces)
     for number, (face, copy) in enumerate(zip(cage_points.faces, cage_points.copies, strict=True)):
         copies = triangles.at(int(face), cage_points.face_coordinates[number])
         if copy < len(copies):
@@ -176,25 +194,25 @@ def to_surface_points(surface, cage_points: CagePoints) -> tuple[np.ndarray, np.
 class _TrianglesOf:
     """Looks up the triangles of a surface that come from given faces of the cage."""
 
-    def __init__(self, surface, faces: np.ndarray) -> None:
-        self.surface = surface
-        from_these = np.flatnonzero(np.isin(surface.cage.faces, faces))
-        self.order = from_these[np.argsort(surface.cage.faces[from_these], kind="stable")]
-        self.sorted = surface.cage.faces[self.order]
+    def __init__(self, surface: Surface, cage: CageTrace, faces: np.ndarray) -> None:
+        self.surface, self.cage = surface, cage
+        from_these = np.flatnonzero(np.isin(cage.faces, faces))
+        self.order = from_these[np.argsort(cage.faces[from_these], kind="stable")]
+        self.sorted = cage.faces[self.order]
 
-    def at(self, face: int, coordinates: np.ndarray) -> list:
+    def at(self, face: int, coordinates: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """All copies of a point, each as triangle (1,) and barycentric coordinates (1, 3)."""
         if face < 0:
             return []
         first, last = np.searchsorted(self.sorted, [face, face + 1])
         triangles = self.order[first:last]
-        barycentric = _barycentric(self.surface.cage.face_coordinates[triangles], coordinates)
+        barycentric = _barycentric(self.cage.face_coordinates[triangles], coordinates)
         inside = np.flatnonzero(barycentric.min(axis=1, initial=1.0) >= INSIDE)
         weights = np.clip(barycentric[inside], 0.0, None)
         weights /= weights.sum(axis=1, keepdims=True)
         positions = self.surface.points(triangles[inside], weights)
-        copies: list = []
-        where: list = []
+        copies: list[tuple[np.ndarray, np.ndarray]] = []
+        where: list[np.ndarray] = []
         for triangle, weight, position in zip(triangles[inside], weights, positions, strict=True):
             near = SAME_POSITION * self.surface.diagonal
             if all(np.linalg.norm(position - other) > near for other in where):
@@ -221,11 +239,11 @@ def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 class _Copy:
     """A copy of an object, to be evaluated in a separate scene, whose mesh has the attributes."""
 
-    def __init__(self, mesh_object, cage) -> None:
+    def __init__(self, mesh_object: bpy.types.Object, cage: bpy.types.Mesh) -> None:
         self.mesh_object, self.cage = mesh_object, cage
         self.identities = np.random.default_rng(0).random((len(cage.vertices), 3), np.float32)
 
-    def trace(self, shown, loops: np.ndarray) -> CageTrace:
+    def trace(self, shown: bpy.types.Mesh, loops: np.ndarray) -> CageTrace:
         """Evaluate the copy and read its attributes."""
         copy = self.mesh_object.copy()
         copy.data = self.cage.copy()
@@ -237,7 +255,7 @@ class _Copy:
         with evaluated_in_isolation(copy) as evaluated:
             return self._read(evaluated, shown, loops, collapses)
 
-    def _write(self, data) -> None:
+    def _write(self, data: bpy.types.Mesh) -> None:
         starts, totals = (
             read(data.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total")
         )
@@ -252,7 +270,9 @@ class _Copy:
         ):
             data.attributes.new(name, kind, domain).data.foreach_set(field, values.ravel())
 
-    def _read(self, mesh, shown, loops: np.ndarray, collapses: bool) -> CageTrace:
+    def _read(
+        self, mesh: bpy.types.Mesh, shown: bpy.types.Mesh, loops: np.ndarray, collapses: bool
+    ) -> CageTrace:
         positions = positions_of(self.cage)
         vertices = np.full(len(positions), -1)
         faces, coordinates = np.full(len(loops), -1), np.zeros((*loops.shape, 2), np.float32)
@@ -280,7 +300,7 @@ class _Copy:
         return CageTrace(positions, vertices, sizes, corners, faces, coordinates)
 
 
-def _have_equal_faces(one, other) -> bool:
+def _have_equal_faces(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     return _sizes(one) == _sizes(other) and np.array_equal(
         corner_vertices(one), corner_vertices(other)
     )
@@ -303,5 +323,5 @@ def _keys(rows: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(rows[:, :2]).view(np.uint64)[:, 0]
 
 
-def _sizes(mesh) -> tuple:
+def _sizes(mesh: bpy.types.Mesh) -> tuple[int, int, int]:
     return len(mesh.vertices), len(mesh.polygons), len(mesh.loops)

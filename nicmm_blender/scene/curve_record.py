@@ -8,18 +8,27 @@ a surface that modifiers generate, each control point is also stored by the face
 comes from, because that face stays the same when the subdivision level changes.
 """
 
+from __future__ import annotations
+
 import hashlib
-from dataclasses import asdict, field, fields, make_dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import bpy
 import numpy as np
 
 from ...nicmm_core.options import OPTIONS, Kind
 from . import mesh_data, record_check, surface_cache
-from .cage_trace import CagePoints, to_cage_points, to_surface_points, with_identity_trace
+from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .lookup import is_in
 from .messages import InputError, check_finite
-from .surface import group_weights, read
+from .record_check import Record
+from .surface import Surface, group_weights, read
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ...nicmm_core.options import Option
 
 RECORD_KEY = "nicmm_curve"
 """Custom property of the object that holds the record."""
@@ -38,23 +47,21 @@ DIGEST_KEY = "nicmm_designed_on"
 """Custom property of the object's data that holds the digest at the time of the design."""
 
 
+class Drawn(TypedDict):
+    """How a curve is drawn."""
+
+    spline: str
+    offset: float
+
+
 def identifier(name: str) -> str:
     """The Blender identifier of one of the core's choices."""
     return name.upper().replace("-", "_")
 
 
-def property_name(option) -> str:
+def property_name(option: Option) -> str:
     """The name of the Blender property for a core option; for weights it names a vertex group."""
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
-
-
-def _default(option):
-    """The default of the Blender property for a core option."""
-    if option.kind is Kind.WEIGHTS:
-        return ""
-    if option.kind is Kind.CHOICE:
-        return identifier(option.default)
-    return option.default
 
 
 WITHOUT_MODIFIERS = ", use_modifiers=False"
@@ -70,34 +77,36 @@ RECORDED = tuple(
 """Options that a record stores."""
 
 
-def _check_finite(settings) -> None:
-    """Raise an error if a setting is NaN or infinite."""
-    for name, value in asdict(settings).items():
-        check_finite(name, value)
+@dataclass(frozen=True)
+class CurveSettings:
+    """The settings of a curve, besides its control points: `RECORDED`, and the use of modifiers."""
+
+    closed: bool = True
+    method: str = "NICMM"
+    smoothness: float = 1.0
+    obstacle_group: str = ""
+    clearance: float = 0.0
+    alignment_group: str = ""
+    use_modifiers: bool = True
+
+    def __post_init__(self) -> None:
+        """Raise an error if a setting is NaN or infinite."""
+        for name, value in asdict(self).items():
+            check_finite(name, value)
+
+    def with_value(self, name: str, value: bool | float | str) -> CurveSettings:
+        """A copy with another value of the setting with a name."""
+        changed: dict[str, Any] = {name: value}
+        return replace(self, **changed)
 
 
-CurveSettings = make_dataclass(
-    "CurveSettings",
-    [
-        (property_name(option), type(_default(option)), field(default=_default(option)))
-        for option in RECORDED
-    ]
-    + [("use_modifiers", bool, field(default=True))],
-    frozen=True,
-    namespace={
-        "__doc__": "The settings of a curve, besides its control points.",
-        "__post_init__": _check_finite,
-    },
-)
-
-
-def groups_of(settings: CurveSettings) -> list:
+def groups_of(settings: CurveSettings) -> list[str]:
     """Names of the vertex groups that a curve depends on; an empty name means none."""
     names = [property_name(option) for option in RECORDED if option.kind is Kind.WEIGHTS]
     return [getattr(settings, name) for name in names]
 
 
-def arguments_of(settings: CurveSettings, weights) -> dict:
+def arguments_of(settings: CurveSettings, weights: Callable[[str], np.ndarray | None]) -> dict:
     """Settings as keyword arguments for the core.
 
     `weights` is a function from the name of a vertex group to its weights, and from "" to None.
@@ -116,7 +125,7 @@ def arguments_of(settings: CurveSettings, weights) -> dict:
     return values
 
 
-def settings_from(properties) -> CurveSettings:
+def settings_from(properties: bpy.types.Operator | bpy.types.PropertyGroup) -> CurveSettings:
     """The settings of a curve from the properties of an operator or the scene."""
     return CurveSettings(
         **{field.name: getattr(properties, field.name) for field in fields(CurveSettings)}
@@ -124,13 +133,13 @@ def settings_from(properties) -> CurveSettings:
 
 
 def write_record(
-    curve_object,
-    mesh_object,
-    surface,
-    curves,
+    curve_object: bpy.types.Object,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    curves: list[SurfaceCurve],
     settings: CurveSettings,
-    drawn: dict | None,
-    controls=None,
+    drawn: Drawn | None,
+    controls: SurfacePoints | None = None,
 ) -> None:
     """Store the positions of curves on the mesh, their settings and how they are drawn.
 
@@ -161,7 +170,7 @@ def write_record(
         control_faces, control_barycentric = controls.faces, controls.barycentric
     known = {"positions": surface.points(control_faces, control_barycentric)}
     if surface.cage is not None:
-        cage_points = to_cage_points(surface, control_faces, control_barycentric)
+        cage_points = to_cage_points(surface, surface.cage, control_faces, control_barycentric)
         known |= {"cage_faces": cage_points.faces, "cage_places": cage_points.face_coordinates}
         known["cage_copies"] = cage_points.copies
     curve_object[RECORD_KEY] = {
@@ -193,7 +202,7 @@ def _flat(arrays: list) -> list:
     return [value for array in arrays for value in array.ravel().tolist()]
 
 
-def digest(mesh_object, surface, settings: CurveSettings) -> str:
+def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSettings) -> str:
     """A hash of everything that a curve depends on besides its control points."""
     # Digests in saved files must remain valid: the text begins with the first name of the class,
     # and without modifiers it is that of version 1.
@@ -211,24 +220,24 @@ def digest(mesh_object, surface, settings: CurveSettings) -> str:
     return found.hexdigest()
 
 
-def digest_of(curve_object) -> str:
+def digest_of(curve_object: bpy.types.Object) -> str:
     """The digest that a curve was designed with; empty if it has none."""
     return curve_object.data.get(DIGEST_KEY, "")
 
 
-def is_current(curve_object, now: str) -> bool:
+def is_current(curve_object: bpy.types.Object, now: str) -> bool:
     """Whether a curve was designed with the digest `now`."""
     return digest_of(curve_object) == now
 
 
-def _checked_record(curve_object):
+def _checked_record(curve_object: bpy.types.Object) -> Record:
     """The record of a curve; an error if its version, settings or points cannot be used."""
     record = _record_with_checked_settings(curve_object)
     _refuse(curve_object, record_check.problem_of(record))
     return record
 
 
-def _record_with_checked_settings(curve_object):
+def _record_with_checked_settings(curve_object: bpy.types.Object) -> Record:
     """The record of a curve; an error if its version or settings cannot be used."""
     record = curve_object[RECORD_KEY]
     version = record.get("version", 0)
@@ -243,7 +252,7 @@ def _record_with_checked_settings(curve_object):
     return record
 
 
-def _refuse(curve_object, problem: str) -> None:
+def _refuse(curve_object: bpy.types.Object, problem: str) -> None:
     """Raise an error if there is a problem with the record."""
     if problem:
         raise InputError(
@@ -252,24 +261,24 @@ def _refuse(curve_object, problem: str) -> None:
         )
 
 
-def has_record(candidate) -> bool:
+def has_record(candidate: bpy.types.Object | None) -> bool:
     """Whether an object is a designed curve."""
     if candidate is None or candidate.type not in KINDS or RECORD_KEY not in candidate:
         return False
     return record_check.is_group(candidate[RECORD_KEY])
 
 
-def number_of_curves(curve_object) -> int:
+def number_of_curves(curve_object: bpy.types.Object) -> int:
     """The number of curves in a designed object; 0 for a drawing that has too few points."""
     return len(_checked_record(curve_object)["counts"])
 
 
-def has_curve(curve_object) -> bool:
+def has_curve(curve_object: bpy.types.Object) -> bool:
     """Whether a designed curve has enough points for a curve."""
     return number_of_curves(curve_object) > 0
 
 
-def is_unfinished(curve_object) -> bool:
+def is_unfinished(curve_object: bpy.types.Object) -> bool:
     """Whether a drawing has too few points for a curve; False if its record is damaged."""
     try:
         return not has_curve(curve_object)
@@ -277,7 +286,7 @@ def is_unfinished(curve_object) -> bool:
         return False
 
 
-def mesh_of(curve_object):
+def mesh_of(curve_object: bpy.types.Object) -> bpy.types.Object | None:
     """The mesh object that a curve was designed on, or None if it no longer exists."""
     found = curve_object[RECORD_KEY].get("mesh")
     override = getattr(curve_object.parent, "override_library", None)
@@ -286,7 +295,9 @@ def mesh_of(curve_object):
     return found if isinstance(found, bpy.types.Object) and found.type == "MESH" else None
 
 
-def mesh_in_view_layer(context, curve_object):
+def mesh_in_view_layer(
+    context: bpy.types.Context, curve_object: bpy.types.Object
+) -> bpy.types.Object:
     """The mesh object that a curve was designed on; an error if it is not in the view layer."""
     found = mesh_of(curve_object)
     if found is not None and is_in(context.view_layer, found):
@@ -299,7 +310,7 @@ def mesh_in_view_layer(context, curve_object):
     raise _missing_mesh_error(curve_object)
 
 
-def mesh_in_any_scene(curve_object):
+def mesh_in_any_scene(curve_object: bpy.types.Object) -> bpy.types.Object:
     """The mesh object that a curve was designed on; an error if it is in no scene."""
     found = mesh_of(curve_object)
     if found is None or not found.users_scene:
@@ -307,14 +318,14 @@ def mesh_in_any_scene(curve_object):
     return found
 
 
-def _missing_mesh_error(curve_object) -> InputError:
+def _missing_mesh_error(curve_object: bpy.types.Object) -> InputError:
     return InputError(
         f'The mesh that "{curve_object.name}" was designed on is not in this scene. '
         "Link it to the scene, or draw the curve again"
     )
 
 
-def mesh_of_context(context):
+def mesh_of_context(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active mesh, or the mesh of the active designed curve."""
     active = context.active_object
     if has_record(active):
@@ -322,7 +333,7 @@ def mesh_of_context(context):
     return mesh_data.mesh_object(context)
 
 
-def curves_on(context, mesh_object) -> list:
+def curves_on(context: bpy.types.Context, mesh_object: bpy.types.Object) -> list:
     """Visible curve objects of the view layer that were designed on a mesh."""
     return [
         found
@@ -331,7 +342,7 @@ def curves_on(context, mesh_object) -> list:
     ]
 
 
-def positions_of(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
+def positions_of(curve_object: bpy.types.Object, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Control points, (k, 3), and points of the curve, (n, 3), in the mesh's local space.
 
     Points whose triangle no longer exists are left out; a closed curve ends with its first point.
@@ -351,7 +362,7 @@ def positions_of(curve_object, surface) -> tuple[np.ndarray, np.ndarray]:
     return points, line
 
 
-def lies_on(curve_object, surface) -> bool:
+def lies_on(curve_object: bpy.types.Object, surface: Surface) -> bool:
     """Whether all triangles of a curve still exist; False if it has no curve yet."""
     record = _checked_record(curve_object)
     return len(record["counts"]) > 0 and bool(
@@ -359,13 +370,13 @@ def lies_on(curve_object, surface) -> bool:
     )
 
 
-def designed_on(mesh_object) -> list:
+def designed_on(mesh_object: bpy.types.Object) -> list:
     """All curve objects designed on a mesh object, sorted by name."""
     found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
     return sorted(found, key=lambda each: each.name)
 
 
-def settings_of(curve_object) -> CurveSettings:
+def settings_of(curve_object: bpy.types.Object) -> CurveSettings:
     """The settings of a curve."""
     record = _record_with_checked_settings(curve_object)
     stored = record.get("asked")
@@ -374,19 +385,19 @@ def settings_of(curve_object) -> CurveSettings:
     before = {"use_modifiers": False}  # how versions behaved that did not record a setting
     return CurveSettings(
         **{
-            field.name: field.type(stored.get(field.name, before.get(field.name, field.default)))
-            for field in fields(CurveSettings)
+            name: type(default)(stored.get(name, before.get(name, default)))
+            for name, default in asdict(CurveSettings()).items()
         }
     )
 
 
-def drawn_as(curve_object) -> dict | None:
+def drawn_as(curve_object: bpy.types.Object) -> Drawn | None:
     """How a curve is drawn; None if an earlier version made it, which drew all points."""
     found = _record_with_checked_settings(curve_object).get("drawn")
     return None if found is None else {"spline": found["spline"], "offset": found["offset"]}
 
 
-def no_curve_message(curve_object) -> str:
+def no_curve_message(curve_object: bpy.types.Object) -> str:
     """The message for a drawing that has too few points for a curve."""
     count = len(_checked_record(curve_object)["control_corners"]) // 3
     return (
@@ -395,12 +406,12 @@ def no_curve_message(curve_object) -> str:
     )
 
 
-def surface_of(curve_object, mesh_object):
+def surface_of(curve_object: bpy.types.Object, mesh_object: bpy.types.Object) -> Surface:
     """The current surface that a curve lies on."""
     return read(mesh_object, settings_of(curve_object).use_modifiers)
 
 
-def read_curves(curve_object, surface) -> list:
+def read_curves(curve_object: bpy.types.Object, surface: Surface) -> list:
     """The recorded curves as curves of the core, on the current surface."""
     from ... import nicmm_core as nicmm
 
@@ -428,7 +439,9 @@ def read_curves(curve_object, surface) -> list:
     return curves
 
 
-def read_control_points(curve_object, surface) -> tuple[object, np.ndarray | None]:
+def read_control_points(
+    curve_object: bpy.types.Object, surface: Surface
+) -> tuple[SurfacePoints, np.ndarray]:
     """The control points of a curve as SurfacePoints, and their positions when it was designed.
 
     The face of a point is -1 if its triangle no longer exists. Positions, (k, 3), are in the local
@@ -447,7 +460,9 @@ def read_control_points(curve_object, surface) -> tuple[object, np.ndarray | Non
     return found, np.array(record["control_positions"], dtype=np.float64).reshape(-1, 3)
 
 
-def current_control_points(curve_object, mesh_object, surface) -> tuple[object, int]:
+def current_control_points(
+    curve_object: bpy.types.Object, mesh_object: bpy.types.Object, surface: Surface
+) -> tuple[SurfacePoints, int]:
     """The control points of a curve on the current surface, and how many of them were moved.
 
     A point whose triangle no longer exists is located by the face of the cage that it came from. If
@@ -462,10 +477,10 @@ def current_control_points(curve_object, mesh_object, surface) -> tuple[object, 
     faces, barycentric = points.faces.copy(), points.barycentric.copy()
     lost = faces < 0
     if lost.any():
-        traced = with_identity_trace(surface) if surface.cage is None else surface
-        cage_points = _cage_points(curve_object, mesh_object, traced.cage.sizes)
+        cage = identity_trace(surface) if surface.cage is None else surface.cage
+        cage_points = _cage_points(curve_object, mesh_object, cage.sizes)
         if cage_points is not None:
-            there, weights = to_surface_points(traced, cage_points)
+            there, weights = to_surface_points(surface, cage, cage_points)
             faces[lost], barycentric[lost] = there[lost], weights[lost]
     lost = faces < 0
     if lost.any():
@@ -475,7 +490,9 @@ def current_control_points(curve_object, mesh_object, surface) -> tuple[object, 
     return nicmm.SurfacePoints(faces, barycentric), int(lost.sum())
 
 
-def _cage_points(curve_object, mesh_object, sizes: tuple) -> CagePoints | None:
+def _cage_points(
+    curve_object: bpy.types.Object, mesh_object: bpy.types.Object, sizes: tuple[int, int, int]
+) -> CagePoints | None:
     """The control points of a curve in faces of the cage; None if unknown.
 
     `sizes` are the current numbers of vertices, faces and corners of the cage.
@@ -494,12 +511,14 @@ def _cage_points(curve_object, mesh_object, sizes: tuple) -> CagePoints | None:
     there = points.faces >= 0
     if not there.any():
         return None
-    found = to_cage_points(with_identity_trace(cage), points.faces, points.barycentric)
+    found = to_cage_points(cage, identity_trace(cage), points.faces, points.barycentric)
     found.faces[~there] = -1
     return found
 
 
-def _find_points(record, corners_name: str, weights_name: str, surface):
+def _find_points(
+    record: Record, corners_name: str, weights_name: str, surface: Surface
+) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (n,) and barycentric coordinates (n, 3) of recorded points.
 
     The triangle is -1 if it no longer exists.
@@ -512,7 +531,7 @@ def _find_points(record, corners_name: str, weights_name: str, surface):
     return faces, np.take_along_axis(barycentric, order, axis=1)
 
 
-def _keeps_indices(record, surface) -> bool:
+def _keeps_indices(record: Record, surface: Surface) -> bool:
     """Whether vertices of the surface have the indices that they had when a curve was designed.
 
     A deformation and turned normals keep them. Many operators that add or remove faces do not; then
@@ -526,7 +545,7 @@ def _keeps_indices(record, surface) -> bool:
     return record.get("triangles") == surface.triangles_digest or not _is_elsewhere(record, surface)
 
 
-def _is_elsewhere(record, surface) -> bool:
+def _is_elsewhere(record: Record, surface: Surface) -> bool:
     """Whether control points found by indices have moved although the surface is still there.
 
     Where a deformation has moved a point, the surface has left the former position, too.

@@ -5,9 +5,13 @@ The main thread reads the data. `answer` does not access Blender's data, so it c
 slices (`operators.time_slices`).
 """
 
+from __future__ import annotations
+
 import contextlib
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
+import bpy
 import numpy as np
 
 from ...nicmm_core.options import FEWEST_CLOSED, FEWEST_OPEN
@@ -16,6 +20,13 @@ from .curve_record import CurveSettings
 from .lookup import by_uid
 from .messages import InputError, user_message
 from .surface import Surface, group_weights, read
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
+    from ...nicmm_core.progress import Progress
+
+    Answer = Design | Exception
+    """What a request leads to."""
 
 
 @dataclass(frozen=True)
@@ -29,14 +40,14 @@ class DesignRequest:
     mesh_name: str
     mesh_uid: int
     surface: Surface
-    points: object
+    points: np.ndarray | SurfacePoints
     order: str
     settings: CurveSettings
-    options: dict
-    start: object = None
+    options: dict[str, Any]
+    start: Design | SurfaceCurve | None = None
     moved: int = 0
 
-    def mesh_object(self):
+    def mesh_object(self) -> bpy.types.Object | None:
         """The mesh object, or None if it has been removed."""
         return by_uid(self.mesh_uid)
 
@@ -62,7 +73,13 @@ class DesignRequest:
         return local @ local_to_world[:3, :3].T + local_to_world[:3, 3]
 
 
-def for_points(mesh_object, surface, points, order: str, settings: CurveSettings) -> DesignRequest:
+def for_points(
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    points: np.ndarray | SurfacePoints,
+    order: str,
+    settings: CurveSettings,
+) -> DesignRequest:
     """A request for a curve through points on a surface.
 
     Parameters
@@ -79,7 +96,8 @@ def for_points(mesh_object, surface, points, order: str, settings: CurveSettings
         Settings of the curve.
     """
     options = curve_record.arguments_of(
-        settings, lambda name: group_weights(mesh_object, name, surface.with_modifiers)
+        settings,
+        lambda name: group_weights(mesh_object, name, surface.with_modifiers) if name else None,
     )
     options["clearance"] /= surface.unit
     return DesignRequest(
@@ -93,14 +111,21 @@ def for_points(mesh_object, surface, points, order: str, settings: CurveSettings
     )
 
 
-def for_drawing(mesh_object, surface, points, settings: CurveSettings) -> DesignRequest:
+def for_drawing(
+    mesh_object: bpy.types.Object, surface: Surface, points: SurfacePoints, settings: CurveSettings
+) -> DesignRequest:
     """A request for a curve that is drawn point by point; with two points it is always open."""
     request = for_points(mesh_object, surface, points, "given", settings)
     closed = settings.closed and len(points) >= FEWEST_CLOSED
     return replace(request, options={**request.options, "closed": closed})
 
 
-def for_curve(curve_object, mesh_object, surface, settings: CurveSettings) -> DesignRequest:
+def for_curve(
+    curve_object: bpy.types.Object,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    settings: CurveSettings,
+) -> DesignRequest:
     """A request to design a curve again on the current surface, along the same course."""
     points, moved = curve_record.current_control_points(curve_object, mesh_object, surface)
     if len(points) < FEWEST_OPEN:
@@ -114,7 +139,7 @@ def for_curve(curve_object, mesh_object, surface, settings: CurveSettings) -> De
     return replace(request, start=start, moved=moved)
 
 
-def answer(request: DesignRequest, progress):
+def answer(request: DesignRequest, progress: Progress) -> Design:
     """Design the curve with the core, without access to Blender's data."""
     from ... import nicmm_core as nicmm
 

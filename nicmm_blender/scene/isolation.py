@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evaluates a temporary object in a separate scene, without touching the user's data."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -10,7 +13,7 @@ SIMPLIFICATION = ("use_simplify", "simplify_subdivision")
 
 
 @contextmanager
-def evaluated_in_isolation(temporary):
+def evaluated_in_isolation(temporary: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     """Yield the evaluated mesh of an object that is in no scene; it is valid inside the block only.
 
     The object and its mesh are removed afterwards, so no other object may use that mesh.

@@ -4,12 +4,12 @@
 import bpy
 
 
-def by_uid(uid: int):
+def by_uid(uid: int) -> bpy.types.Object | None:
     """The object with this session_uid, or None. Undo replaces Blender's Python objects."""
     return next((found for found in bpy.data.objects if found.session_uid == uid), None)
 
 
-def is_in(view_layer, candidate) -> bool:
+def is_in(view_layer: bpy.types.ViewLayer, candidate: bpy.types.Object) -> bool:
     """Whether a view layer contains an object.
 
     The name alone does not tell: an object linked from a library may have the same name.

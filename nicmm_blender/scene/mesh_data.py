@@ -4,12 +4,15 @@
 Blender keeps a separate copy of a mesh in Edit Mode, so operators call `synchronise` first.
 """
 
+from __future__ import annotations
+
+import bpy
 import numpy as np
 
 from .messages import InputError
 
 
-def mesh_object(context):
+def mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
     """The mesh to design on: the active object, or the parent of the active curve object.
 
     The parent is needed for the redo panel: Blender shows it only while the operator can run again,
@@ -21,13 +24,13 @@ def mesh_object(context):
     return active if active is not None and active.type == "MESH" else None
 
 
-def synchronise(mesh_object) -> None:
+def synchronise(mesh_object: bpy.types.Object) -> None:
     """Copy the changes of Edit Mode to the mesh."""
     if mesh_object.mode == "EDIT":
         mesh_object.update_from_editmode()
 
 
-def marked_edges(mesh_object, mark: str) -> np.ndarray:
+def marked_edges(mesh_object: bpy.types.Object, mark: str) -> np.ndarray:
     """Vertices (n, 2) of the edges that have a mark, such as "use_seam"."""
     edges = mesh_object.data.edges
     marked = np.empty(len(edges), dtype=bool)
@@ -37,7 +40,7 @@ def marked_edges(mesh_object, mark: str) -> np.ndarray:
     return vertices[marked].astype(np.int64)
 
 
-def check_local(mesh_object, consequence: str) -> None:
+def check_local(mesh_object: bpy.types.Object, consequence: str) -> None:
     """Raise an error if the data of the mesh belongs to another file."""
     library = mesh_object.data.library or mesh_object.library
     if library is not None:

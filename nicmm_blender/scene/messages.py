@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages for the user: errors, the core's messages reworded for Blender, counted things."""
 
+from __future__ import annotations
+
 import math
 import re
+
+import numpy as np
 
 
 class InputError(Exception):
     """Blender's data cannot be used; the message says what to change."""
 
 
-def check_finite(name: str, value) -> None:
+def check_finite(name: str, value: object) -> None:
     """Raise an error if a setting is NaN or infinite, which scripts can pass."""
     if isinstance(value, float) and not math.isfinite(value):
         label = sentence(name.replace("_", " "))
         raise InputError(f"{label} is {value}. Give a finite number")
 
 
-def user_message(error: Exception, obstacle_group: str = "", vertices=None) -> str:
+def user_message(
+    error: Exception, obstacle_group: str = "", vertices: np.ndarray | None = None
+) -> str:
     """Reword a message of the core: points are counted from 1, and the obstacle map is named.
 
     `vertices` are the vertex indices of the control points, or None if they are not at vertices.

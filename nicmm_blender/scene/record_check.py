@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks the record of a curve before it is used, since files and scripts may contain anything."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
+
+Record = Mapping[str, Any]
+"""The custom property that holds a record."""
 
 LARGEST = 2**31 - 1
 """Largest index in Blender."""
@@ -12,22 +19,22 @@ SPLINES = ("EVEN", "EXACT", "BEZIER")
 """Spline types of a drawing."""
 
 
-def is_group(value) -> bool:
+def is_group(value: object) -> bool:
     """Whether a custom property is a group of properties."""
     return hasattr(value, "keys") and hasattr(value, "get")
 
 
-def problem_of(record) -> str:
+def problem_of(record: Record) -> str:
     """The problem with the points of a record; empty if they can be used."""
     return _problem(_check_points, record)
 
 
-def problem_of_settings(record, settings_type) -> str:
+def problem_of_settings(record: Record, settings_type: type) -> str:
     """The problem with the settings of a record, whose class is `settings_type`; empty if none."""
     return _problem(_check_settings, record, settings_type)
 
 
-def _problem(check, *arguments) -> str:
+def _problem(check: Callable[..., None], *arguments: object) -> str:
     try:
         check(*arguments)
     except _DamagedError as error:
@@ -39,7 +46,7 @@ class _DamagedError(Exception):
     """A problem with a record."""
 
 
-def _check_points(record) -> None:
+def _check_points(record: Record) -> None:
     counts = _whole(record, "counts", least=1)
     closed = _whole(record, "closed", len(counts), least=0)
     total = sum(counts)
@@ -72,7 +79,7 @@ def _check_points(record) -> None:
         _whole(record, "control_cage_copies", count, least=0)
 
 
-def _check_settings(record, settings_type) -> None:
+def _check_settings(record: Record, settings_type: type) -> None:
     settings, drawn = record.get("asked"), record.get("drawn")
     if settings is None:
         if not len(_whole(record, "closed")):
@@ -82,7 +89,9 @@ def _check_settings(record, settings_type) -> None:
     else:
         for field in fields(settings_type):
             value = settings.get(field.name, field.default)
-            if not (isinstance(value, str) if field.type is str else _is_finite(value)):
+            if not (
+                isinstance(value, str) if isinstance(field.default, str) else _is_finite(value)
+            ):
                 raise _DamagedError(f"its setting {field.name} is {value!r}")
     if drawn is not None and not (
         is_group(drawn) and drawn.get("spline") in SPLINES and _is_finite(drawn.get("offset"))
@@ -90,17 +99,17 @@ def _check_settings(record, settings_type) -> None:
         raise _DamagedError("drawn does not describe how the curve is drawn")
 
 
-def _is_finite(value) -> bool:
+def _is_finite(value: object) -> bool:
     return isinstance(value, int | float) and bool(np.isfinite(value))
 
 
-def _ranges(counts: np.ndarray):
+def _ranges(counts: np.ndarray) -> Iterator[tuple[int, int]]:
     """Start and end of each part of an array that is divided into parts of these lengths."""
     ends = np.cumsum(counts)
     return zip((ends - counts).tolist(), ends.tolist(), strict=True)
 
 
-def _numbers(record, name: str, length: int | None = None) -> np.ndarray:
+def _numbers(record: Record, name: str, length: int | None = None) -> np.ndarray:
     """Read a list of finite numbers of a given length, or of any length."""
     try:
         values = np.array(record[name], dtype=np.float64)
@@ -113,7 +122,7 @@ def _numbers(record, name: str, length: int | None = None) -> np.ndarray:
     return values
 
 
-def _whole(record, name: str, length: int | None = None, least: int = 0) -> np.ndarray:
+def _whole(record: Record, name: str, length: int | None = None, least: int = 0) -> np.ndarray:
     """Read a list of whole numbers from `least` to `LARGEST`."""
     values = _numbers(record, name, length)
     if ((values != np.floor(values)) | (values < least) | (values > LARGEST)).any():

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads control points from the selection, from a vertex group or from a script."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
 import numpy as np
 
 import bmesh
 
 from . import surface_cache
+from .cage_trace import CageTrace
 from .messages import InputError
 from .surface import Surface, group_weights
 
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfacePoints
 
-def selected_vertices(mesh_object) -> np.ndarray:
+
+def selected_vertices(mesh_object: bpy.types.Object) -> np.ndarray:
     """Indices of the selected vertices, ascending."""
     mesh = mesh_object.data
     selected = np.empty(len(mesh.vertices), dtype=bool)
@@ -18,7 +27,7 @@ def selected_vertices(mesh_object) -> np.ndarray:
     return np.flatnonzero(selected)
 
 
-def selection_history(mesh_object) -> np.ndarray:
+def selection_history(mesh_object: bpy.types.Object) -> np.ndarray:
     """Indices of the vertices in Blender's selection history, oldest first."""
     mesh = mesh_object.data
     if mesh_object.mode == "EDIT":
@@ -31,14 +40,14 @@ def selection_history(mesh_object) -> np.ndarray:
         edited.free()
 
 
-def _history(edited) -> np.ndarray:
+def _history(edited: bmesh.types.BMesh) -> np.ndarray:
     # list() first: in some Blender versions a generator expression fails on this iterator.
     elements = list(edited.select_history)
     vertices = [found.index for found in elements if isinstance(found, bmesh.types.BMVert)]
     return np.array(vertices, dtype=np.int64)
 
 
-def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
+def selected_points(mesh_object: bpy.types.Object, order: str) -> tuple[np.ndarray, str]:
     """Return the selected vertices and the core's order for them, "given" or "shortest".
 
     Blender does not record box, circle and lasso selection, and old entries stay in the selection
@@ -64,7 +73,7 @@ def selected_points(mesh_object, order: str) -> tuple[np.ndarray, str]:
     return selected, "shortest"
 
 
-def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str]:
+def points_of_group(mesh_object: bpy.types.Object, name: str, order: str) -> tuple[np.ndarray, str]:
     """Return the vertices of a vertex group, and the core's order for them."""
     vertices = np.flatnonzero(group_weights(mesh_object, name, use_modifiers=False) > 0.0)
     if order == "GIVEN":
@@ -79,7 +88,7 @@ def points_of_group(mesh_object, name: str, order: str) -> tuple[np.ndarray, str
     return vertices, "shortest"
 
 
-def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
+def given_points(surface: Surface, text: str, order: str) -> tuple[np.ndarray | SurfacePoints, str]:
     """Return the control points that a script gives as text, and the core's order for them.
 
     The text lists vertex indices of the mesh or positions in the object's local space, such as
@@ -99,7 +108,7 @@ def given_points(surface: Surface, text: str, order: str) -> tuple[object, str]:
     return np.array(places), core_order
 
 
-def points_at(surface: Surface, vertices: np.ndarray):
+def points_at(surface: Surface, vertices: np.ndarray) -> np.ndarray | SurfacePoints:
     """Points for the core at vertices (k,) of the mesh.
 
     Returns vertex indices of the surface. If modifiers have removed any of the vertices, returns
@@ -108,7 +117,7 @@ def points_at(surface: Surface, vertices: np.ndarray):
     if surface.cage is None:
         return vertices
     found = surface.cage.vertices[vertices]
-    return found if (found >= 0).all() else _nearest(surface, vertices)
+    return found if (found >= 0).all() else _nearest(surface, surface.cage, vertices)
 
 
 def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
@@ -120,12 +129,12 @@ def positions_at(surface: Surface, vertices: np.ndarray) -> np.ndarray:
     return np.einsum("nj,njk->nk", points.barycentric, corners)
 
 
-def _nearest(surface: Surface, vertices: np.ndarray):
+def _nearest(surface: Surface, cage: CageTrace, vertices: np.ndarray) -> SurfacePoints:
     """The points of the surface nearest to vertices of the mesh, as SurfacePoints of the core."""
     from ...nicmm_core.geometry.surface_points import nearest_points
 
-    found = surface.cage.vertices[vertices]
-    before = surface.cage.positions[vertices] @ surface.local_to_core.T
+    found = cage.vertices[vertices]
+    before = cage.positions[vertices] @ surface.local_to_core.T
     wanted = np.where(found[:, None] >= 0, surface.core_positions[found], before)
     mesh = surface_cache.core_mesh(surface)
     return nearest_points(mesh, wanted)[0]

@@ -5,7 +5,10 @@ The mesh without its modifiers is called the cage. In Edit Mode the cage is Blen
 that is being edited.
 """
 
+from __future__ import annotations
+
 import hashlib
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +17,7 @@ import bpy
 import numpy as np
 
 import bmesh
+from mathutils import Matrix
 
 from . import mesh_arrays
 from .cage_trace import CageTrace, trace
@@ -114,7 +118,7 @@ class Surface:
         return bool((self.local_to_core == np.eye(3)).all())
 
 
-def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
+def read(mesh_object: bpy.types.Object, use_modifiers: bool, traced: bool = True) -> Surface:
     """Read the surface of a mesh object; its cage is traced only if `traced` is set.
 
     Quads and larger faces are triangulated as Blender draws them.
@@ -153,7 +157,9 @@ def read(mesh_object, use_modifiers: bool, traced: bool = True) -> Surface:
 
 
 @contextmanager
-def shown_mesh(mesh_object, use_modifiers: bool):
+def shown_mesh(
+    mesh_object: bpy.types.Object, use_modifiers: bool
+) -> Iterator[tuple[bpy.types.Mesh, Matrix]]:
     """Yield the mesh with its modifiers and shape keys, or the cage, and the world matrix.
 
     The mesh is valid inside the block only.
@@ -171,7 +177,7 @@ def shown_mesh(mesh_object, use_modifiers: bool):
 
 
 @contextmanager
-def cage_mesh(mesh_object):
+def cage_mesh(mesh_object: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     """Yield the mesh without modifiers; it is valid inside the block only.
 
     In Edit Mode it is a copy, since Blender would report it as a change if the edited mesh were
@@ -188,7 +194,7 @@ def cage_mesh(mesh_object):
         bpy.data.meshes.remove(copy)
 
 
-def active_modifiers_text(mesh_object) -> str:
+def active_modifiers_text(mesh_object: bpy.types.Object) -> str:
     """Words for what the viewport shows besides the cage: modifiers, shape keys, both or empty."""
     shown = []
     if any(modifier.show_viewport for modifier in mesh_object.modifiers):
@@ -200,16 +206,14 @@ def active_modifiers_text(mesh_object) -> str:
     return " and ".join(shown)
 
 
-def group_weights(mesh_object, name: str, use_modifiers: bool) -> np.ndarray | None:
-    """Weights (V,) of the surface's vertices in a vertex group; None for an empty name."""
-    if not name:
-        return None
+def group_weights(mesh_object: bpy.types.Object, name: str, use_modifiers: bool) -> np.ndarray:
+    """Weights (V,) of the surface's vertices in a vertex group."""
     vertex_group(mesh_object, name)
     with shown_mesh(mesh_object, use_modifiers) as (mesh, _):
         return weights_on(mesh, mesh_object.vertex_groups.keys(), name)
 
 
-def vertex_group(mesh_object, name: str):
+def vertex_group(mesh_object: bpy.types.Object, name: str) -> bpy.types.VertexGroup:
     """Return the vertex group with a name, or raise an error if there is none."""
     group = mesh_object.vertex_groups.get(name)
     if group is None:
@@ -222,7 +226,7 @@ def vertex_group(mesh_object, name: str):
     return group
 
 
-def _is_sculpted_without_modifiers(mesh_object) -> bool:
+def _is_sculpted_without_modifiers(mesh_object: bpy.types.Object) -> bool:
     """Whether the mesh is sculpted without modifiers, so that the evaluated mesh is outdated.
 
     Strokes then change only the mesh itself, and Blender does not evaluate it again before the mode
@@ -238,7 +242,7 @@ def _is_sculpted_without_modifiers(mesh_object) -> bool:
     return not active_modifiers_text(mesh_object)
 
 
-def _depsgraph_of(mesh_object):
+def _depsgraph_of(mesh_object: bpy.types.Object) -> bpy.types.Depsgraph:
     """A dependency graph that evaluates the object: preferably that of the current view layer."""
     context = bpy.context
     if is_in(context.view_layer, mesh_object):
@@ -260,7 +264,7 @@ def _depsgraph_of(mesh_object):
     )
 
 
-def _is_disabled(view_layer, mesh_object) -> bool:
+def _is_disabled(view_layer: bpy.types.ViewLayer, mesh_object: bpy.types.Object) -> bool:
     """Whether an object, or all of its collections, are disabled in viewports.
 
     Blender does not evaluate such an object. It does evaluate one that is hidden with the eye icon.

@@ -30,6 +30,7 @@ from .viewports import redraw
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, Designer, Mesh, SurfaceCurve
+    from ...nicmm_core.progress import Progress
 
 MOST_SURFACES = 4
 """Maximum number of surfaces in the cache."""
@@ -115,12 +116,12 @@ def note_change() -> None:
 # Surfaces
 
 
-def cached(mesh_object, use_modifiers: bool) -> Surface | None:
+def cached(mesh_object: bpy.types.Object, use_modifiers: bool) -> Surface | None:
     """The surface of an object if it has been read since the object's last change, or None."""
     return _cache.surfaces.get(_key(mesh_object, use_modifiers))
 
 
-def get(mesh_object, use_modifiers: bool) -> Surface:
+def get(mesh_object: bpy.types.Object, use_modifiers: bool) -> Surface:
     """The surface of an object, read again only if the object has changed."""
     found = cached(mesh_object, use_modifiers)
     if found is None:
@@ -132,7 +133,7 @@ def get(mesh_object, use_modifiers: bool) -> Surface:
     return found
 
 
-def cached_or_soon(mesh_object, use_modifiers: bool) -> Surface | None:
+def cached_or_soon(mesh_object: bpy.types.Object, use_modifiers: bool) -> Surface | None:
     """The surface of an object if it is in the cache; if not, it is read soon.
 
     A large mesh is read only if it was read before: the user waits for that at the first click.
@@ -145,7 +146,7 @@ def cached_or_soon(mesh_object, use_modifiers: bool) -> Surface | None:
     return found
 
 
-def _key(mesh_object, use_modifiers: bool) -> tuple:
+def _key(mesh_object: bpy.types.Object, use_modifiers: bool) -> tuple:
     return mesh_object.session_uid, mesh_object.mode, use_modifiers
 
 
@@ -154,7 +155,7 @@ def _drop_oldest(entries: dict, most: int) -> None:
         del entries[next(iter(entries))]
 
 
-def _has_few_faces(mesh_object) -> bool:
+def _has_few_faces(mesh_object: bpy.types.Object) -> bool:
     """Whether reading the surface of an object is fast."""
     evaluated = mesh_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return len(evaluated.data.polygons) <= FEW_FACES and not any(
@@ -240,7 +241,7 @@ def is_prepared(surface: Surface) -> bool:
     return computed is not None and "face_trees" in vars(computed.designer.mesh)
 
 
-def prepare(surface: Surface, progress) -> bool:
+def prepare(surface: Surface, progress: Progress) -> bool:
     """Build the search trees for ray casts; return False if the progress function cancelled it."""
     from ...nicmm_core.progress import CancelledError, watched
 
@@ -281,7 +282,7 @@ def _is_same(one: SurfaceCurve, other: SurfaceCurve) -> bool:
 
 
 @persistent
-def note_updates(_scene, depsgraph) -> None:
+def note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Drop the surfaces of the objects that have changed."""
     for update in depsgraph.updates:
         changed = update.id.original
@@ -304,14 +305,14 @@ def _drop(uid: int) -> None:
 
 
 @persistent
-def drop_surfaces(*_arguments) -> None:
+def drop_surfaces(*_arguments: object) -> None:
     """Drop the surfaces of all objects: after undo or redo, or a frame change."""
     _cache.surfaces.clear()
     _cache.changes += 1
 
 
 @persistent
-def forget(*_arguments) -> None:
+def forget(*_arguments: object) -> None:
     """Drop everything, before another file is opened."""
     _cache.clear()
 

@@ -14,7 +14,7 @@ from .isolation import evaluated_in_isolation
 STORED = "nicmm_weights"
 
 
-def weights_on(mesh, groups: list, group: str) -> np.ndarray:
+def weights_on(mesh: bpy.types.Mesh, groups: list, group: str) -> np.ndarray:
     """Weights (V,) of all vertices of a mesh in a vertex group; 0 outside the group.
 
     `mesh` may be the evaluated mesh of an object. It is not changed. `groups` are the names of all
@@ -34,7 +34,7 @@ def weights_on(mesh, groups: list, group: str) -> np.ndarray:
     return weights.astype(np.float64)
 
 
-def _new_node_group(group: str):
+def _new_node_group(group: str) -> bpy.types.NodeTree:
     """A new node group that stores a vertex group as an attribute."""
     tree = bpy.data.node_groups.new("NICMM weights", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):

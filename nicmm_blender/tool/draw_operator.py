@@ -33,12 +33,12 @@ class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if context.mode not in modes.TOOLS or not picking.is_view(context):
             return PASS
         return with_error_reports(self, lambda: self._invoke(context, event))
 
-    def _invoke(self, context, event):
+    def _invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         mesh_object, curve = picking.mesh_and_curve(context)
         if mesh_object is None:
             return PASS
@@ -53,12 +53,12 @@ class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
             return self._act(context)
         return self.work_on(context, lambda progress: surface_cache.prepare(surface, progress))
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
         return super().modal(context, event)
 
-    def done(self, context, _result):
+    def done(self, context: bpy.types.Context, _result: bool) -> set[str]:
         """Do what the click was for."""
         if not self.is_sliced:
             return self._act(context)
@@ -72,7 +72,7 @@ class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
     def progress_text(self) -> str:
         return "Preparing the mesh"
 
-    def _act(self, context):
+    def _act(self, context: bpy.types.Context) -> set[str]:
         hit = picking.under_mouse(context, self._pixel)
         if hit is None:
             return PASS
@@ -90,7 +90,7 @@ class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _call_of(hit, remove: bool) -> tuple | None:
+def _call_of(hit: picking.Hit, remove: bool) -> tuple | None:
     """The operator for what is under the mouse, with its arguments; None if there is none."""
     calls = bpy.ops.nicmm
     if remove:

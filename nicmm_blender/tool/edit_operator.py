@@ -2,6 +2,7 @@
 """The operator that sets all control points of a curve in scripts, and chooses the tool."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -13,15 +14,17 @@ from ..operators.long_solves import answer_now
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record
+from ..scene.curve_record import CurveSettings
 from ..scene.messages import InputError
 from . import modes
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfacePoints
 
 OBJECT_SETTINGS = ("spline", "radius", "thickness", "offset")
 """Properties of a new curve object, shown in the redo panel."""
 
 TOO_FEW_POINTS = "A curve needs at least two points, a closed curve at least three. Add more points"
-
-_OUTPUT = settings.OutputProperties.__annotations__
 
 
 class NICMM_PG_control_point(bpy.types.PropertyGroup):
@@ -50,11 +53,11 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         ),
         default="CURVE",
     )
-    spline: _OUTPUT["spline"]
-    radius: _OUTPUT["radius"]
-    offset: _OUTPUT["offset"]
-    thickness: _OUTPUT["thickness"]
-    tube: _OUTPUT["tube"]
+    spline: settings.output_property("spline")
+    radius: settings.output_property("radius")
+    offset: settings.output_property("offset")
+    thickness: settings.output_property("thickness")
+    tube: settings.output_property("tube")
     curve: bpy.props.StringProperty(
         name="Curve Object",
         description="Name of the designed curve to edit. Leave empty to edit the active curve, or "
@@ -69,11 +72,11 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         has_mesh = curve_record.mesh_of_context(context) is not None
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL_OR_EDIT)
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         if not len(self.points):  # the tool was chosen
             return
         layout = self.layout
@@ -92,7 +95,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             if self.output == "STICKY":
                 layout.prop(self, "tube")
 
-    def invoke(self, context, _event):
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Choose the tool in a 3D viewport; with points given, or elsewhere, execute instead."""
         settings.choose_tube(self)
         in_view = context.space_data is not None and context.space_data.type == "VIEW_3D"
@@ -100,7 +103,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             return self.execute(context)
         return with_error_reports(self, lambda: self._choose_tool(context))
 
-    def _choose_tool(self, context):
+    def _choose_tool(self, context: bpy.types.Context) -> set[str]:
         edited = edited_curve.chosen(context, self.curve)
         if context.mode not in modes.TOOLS:
             raise InputError(modes.WRONG_MODE)
@@ -111,10 +114,10 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         # Without a curve nothing has changed that could be undone.
         return {"CANCELLED"} if edited is None else {"FINISHED"}
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         edited = edited_curve.chosen(context, self.curve)
         opened = edited_curve.open_curve(context, edited, self._settings_for(context, edited))
         points = opened.points
@@ -126,15 +129,18 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
                 'There are no control points. Pass points=[{"name": "", "position": (x, y, '
                 "z)}, …], or draw with the Surface Curve tool in the 3D viewport"
             )
-        curves = [opened.curve]
         if len(self.points) or opened.curve is None:
             curves = _design_curves(context, opened, points)
+        else:
+            curves = [opened.curve]
         result = edited_curve.write(context, opened, points, curves, self)
         self._store(opened, points)
         self.report({"INFO"}, f'"{result.name}" through {len(points)} points{opened.remark}')
         return {"FINISHED"}
 
-    def _settings_for(self, context, edited):
+    def _settings_for(
+        self, context: bpy.types.Context, edited: bpy.types.Object | None
+    ) -> CurveSettings:
         """The settings of the curve, or of the sidebar, replaced by those given in this call."""
         if edited is None:
             curve_settings = curve_record.settings_from(context.scene.nicmm_curves)
@@ -147,7 +153,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
         }
         return replace(curve_settings, method="NICMM", **given)
 
-    def _store(self, opened: Opened, points) -> None:
+    def _store(self, opened: Opened, points: "SurfacePoints") -> None:
         """Store points and settings for the redo panel."""
         for name in settings.EditingProperties.__annotations__:
             setattr(self, name, getattr(opened.settings, name))
@@ -156,7 +162,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             self.points.add().position = position
 
 
-def _design_curves(context, opened: Opened, points) -> list:
+def _design_curves(context: bpy.types.Context, opened: Opened, points: "SurfacePoints") -> list:
     """The curve through points, as a list; an error if there is none."""
     requests = edited_curve.request(opened, points)
     if not requests:

@@ -14,15 +14,15 @@ from . import modes, overlay, picking
 class NICMM_GT_hover(bpy.types.Gizmo):
     bl_idname = "NICMM_GT_hover"
 
-    def draw(self, _context):
+    def draw(self, _context: bpy.types.Context) -> None:
         """Draw nothing, since the overlay draws the mark."""
 
-    def test_select(self, context, location):
+    def test_select(self, context: bpy.types.Context, location: tuple[int, int]) -> int:
         overlay.show_hover(_under(context, location))
         return -1
 
 
-def _under(context, location):
+def _under(context: bpy.types.Context, location: tuple[int, int]) -> picking.Hit | None:
     """What is under the mouse, or None if that would need a long computation."""
     from ...nicmm_core import NicmmError
 
@@ -45,13 +45,13 @@ class NICMM_GGT_hover(bpy.types.GizmoGroup):
     bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}  # noqa: RUF012 - as Blender reads it
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         active = modes.is_tool_active(context)
         if not active and overlay.hovered() is not None:
             overlay.show_hover(None)
         return active
 
-    def setup(self, _context):
+    def setup(self, _context: bpy.types.Context) -> None:
         self.gizmos.new(NICMM_GT_hover.bl_idname)
 
 

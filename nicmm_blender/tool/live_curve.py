@@ -5,11 +5,17 @@ Each move starts from the last curve. If that is impossible, for example after a
 to be designed from scratch, which takes longer; `waiting` is then set.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ..scene import surface_cache
 from ..scene.design_request import DesignRequest
 from ..scene.messages import user_message
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
 
 ITERATIONS = 3
 """Maximum number of iterations for each move; they take one or two frames."""
@@ -42,19 +48,21 @@ class LiveCurve:
         self.problem = ""
 
     @property
-    def curve(self):
+    def curve(self) -> SurfaceCurve | None:
         """The last curve, a SurfaceCurve of the core, or None."""
-        found = self.request.start
-        return found.curves[0] if hasattr(found, "curves") else found
+        from ... import nicmm_core as nicmm
 
-    def move(self, points) -> None:
+        found = self.request.start
+        return found.curves[0] if isinstance(found, nicmm.Design) else found
+
+    def move(self, points: SurfacePoints) -> None:
         """Move the control points and take a first step."""
         self.request = replace(self.request, points=points)
         self.waiting, self.steps_left = self.request.start is None, MOST_STEPS
         if not self.waiting:
             self.step()
 
-    def set_result(self, design) -> None:
+    def set_result(self, design: Design | Exception) -> None:
         """Store the result of a design from scratch, which may be an exception."""
         self.waiting, self.steps_left = False, 0
         if isinstance(design, Exception):
@@ -66,15 +74,21 @@ class LiveCurve:
         """Continue for a few iterations."""
         from ... import nicmm_core as nicmm
 
-        if not self.steps_left:
+        curve = self.curve
+        if curve is None or not self.steps_left:
             return
         self.steps_left -= 1
         request, surface = self.request, self.request.surface
-        iterations = min(max(POINTS // len(self.curve.faces), 1), ITERATIONS)
-        bounds = {"order": "given", "max_iterations": iterations, "start": request.start}
+        iterations = min(max(POINTS // len(curve.faces), 1), ITERATIONS)
         try:
             with surface_cache.designer_of(surface) as designer:
-                design = designer.design(request.points, **bounds, **request.options)
+                design = designer.design(
+                    request.points,
+                    order="given",
+                    max_iterations=iterations,
+                    start=request.start,
+                    **request.options,
+                )
         except nicmm.CurveError:
             self.waiting, self.steps_left = True, 0
         except nicmm.NicmmError as error:

@@ -5,6 +5,10 @@ The tool does not work in mesh Edit Mode, where Blender's undo does not restore 
 click could not be undone. There, control points are selected vertices.
 """
 
+from __future__ import annotations
+
+import bpy
+
 from ..outputs import curve_object
 from ..scene import curve_record
 from ..scene.lookup import is_in
@@ -22,7 +26,7 @@ WRONG_MODE = (
 )
 
 
-def is_tool_active(context) -> bool:
+def is_tool_active(context: bpy.types.Context) -> bool:
     """Whether the tool is active in the current mode."""
     if context.mode not in TOOLS or context.workspace is None:
         return False
@@ -30,7 +34,7 @@ def is_tool_active(context) -> bool:
     return tool is not None and tool.idname == TOOLS[context.mode]
 
 
-def make_active(context, curve) -> None:
+def make_active(context: bpy.types.Context, curve: bpy.types.Object | None) -> None:
     """Make a designed curve the active one, which is drawn; None ends drawing.
 
     In Object Mode it becomes the active object. In other modes the mesh stays active, and the

@@ -4,7 +4,10 @@
 Parts hidden by the mesh are dimmed. A mark under the mouse shows what a click would do.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import bpy
 import gpu
@@ -14,12 +17,20 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
 from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
 from ..scene.lookup import by_uid
 from ..scene.messages import InputError
+from ..scene.surface import Surface
 from ..scene.viewports import redraw
 from . import modes, picking
 from .picking import Kind
-from .view import OFFSET
+from .view import OFFSET, View
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
+
+Colour = tuple[float, ...]
+"""Red, green and blue, and possibly opacity."""
 
 HIDDEN = 0.22
 """Opacity of parts hidden by the mesh."""
@@ -39,7 +50,7 @@ class _Drawn:
     """Points, (k, 3), and line, (n, 3), in the local space of a mesh object."""
 
     mesh_uid: int
-    surface: object
+    surface: Surface
     points: np.ndarray
     line: np.ndarray
     problem: str = ""
@@ -50,44 +61,55 @@ class _State:
     """What is drawn. Holds no Blender objects, since undo replaces them."""
 
     def __init__(self) -> None:
-        self.handlers: list = []
+        self.handlers: list[object] = []
+        self.reset()
+
+    def reset(self) -> None:
+        """Draw nothing."""
         self.dragged: _Drawn | None = None
-        self.hover = None  # a picking.Hit
-        self.batch, self.batch_of = None, None
-        self.visible: tuple = (None, None)
+        self.hover: picking.Hit | None = None
+        self.batch: gpu.types.GPUBatch | None = None
+        self.batch_of: np.ndarray | None = None
+        self.visible: np.ndarray = np.zeros(0, dtype=bool)
+        self.visible_of: tuple[bytes, bool, int, bytes] | None = None
 
 
 _state = _State()
 
 
-def show_dragged(opened, points=None, curve=None, problem: str = "") -> None:
-    """Draw a curve that is being changed instead of the active one; `opened=None` ends that."""
+def show_dragged(
+    opened: Opened, points: SurfacePoints, curve: SurfaceCurve | None, problem: str = ""
+) -> None:
+    """Draw a curve that is being changed instead of the active one."""
+    _state.hover = None
+    _state.dragged = _Drawn(
+        opened.mesh_uid,
+        opened.surface,
+        opened.surface.points(points.faces, points.barycentric),
+        edited_curve.polyline_of(opened.surface, curve),
+        problem,
+        _radius_of(opened),
+    )
+
+
+def show_active() -> None:
+    """Draw the active curve again instead of one that is being changed."""
     _state.dragged, _state.hover = None, None
-    if opened is not None:
-        surface = opened.surface
-        _state.dragged = _Drawn(
-            opened.mesh_uid,
-            surface,
-            surface.points(points.faces, points.barycentric),
-            edited_curve.polyline_of(surface, curve),
-            problem,
-            _radius_of(opened),
-        )
 
 
-def show_hover(hit) -> None:
+def show_hover(hit: picking.Hit | None) -> None:
     """Mark what is under the mouse, a `picking.Hit` or None."""
     if hit != _state.hover:
         _state.hover = hit
         redraw()
 
 
-def hovered():
+def hovered() -> picking.Hit | None:
     """What is marked under the mouse."""
     return _state.hover
 
 
-def _drawn_now(context) -> _Drawn | None:
+def _drawn_now(context: bpy.types.Context) -> _Drawn | None:
     """What to draw; None if the tool is not active or the mesh would have to be read first."""
     from ...nicmm_core import NicmmError
 
@@ -108,14 +130,14 @@ def _drawn_now(context) -> _Drawn | None:
     return _Drawn(opened.mesh_uid, opened.surface, points, line, "", _radius_of(opened))
 
 
-def _hover_on(drawn: _Drawn):
+def _hover_on(drawn: _Drawn) -> picking.Hit | None:
     """What is marked under the mouse on the drawn mesh, or None; nothing is marked in a drag."""
     hit = _state.hover
     marks = hit is not None and hit.mesh_uid == drawn.mesh_uid and _state.dragged is None
     return hit if marks else None
 
 
-def _radius_of(opened) -> float:
+def _radius_of(opened: Opened) -> float:
     curve = opened.curve_object
     return 0.0 if curve is None else picking.radius_of(curve, opened.surface)
 
@@ -123,8 +145,7 @@ def _radius_of(opened) -> float:
 def _draw_lines() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    mesh_object = None if drawn is None else by_uid(drawn.mesh_uid)
-    if mesh_object is None:
+    if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
     colours = _Colours(context)
     nearer = _towards_the_eye(context.region_data, mesh_object, drawn.surface, drawn.radius)
@@ -141,7 +162,9 @@ def _draw_lines() -> None:
                 _draw_line(context, nearer, _batch(line.positions), colours.hover)
 
 
-def _draw_line(context, matrix, batch, colour) -> None:
+def _draw_line(
+    context: bpy.types.Context, matrix: Matrix, batch: gpu.types.GPUBatch, colour: Colour
+) -> None:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     region, scale = context.region, context.preferences.system.ui_scale
     hidden = 1.0 if picking.is_xray(context.space_data) else HIDDEN
@@ -161,14 +184,14 @@ def _draw_line(context, matrix, batch, colour) -> None:
     gpu.state.blend_set("NONE")
 
 
-def _line_batch(line: np.ndarray):
+def _line_batch(line: np.ndarray) -> gpu.types.GPUBatch:
     """The batch of the active line, rebuilt only if the line has changed."""
     if _state.batch_of is None or not np.array_equal(_state.batch_of, line):
         _state.batch, _state.batch_of = _batch(line), line
     return _state.batch
 
 
-def _batch(line: np.ndarray):
+def _batch(line: np.ndarray) -> gpu.types.GPUBatch:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     return batch_for_shader(shader, "LINE_STRIP", {"pos": line.astype(np.float32)})
 
@@ -176,8 +199,7 @@ def _batch(line: np.ndarray):
 def _draw_points() -> None:
     context = bpy.context
     drawn = _drawn_now(context)
-    mesh_object = None if drawn is None else by_uid(drawn.mesh_uid)
-    if mesh_object is None:
+    if drawn is None or (mesh_object := by_uid(drawn.mesh_uid)) is None:
         return
     view = picking.view_on(context, mesh_object, drawn.surface)
     colours = _Colours(context)
@@ -223,18 +245,18 @@ def _draw_points() -> None:
     gpu.state.blend_set("NONE")
 
 
-def _visible(view, positions: np.ndarray) -> np.ndarray:
+def _visible(view: View, positions: np.ndarray) -> np.ndarray:
     """Which points are visible; rays are cast only if the view or the points have changed."""
     key = view.perspective.tobytes(), view.xray, id(view.mesh), positions.tobytes()
-    if _state.visible[0] != key:
-        _state.visible = key, view.visible(positions)
-    return _state.visible[1]
+    if _state.visible_of != key:
+        _state.visible, _state.visible_of = view.visible(positions), key
+    return _state.visible
 
 
 class _Colours:
     """Gizmo colours of the theme, which differ from its selection colours."""
 
-    def __init__(self, context) -> None:
+    def __init__(self, context: bpy.types.Context) -> None:
         theme = context.preferences.themes[0].user_interface
         self.line, self.point = tuple(theme.gizmo_secondary), tuple(theme.gizmo_hi)
         self.hover, self.problem = tuple(theme.gizmo_primary), tuple(theme.axis_x)
@@ -250,7 +272,12 @@ def _disc() -> np.ndarray:
 _DISC = _disc()
 
 
-def _towards_the_eye(region_3d, mesh_object, surface, radius: float):
+def _towards_the_eye(
+    region_3d: bpy.types.RegionView3D,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    radius: float,
+) -> Matrix:
     """The model-view matrix, moved slightly towards the eye so that lines lie in front of the mesh.
 
     The shift includes the radius of the tube. In perspective the matrix is scaled about the eye, so
@@ -278,4 +305,5 @@ def register() -> None:
 def unregister() -> None:
     for handler in _state.handlers:
         bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
-    _state.__init__()
+    _state.handlers.clear()
+    _state.reset()

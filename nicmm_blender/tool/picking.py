@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds what is under the mouse: part of the active curve, another curve, or the surface."""
 
+from __future__ import annotations
+
 import contextlib
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -11,12 +14,17 @@ from bpy.app.handlers import persistent
 
 from mathutils import Vector
 
+from ..operators import polls
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, surface_cache
 from ..scene.lookup import is_in
 from ..scene.messages import InputError
+from ..scene.surface import Surface
 from .view import View, view_of
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Mesh, SurfaceCurve
 
 POINT_REACH, CURVE_REACH = 12.0, 8.0
 """Maximum distances of the mouse from a point and from a curve, in pixels at a scale of 1."""
@@ -56,7 +64,7 @@ class Hit:
     kind: Kind
     name: str
     index: int
-    position: tuple
+    position: tuple[float, float, float]
     mesh_uid: int
 
 
@@ -77,17 +85,19 @@ class _VisibleCurves:
 
     def reset(self) -> None:
         """Drop everything that was read."""
-        self.key: tuple = ()
+        self.key: tuple[object, ...] = ()
         self.opened: Opened | None = None
         self.lines: list[Line] = []
-        self.uses_key: tuple = ()
+        self.uses_key: tuple[int, ...] = ()
         self.uses: set[bool] = set()
 
 
 _visible_curves = _VisibleCurves()
 
 
-def mesh_and_curve(context) -> tuple:
+def mesh_and_curve(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
     """The mesh object that a click draws on, and the active curve; each may be None."""
     curve = edited_curve.active(context)
     if curve is None:
@@ -101,7 +111,9 @@ def mesh_and_curve(context) -> tuple:
     return mesh_object, curve
 
 
-def is_ready(context, mesh_object, curve) -> bool:
+def is_ready(
+    context: bpy.types.Context, mesh_object: bpy.types.Object, curve: bpy.types.Object | None
+) -> bool:
     """Whether what is under the mouse is known without a long computation.
 
     If a surface has not been read, it is read soon; but not during a render, because reading makes
@@ -118,37 +130,39 @@ def is_ready(context, mesh_object, curve) -> bool:
     return few or surface_cache.is_prepared(surface)
 
 
-def surface_for(context, mesh_object, curve):
+def surface_for(
+    context: bpy.types.Context, mesh_object: bpy.types.Object, curve: bpy.types.Object | None
+) -> Surface:
     """The surface that a click draws on."""
     return surface_cache.get(mesh_object, _uses_modifiers(context, curve))
 
 
-def opened_now(context) -> Opened:
+def opened_now(context: bpy.types.Context) -> Opened:
     """The active curve, or the mesh for a new curve, as `Opened`; read again after changes only."""
-    return _read(context).opened
+    return _read(context)[0]
 
 
-def other_lines(context) -> list:
-    """The other designed curves on the mesh that the viewport shows, each a `Line`."""
+def other_lines(context: bpy.types.Context) -> list[Line]:
+    """The other designed curves on the mesh that the viewport shows."""
     # Blender does not report that an object was hidden.
     return [
-        line for line in _read(context).lines if _is_shown(context, bpy.data.objects.get(line.name))
+        line for line in _read(context)[1] if _is_shown(context, bpy.data.objects.get(line.name))
     ]
 
 
-def pixel_of(event) -> np.ndarray:
+def pixel_of(event: bpy.types.Event) -> np.ndarray:
     """Position of the mouse in the region of an event, in pixels, (2,)."""
     return np.array([event.mouse_region_x, event.mouse_region_y], dtype=np.float64)
 
 
-def view_on(context, mesh_object, surface) -> View:
+def view_on(context: bpy.types.Context, mesh_object: bpy.types.Object, surface: Surface) -> View:
     """The view of the context's region on a mesh."""
     mesh = surface_cache.core_mesh(surface)
     region = context.region
     return view_of(region, region.data, mesh_object, surface, mesh, is_xray(context.space_data))
 
 
-def is_xray(space) -> bool:
+def is_xray(space: bpy.types.SpaceView3D) -> bool:
     """Whether the viewport shows what is behind the surface."""
     shading = space.shading
     if shading.type == "WIREFRAME":
@@ -156,7 +170,7 @@ def is_xray(space) -> bool:
     return shading.type == "SOLID" and shading.show_xray
 
 
-def under_mouse(context, pixel) -> Hit | None:
+def under_mouse(context: bpy.types.Context, pixel: np.ndarray) -> Hit | None:
     """What a click at a pixel meets; None if nothing, or if another mesh is in front."""
     mesh_object, curve = mesh_and_curve(context)
     if mesh_object is None:
@@ -169,7 +183,14 @@ def under_mouse(context, pixel) -> Hit | None:
     return hit
 
 
-def _hit(context, view: View, pixel, opened: Opened, name: str, curve) -> Hit | None:
+def _hit(
+    context: bpy.types.Context,
+    view: View,
+    pixel: np.ndarray,
+    opened: Opened,
+    name: str,
+    curve: bpy.types.Object | None,
+) -> Hit | None:
     scale = context.preferences.system.ui_scale
     positions = opened.positions()
     number = view.nearest_point(pixel, positions, POINT_REACH * scale)
@@ -177,47 +198,57 @@ def _hit(context, view: View, pixel, opened: Opened, name: str, curve) -> Hit | 
         return Hit(Kind.POINT, name, number, tuple(positions[number]), opened.mesh_uid)
     reach = CURVE_REACH * scale
     radius = 0.0 if curve is None else radius_of(curve, opened.surface)
-    on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
-    if on_line is not None:
-        return _on_line(opened, view.mesh, name, *on_line)
+    if opened.curve is not None:
+        on_line = view.nearest_on_line(pixel, opened.polyline(), reach, radius)
+        if on_line is not None:
+            return _on_line(opened, opened.curve, view.mesh, name, *on_line)
     for line in other_lines(context):
         on_line = view.nearest_on_line(pixel, line.positions, reach, line.radius)
         if on_line is not None:
-            place = tuple(line.positions[on_line[0]])
-            return Hit(Kind.CURVE, line.name, 0, place, opened.mesh_uid)
+            position = tuple(line.positions[on_line[0]])
+            return Hit(Kind.CURVE, line.name, 0, position, opened.mesh_uid)
     place = view.surface_point_at(pixel)
     if place is None:
         return None
-    position = opened.surface.points(place.faces, place.barycentric)[0]
-    return Hit(Kind.SURFACE, name, len(positions), tuple(position), opened.mesh_uid)
+    position = tuple(opened.surface.points(place.faces, place.barycentric)[0])
+    return Hit(Kind.SURFACE, name, len(positions), position, opened.mesh_uid)
 
 
-def _on_line(opened: Opened, mesh, name: str, segment: int, share: float) -> Hit:
+def _on_line(
+    opened: Opened, curve: SurfaceCurve, mesh: Mesh, name: str, segment: int, share: float
+) -> Hit:
     from ...nicmm_core.geometry.curve import leg_of_segment, point_on_segment
 
-    place = point_on_segment(mesh, opened.curve, segment, share)
-    number = leg_of_segment(opened.curve, segment) + 1
+    place = point_on_segment(mesh, curve, segment, share)
+    number = leg_of_segment(curve, segment) + 1
     position = opened.surface.points(place.faces, place.barycentric)[0]
     return Hit(Kind.LINE, name, number, tuple(position), opened.mesh_uid)
 
 
-def _read(context) -> _VisibleCurves:
+def _read(context: bpy.types.Context) -> tuple[Opened, list[Line]]:
+    """The active curve, or the mesh for a new curve, and the other curves."""
     mesh_object, curve = mesh_and_curve(context)
+    if mesh_object is None:
+        raise InputError(polls.NO_MESH_OR_CURVE)
     uid = 0 if curve is None else curve.session_uid
     panel = context.scene.nicmm_curves.use_modifiers
     # Another viewport may be in local view and show other curves.
     view = 0 if context.space_data is None else context.space_data.as_pointer()
     key = surface_cache.changes(), mesh_object.session_uid, uid, panel, mesh_object.mode, view
-    if key != _visible_curves.key:
-        _visible_curves.opened = edited_curve.open_curve(context, curve)
-        _visible_curves.lines = _other_lines(
-            context, mesh_object, curve, _visible_curves.opened.surface
-        )
+    opened = _visible_curves.opened
+    if opened is None or key != _visible_curves.key:
+        _visible_curves.opened = opened = edited_curve.open_curve(context, curve)
+        _visible_curves.lines = _other_lines(context, mesh_object, curve, opened.surface)
         _visible_curves.key = surface_cache.changes(), *key[1:]
-    return _visible_curves
+    return opened, _visible_curves.lines
 
 
-def _other_lines(context, mesh_object, active, surface) -> list:
+def _other_lines(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    active: bpy.types.Object | None,
+    surface: Surface,
+) -> list[Line]:
     from ...nicmm_core import NicmmError
 
     lines = []
@@ -225,12 +256,11 @@ def _other_lines(context, mesh_object, active, surface) -> list:
         if curve == active or not _is_shown(context, curve):
             continue
         try:
-            on = surface
             settings = curve_record.settings_of(curve)
-            if settings.use_modifiers != surface.with_modifiers:
-                on = surface_cache.cached(mesh_object, settings.use_modifiers)
-                if on is None:  # read later, see `is_ready`
-                    continue
+            is_same = settings.use_modifiers == surface.with_modifiers
+            on = surface if is_same else surface_cache.cached(mesh_object, settings.use_modifiers)
+            if on is None:  # read later, see `is_ready`
+                continue
             _, line = curve_record.positions_of(curve, on)
         except (InputError, NicmmError):
             continue  # the error is reported where the curve is used
@@ -238,14 +268,16 @@ def _other_lines(context, mesh_object, active, surface) -> list:
     return lines
 
 
-def _uses_modifiers(context, curve) -> bool:
+def _uses_modifiers(context: bpy.types.Context, curve: bpy.types.Object | None) -> bool:
     """Whether a curve, or a new one, lies on the surface with modifiers."""
     if curve is None:
         return context.scene.nicmm_curves.use_modifiers
     return curve_record.settings_of(curve).use_modifiers
 
 
-def _modifier_uses(context, mesh_object, curve) -> frozenset:
+def _modifier_uses(
+    context: bpy.types.Context, mesh_object: bpy.types.Object, curve: bpy.types.Object | None
+) -> frozenset[bool]:
     """On which surfaces of a mesh, with modifiers or without, the tool shows curves."""
     key = surface_cache.changes(), mesh_object.session_uid
     if key != _visible_curves.uses_key:
@@ -257,7 +289,7 @@ def _modifier_uses(context, mesh_object, curve) -> frozenset:
     return frozenset(_visible_curves.uses | {_uses_modifiers(context, curve)})
 
 
-def radius_of(curve, surface) -> float:
+def radius_of(curve: bpy.types.Object, surface: Surface) -> float:
     """How far a curve object reaches from its line, in the local space of the mesh."""
     from ..outputs import curve_object, tube_radius
 
@@ -267,7 +299,7 @@ def radius_of(curve, surface) -> float:
     return (radius * curve_object.scale_of(curve, surface) + offset) / surface.scale
 
 
-def _is_shown(context, candidate) -> bool:
+def _is_shown(context: bpy.types.Context, candidate: bpy.types.Object | None) -> bool:
     """Whether an object is visible in this viewport, also in its local view."""
     space = context.space_data
     if candidate is None or not is_in(context.view_layer, candidate):
@@ -281,7 +313,13 @@ def _is_shown(context, candidate) -> bool:
     return shown.visible_in_viewport_get(space)
 
 
-def _is_behind_another(context, mesh_object, view: View, pixel, position) -> bool:
+def _is_behind_another(
+    context: bpy.types.Context,
+    mesh_object: bpy.types.Object,
+    view: View,
+    pixel: np.ndarray,
+    position: tuple[float, float, float],
+) -> bool:
     """Whether another mesh hides a position on the line of sight through a pixel."""
     if view.xray:
         return False
@@ -304,7 +342,7 @@ def _is_behind_another(context, mesh_object, view: View, pixel, position) -> boo
     return False
 
 
-def _meets_box(candidate, start, along) -> bool:
+def _meets_box(candidate: bpy.types.Object, start: Vector, along: Vector) -> bool:
     """Whether a ray meets the bounding box of an object, in its local space."""
     corners = np.array([corner[:] for corner in candidate.bound_box])
     direction = np.array(along)
@@ -317,12 +355,12 @@ def _meets_box(candidate, start, along) -> bool:
 
 
 @persistent
-def forget(*_arguments) -> None:
+def forget(*_arguments: object) -> None:
     """Drop all curves that were read, also before another file is opened."""
     _visible_curves.reset()
 
 
-def is_view(context) -> bool:
+def is_view(context: bpy.types.Context) -> bool:
     """Whether the context is a 3D viewport with a view."""
     space, region = context.space_data, context.region
     return (

@@ -5,7 +5,10 @@ The operator is modal only until the button is released. Esc or a right click le
 it was.
 """
 
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -15,9 +18,15 @@ from ..operators.error_reports import with_error_reports
 from ..operators.long_solves import answer_all
 from ..operators.sliced_operator import TIME_SLICE
 from ..outputs import edited_curve, writing
+from ..outputs.edited_curve import Opened
 from ..scene.viewports import NAVIGATION, redraw
 from . import overlay, picking
+from .changes_points import ChangesPoints
 from .live_curve import LiveCurve
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Design, SurfaceCurve
+    from ..scene.design_request import Answer
 
 INTERVAL = 1.0 / 60.0
 """Seconds between two steps of a curve that is converging."""
@@ -28,11 +37,8 @@ PAUSE = 0.15
 HINT = "Release: Confirm   |   Esc, Right Mouse: Cancel"
 
 
-class PointDrag:
-    """A mixin for operators with `open_curve(context)` and `changed(opened)`.
-
-    `dragged` is the current position of the point, as a point of the core, or None in a script.
-    """
+class PointDrag(ChangesPoints):
+    """A mixin for operators that change a point which can be dragged."""
 
     FROM_MOUSE = bpy.props.BoolProperty(
         name="From Mouse",
@@ -41,16 +47,18 @@ class PointDrag:
         options={"SKIP_SAVE", "HIDDEN"},
     )
 
-    dragged = None
-    _live = None
+    _live: LiveCurve | None = None
+    if TYPE_CHECKING:  # Blender evaluates annotations of operators without loading the core
+        _scratch: time_slices.Work[list[Answer]] | None
+    _scratch = None
     _is_dragging = False
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.from_mouse:
             return super().invoke(context, event)
         return with_error_reports(self, lambda: self._press(context, event))
 
-    def _press(self, context, event):
+    def _press(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self._opened = self.open_curve(context)
         self._view = picking.view_on(context, self._opened.mesh_object, self._opened.surface)
         pixel = picking.pixel_of(event)
@@ -65,7 +73,7 @@ class PointDrag:
         requests = edited_curve.request(self._opened, self.changed(self._opened))
         self._live = LiveCurve(requests[0]) if requests else None
         self._preview = _Preview(self._opened)
-        self._scratch, self._last_move = None, 0.0
+        self._last_move = 0.0
         if self._live is not None and self._is_new:
             self._live.move(self.changed(self._opened))
         self._show_drag()  # may fail, so it comes before everything that has to be undone then
@@ -76,7 +84,7 @@ class PointDrag:
         self._is_dragging = True
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self._is_dragging:
             return super().modal(context, event)
         try:
@@ -88,19 +96,19 @@ class PointDrag:
             self._stop(context)
         return result
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         """Stop the drag; called by Blender when it ends the operator, for example when it quits."""
         if self._is_dragging:
             self._end_drag(context)
         else:
             super().cancel(context)
 
-    def _stop(self, context) -> None:
+    def _stop(self, context: bpy.types.Context) -> None:
         """End the drag unless it has ended already."""
         if self._is_dragging:
             self._end_drag(context)
 
-    def _modal(self, context, event):
+    def _modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "MOUSEMOVE":
             self._move(context, event)
         elif event.type == "TIMER":
@@ -114,7 +122,7 @@ class PointDrag:
             return {"PASS_THROUGH"}
         return {"RUNNING_MODAL"}
 
-    def _move(self, context, event) -> None:
+    def _move(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         pixel = picking.pixel_of(event)
         if (pixel == self._pressed).all():
             return
@@ -139,7 +147,7 @@ class PointDrag:
             if time.monotonic() - self._last_move < PAUSE:
                 return
             if self._scratch is None:
-                requests = edited_curve.request(self._opened, live.request.points)
+                requests = edited_curve.request(self._opened, self.changed(self._opened))
                 self._scratch = time_slices.Work(lambda progress: answer_all(requests, progress))
             if not self._scratch.run_slice(TIME_SLICE):
                 return
@@ -158,43 +166,48 @@ class PointDrag:
         curve = None if live is None else live.curve
         problem = "" if live is None else live.problem
         overlay.show_dragged(self._opened, points, curve, problem)
-        if curve is not None and live.request.start is not self._opened.curve:
+        if live is not None and curve is not None and live.request.start is not self._opened.curve:
             self._preview.show(curve)
         redraw()
 
-    def _release(self, context):
+    def _release(self, context: bpy.types.Context) -> set[str]:
+        from ... import nicmm_core as nicmm
+
         live, opened = self._live, self._opened
         moved = np.isnan(self._pressed).any()
         if not moved and not self._is_new:
             self._end_drag(context)
             return {"CANCELLED"}
         self._points = self.changed(opened)
-        self.position = opened.surface.points(self.dragged.faces, self.dragged.barycentric)[0]
+        place = self.place(opened)
+        self.position = opened.surface.points(place.faces, place.barycentric)[0]
         requests = edited_curve.request(opened, self._points)
         design = None
         if live is not None and not live.waiting and not live.problem:
             # Keep the curve that the user sees: go on from it, or take it if it has converged.
             requests = [live.request]
-            if not live.steps_left and hasattr(live.request.start, "curves"):
+            if not live.steps_left and isinstance(live.request.start, nicmm.Design):
                 design = live.request.start
         self._end_drag(context)
         return with_error_reports(self, lambda: self._commit(context, requests, design))
 
-    def _commit(self, context, requests: list, design):
+    def _commit(
+        self, context: bpy.types.Context, requests: list, design: Design | None
+    ) -> set[str]:
         if design is not None:
             return self.end(context, requests, [design])
         # The points stay visible during a long computation.
         overlay.show_dragged(self._opened, self._points, self._opened.curve)
-        result = set()
+        result: set[str] = set()
         try:
             result = self.answer(context, requests)
         finally:
             if "RUNNING_MODAL" not in result:
-                overlay.show_dragged(None)
+                overlay.show_active()
         return result
 
-    def tidy(self, context):
-        overlay.show_dragged(None)
+    def tidy(self, context: bpy.types.Context) -> None:
+        overlay.show_active()
         super().tidy(context)
 
     def _stop_scratch(self) -> None:
@@ -202,12 +215,12 @@ class PointDrag:
             self._scratch.cancel()
             self._scratch = None
 
-    def _end_drag(self, context) -> None:
+    def _end_drag(self, context: bpy.types.Context) -> None:
         """End the drag: restore the window and the object."""
         self._is_dragging = False
         self._stop_scratch()
         self._preview.restore()
-        overlay.show_dragged(None)
+        overlay.show_active()
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
         redraw()
@@ -216,11 +229,11 @@ class PointDrag:
 class _Preview:
     """Shows the dragged curve in its object, through a copy of its data that is removed later."""
 
-    def __init__(self, opened) -> None:
+    def __init__(self, opened: Opened) -> None:
         self._opened = opened
         self._original = self._copy = ""
 
-    def show(self, curve) -> None:
+    def show(self, curve: SurfaceCurve) -> None:
         """Draw a curve."""
         shown = self._opened.curve_object
         if shown is None:

@@ -4,19 +4,23 @@
 Each has a full `execute` and is one undo step. The only state is the curve object with its record.
 """
 
+from typing import TYPE_CHECKING
+
 import bpy
-import numpy as np
 
 from ..operators import polls
 from ..operators.error_reports import with_error_reports
-from ..operators.long_solves import LongSolves
 from ..outputs import edited_curve
-from ..outputs.writing import SEPARATE
+from ..outputs.edited_curve import Opened
 from ..scene import curve_record
 from ..scene.messages import InputError
 from ..settings import CURVE
 from . import modes
+from .changes_points import ChangesPoints
 from .point_drag import PointDrag
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfacePoints
 
 POSITION = bpy.props.FloatVectorProperty(
     name="Position",
@@ -35,65 +39,7 @@ INDEX = bpy.props.IntProperty(
 )
 
 
-class _ChangesPoints(LongSolves):
-    """A mixin for operators with `changed(opened)`: designs the curve through these points."""
-
-    @classmethod
-    def poll(cls, context):
-        has_mesh = curve_record.mesh_of_context(context) is not None
-        return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
-
-    def requests(self, context) -> list:
-        self._opened = self.open_curve(context)
-        self._points = self.changed(self._opened)
-        return edited_curve.request(self._opened, self._points)
-
-    def open_curve(self, context):
-        """Open the curve to change."""
-        edited = edited_curve.chosen(context, self.curve)
-        if edited is None:
-            raise InputError(polls.NO_CURVE)
-        return edited_curve.open_curve(context, edited)
-
-    def finish(self, context, _requests: list, answers: list) -> set:
-        curves = edited_curve.curves_of(answers)
-        panel = context.scene.nicmm_curves
-        opened, points = self._opened, self._points
-        result = edited_curve.write(context, opened, points, curves, _Output(panel))
-        modes.make_active(context, result)
-        if opened.remark:
-            self.report({"WARNING"}, f'"{result.name}" through {len(points)} points{opened.remark}')
-        return {"FINISHED"}
-
-    def checked_index(self, opened) -> int:
-        """The index of the control point; an error if there is no such point."""
-        count = len(opened.points)
-        if not 0 <= self.index < count:
-            raise InputError(
-                f"There is no control point {self.index}; the curve has {count}, counted from 0"
-            )
-        return self.index
-
-    def place(self, opened):
-        """The position of the new or moved point on the surface, as a point of the core."""
-        if self.dragged is not None:
-            return self.dragged
-        given = np.array([self.position[:]], dtype=float)
-        if self.from_mouse:  # the redo panel after a click, where any position can be entered
-            return edited_curve.nearest_surface_points(opened, given)
-        return edited_curve.surface_points_at(opened, given, "position")
-
-
-class _Output:
-    """The output settings of the sidebar for a new object, limited to outputs of the tool."""
-
-    def __init__(self, panel) -> None:
-        self.output = panel.output if panel.output in SEPARATE else "CURVE"
-        for name in ("spline", "radius", "thickness", "offset", "tube"):
-            setattr(self, name, getattr(panel, name))
-
-
-class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
+class NICMM_OT_add_point(PointDrag, bpy.types.Operator):
     """Add a control point at the end of the active curve, or begin a new curve on the mesh"""
 
     bl_idname = "nicmm.add_point"
@@ -104,14 +50,14 @@ class NICMM_OT_add_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def open_curve(self, context):
+    def open_curve(self, context: bpy.types.Context) -> Opened:
         return edited_curve.open_curve(context, edited_curve.chosen(context, self.curve))
 
-    def changed(self, opened):
+    def changed(self, opened: Opened) -> "SurfacePoints":
         return edited_curve.with_point(opened.points, len(opened.points), self.place(opened))
 
 
-class NICMM_OT_insert_point(PointDrag, _ChangesPoints, bpy.types.Operator):
+class NICMM_OT_insert_point(PointDrag, bpy.types.Operator):
     """Insert a control point between two control points of a curve"""
 
     bl_idname = "nicmm.insert_point"
@@ -128,14 +74,14 @@ class NICMM_OT_insert_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def changed(self, opened):
+    def changed(self, opened: Opened) -> "SurfacePoints":
         count = len(opened.points)
         if self.index != count:
             self.checked_index(opened)
         return edited_curve.with_point(opened.points, self.index, self.place(opened))
 
 
-class NICMM_OT_move_point(PointDrag, _ChangesPoints, bpy.types.Operator):
+class NICMM_OT_move_point(PointDrag, bpy.types.Operator):
     """Move a control point of a curve on the surface"""
 
     bl_idname = "nicmm.move_point"
@@ -147,12 +93,12 @@ class NICMM_OT_move_point(PointDrag, _ChangesPoints, bpy.types.Operator):
     position: POSITION
     from_mouse: PointDrag.FROM_MOUSE
 
-    def changed(self, opened):
+    def changed(self, opened: Opened) -> "SurfacePoints":
         number = self.checked_index(opened)
         return edited_curve.with_point(opened.points, number, self.place(opened), replaced=True)
 
 
-class NICMM_OT_remove_point(_ChangesPoints, bpy.types.Operator):
+class NICMM_OT_remove_point(ChangesPoints, bpy.types.Operator):
     """Remove a control point from a curve"""
 
     bl_idname = "nicmm.remove_point"
@@ -162,7 +108,7 @@ class NICMM_OT_remove_point(_ChangesPoints, bpy.types.Operator):
     curve: CURVE
     index: INDEX
 
-    def changed(self, opened):
+    def changed(self, opened: Opened) -> "SurfacePoints":
         return edited_curve.without_point(opened.points, self.checked_index(opened))
 
 
@@ -176,14 +122,14 @@ class NICMM_OT_activate_curve(bpy.types.Operator):
     curve: CURVE
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         has_mesh = curve_record.mesh_of_context(context) is not None
         return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         chosen = edited_curve.chosen(context, self.curve)
         if chosen is None:
             raise InputError(polls.NO_CURVE)
@@ -200,15 +146,17 @@ class NICMM_OT_end_curve(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         has_curve = edited_curve.active(context) is not None
         return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
         return with_error_reports(self, lambda: self._execute(context))
 
-    def _execute(self, context):
+    def _execute(self, context: bpy.types.Context) -> set[str]:
         ended = edited_curve.active(context)
+        if ended is None:
+            raise InputError(polls.NO_CURVE)
         if not curve_record.has_curve(ended):
             raise InputError(curve_record.no_curve_message(ended))
         curve_record.mesh_in_view_layer(context, ended)

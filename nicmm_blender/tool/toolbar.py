@@ -50,7 +50,9 @@ class _SurfaceCurve:
     bl_keymap = KEYMAP
 
     @staticmethod
-    def draw_settings(context, layout, _tool):
+    def draw_settings(
+        context: bpy.types.Context, layout: bpy.types.UILayout, _tool: bpy.types.WorkSpaceTool
+    ) -> None:
         """Draw the settings of the active curve, or of a new one, in the header."""
         curve = edited_curve.active(context)
         if curve is not None:
@@ -84,7 +86,7 @@ class NICMM_WT_weights(_SurfaceCurve, bpy.types.WorkSpaceTool):
 TOOLS = (NICMM_WT_object, NICMM_WT_sculpt, NICMM_WT_weights)
 
 
-def draw_hints(header, context) -> None:
+def draw_hints(header: bpy.types.Header, context: bpy.types.Context) -> None:
     """Draw the tool's mouse buttons and keys at the start of the status bar."""
     if not modes.is_tool_active(context):
         return

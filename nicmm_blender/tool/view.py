@@ -4,9 +4,18 @@
 Positions are in the object's local space, and pixels are coordinates in the viewport's region.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
 import numpy as np
+
+from ..scene.surface import Surface
+
+if TYPE_CHECKING:
+    from ...nicmm_core import Mesh, SurfacePoints
 
 OFFSET = 2e-3
 """Offset towards the eye for drawing and visibility tests, relative to the mesh diagonal."""
@@ -35,8 +44,8 @@ class View:
 
     perspective: np.ndarray
     size: np.ndarray
-    surface: object
-    mesh: object
+    surface: Surface
+    mesh: Mesh
     xray: bool = False
 
     def project(self, positions: np.ndarray) -> np.ndarray:
@@ -58,12 +67,12 @@ class View:
         near, far = ends
         return near, far - near
 
-    def ray(self, pixel) -> tuple[np.ndarray, np.ndarray]:
+    def ray(self, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Line of sight through a pixel: near end, and the vector to its far end."""
         (near,), (direction,) = self.rays(np.asarray(pixel, dtype=np.float64)[None])
         return near, direction
 
-    def surface_point_at(self, pixel):
+    def surface_point_at(self, pixel: np.ndarray) -> SurfacePoints | None:
         """The visible point of the surface under a pixel, as a point of the core, or None."""
         from ...nicmm_core.geometry.surface_points import first_hits
 
@@ -97,7 +106,7 @@ class View:
         room = OFFSET * self.surface.diagonal / np.maximum(lengths, np.finfo(float).tiny)
         return seen & (along >= 1.0 - room)
 
-    def nearest_point(self, pixel, positions: np.ndarray, reach: float) -> int | None:
+    def nearest_point(self, pixel: np.ndarray, positions: np.ndarray, reach: float) -> int | None:
         """The index of the visible position nearest to a pixel, or None if none is within reach.
 
         `reach` is in pixels.
@@ -108,7 +117,7 @@ class View:
         return int(near[away[near].argmin()]) if len(near) else None
 
     def nearest_on_line(
-        self, pixel, line: np.ndarray, reach: float, radius: float = 0.0
+        self, pixel: np.ndarray, line: np.ndarray, reach: float, radius: float = 0.0
     ) -> tuple[int, float] | None:
         """The segment of a polyline (n, 3) nearest to a pixel, and the fraction along the segment.
 
@@ -141,7 +150,7 @@ class View:
         across = 0.5 * self.size[0] * np.linalg.norm(self.perspective[0, :3])
         return radius * across / np.maximum(depth, np.finfo(float).tiny)
 
-    def _towards(self, pixel, centres: np.ndarray, radius: float) -> np.ndarray:
+    def _towards(self, pixel: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
         """Points where the line of sight through a pixel enters spheres about the centres.
 
         For a sphere that the line of sight misses, the point of its outline nearest to that line.
@@ -156,7 +165,14 @@ class View:
         return centres + across - depth[:, None] * direction
 
 
-def view_of(region, region_3d, mesh_object, surface, mesh, xray: bool = False) -> View:
+def view_of(
+    region: bpy.types.Region,
+    region_3d: bpy.types.RegionView3D,
+    mesh_object: bpy.types.Object,
+    surface: Surface,
+    mesh: Mesh,
+    xray: bool = False,
+) -> View:
     """The view of a viewport's region."""
     perspective = np.array(region_3d.perspective_matrix @ mesh_object.matrix_world)
     size = np.array([region.width, region.height], float)

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -173,6 +174,7 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
     record = import_module(f"{empty_scene.name}.nicmm_blender.scene.curve_record")
     designing = bpy.ops.nicmm.design_curve.get_rna_type().properties
     editing = bpy.ops.nicmm.edit_curve.get_rna_type().properties
+    recorded = {}
     for option in table.OPTIONS:
         if option.kind is table.Kind.POINTS:
             continue
@@ -180,7 +182,11 @@ def test_properties_follow_the_options_of_the_core(empty_scene):
         assert designing[name].name == option.label
         is_new_curve_option = option.name in ("order", "alternatives")
         assert (name in editing) == (not is_new_curve_option and option.name != "method")
-        assert (name in record.CurveSettings.__dataclass_fields__) == (not is_new_curve_option)
+        if not is_new_curve_option:
+            recorded[name] = designing[name].default
+    found = asdict(record.CurveSettings())
+    assert list(found) == [*recorded, "use_modifiers"]  # the digest depends on the order
+    assert found == {**recorded, "use_modifiers": True}
     added = table.Option("torsion", table.Kind.NUMBER, 2.0, "Torsion", "Twist", limits=(0.0, 5.0))
     whole = table.Option("turns", table.Kind.COUNT, 1, "Turns", "Winds", limits=(0.0, 9.0))
     made = settings.properties_of((*table.OPTIONS, added, whole))

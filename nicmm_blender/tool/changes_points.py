@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The base of the operators that change single control points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ..operators import polls
+from ..operators.long_solves import LongSolves
+from ..outputs import edited_curve
+from ..outputs.edited_curve import Opened
+from ..outputs.writing import SEPARATE
+from ..scene import curve_record
+from ..scene.design_request import DesignRequest
+from ..scene.messages import InputError
+from . import modes
+
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfacePoints
+    from ..scene.design_request import Answer
+
+
+class ChangesPoints(LongSolves):
+    """A mixin for operators that change control points: designs the curve through the new ones.
+
+    `dragged` is the position of a dragged point, as a point of the core, or None in a script.
+    """
+
+    curve: str
+    index: int
+    position: Sequence[float]
+    from_mouse: bool
+    """Properties of the operators; each has those that it needs."""
+
+    if TYPE_CHECKING:  # Blender evaluates annotations of operators without loading the core
+        dragged: SurfacePoints | None
+    dragged = None
+
+    def changed(self, opened: Opened) -> SurfacePoints:
+        """The control points after the change."""
+        raise NotImplementedError
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        has_mesh = curve_record.mesh_of_context(context) is not None
+        return polls.usable(cls, context, has_mesh, polls.NO_MESH_OR_CURVE, polls.TOOL)
+
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
+        self._opened = self.open_curve(context)
+        self._points = self.changed(self._opened)
+        return edited_curve.request(self._opened, self._points)
+
+    def open_curve(self, context: bpy.types.Context) -> Opened:
+        """Open the curve to change."""
+        edited = edited_curve.chosen(context, self.curve)
+        if edited is None:
+            raise InputError(polls.NO_CURVE)
+        return edited_curve.open_curve(context, edited)
+
+    def finish(
+        self, context: bpy.types.Context, _requests: list[DesignRequest], answers: list[Answer]
+    ) -> set[str]:
+        curves = edited_curve.curves_of(answers)
+        panel = context.scene.nicmm_curves
+        opened, points = self._opened, self._points
+        result = edited_curve.write(context, opened, points, curves, _Output(panel))
+        modes.make_active(context, result)
+        if opened.remark:
+            self.report({"WARNING"}, f'"{result.name}" through {len(points)} points{opened.remark}')
+        return {"FINISHED"}
+
+    def checked_index(self, opened: Opened) -> int:
+        """The index of the control point; an error if there is no such point."""
+        count = len(opened.points)
+        if not 0 <= self.index < count:
+            raise InputError(
+                f"There is no control point {self.index}; the curve has {count}, counted from 0"
+            )
+        return self.index
+
+    def place(self, opened: Opened) -> SurfacePoints:
+        """The position of the new or moved point on the surface, as a point of the core."""
+        if self.dragged is not None:
+            return self.dragged
+        given = np.array([self.position[:]], dtype=float)
+        if self.from_mouse:  # the redo panel after a click, where any position can be entered
+            return edited_curve.nearest_surface_points(opened, given)
+        return edited_curve.surface_points_at(opened, given, "position")
+
+
+class _Output:
+    """The output settings of the sidebar for a new object, limited to outputs of the tool."""
+
+    def __init__(self, panel: bpy.types.PropertyGroup) -> None:
+        self.output: str = panel.output if panel.output in SEPARATE else "CURVE"
+        self.spline: str = panel.spline
+        self.radius: float = panel.radius
+        self.thickness: float = panel.thickness
+        self.offset: float = panel.offset
+        self.tube: bool = panel.tube
