@@ -4,9 +4,12 @@
 Its options are the properties of *Design Curve on Surface*, read from their Blender definitions.
 """
 
+from __future__ import annotations
+
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -17,10 +20,10 @@ from .scene.messages import InputError
 COMMAND = "nicmm"
 FAILED = 2
 
-_registered: list = []
+_registered: list[object] = []
 
 
-def main(arguments: list) -> int:
+def main(arguments: list[str]) -> int:
     """Run the command; return 0, or 2 after a message on standard error if it failed."""
     try:
         options = parser().parse_args(arguments)
@@ -78,7 +81,7 @@ def activate(name: str | None) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def _points(options: argparse.Namespace) -> dict:
+def _points(options: argparse.Namespace) -> dict[str, str]:
     """The control points as arguments of the operator."""
     for name in ("group", "points"):
         if getattr(options, name) == "":
@@ -119,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
     return command_parser
 
 
-def _option(described: bpy.types.Property) -> dict:
+def _option(described: bpy.types.Property) -> dict[str, Any]:
     """The argparse keywords for a Blender property."""
     # argparse expands % in help texts.
     words = {"help": described.description.replace("%", "%%"), "default": None}

@@ -75,7 +75,7 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
 
 
 @functools.cache
-def library_report() -> tuple:
+def library_report() -> tuple[str, ...]:
     """Lines that list the libraries found, without loading them."""
     lines = []
     for module, name in (("scipy", "SciPy"), ("igl", "libigl")):

@@ -34,7 +34,7 @@ CURVE = StringProperty(
 """The property of operators that names a designed curve."""
 
 
-def properties_of(options: Iterable[Option]) -> dict:
+def properties_of(options: Iterable[Option]) -> dict[str, bpy.props._PropertyDeferred]:
     """Blender properties for core options, by property name; options for points are left out."""
     return {
         curve_record.property_name(option): _property(option)
@@ -266,7 +266,9 @@ APPEARANCE = ("spline", "radius", "offset", "thickness")
 PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotations__)
 
 
-def with_options(given: bpy.props._PropertyDeferred, options: set) -> bpy.props._PropertyDeferred:
+def with_options(
+    given: bpy.props._PropertyDeferred, options: set[str]
+) -> bpy.props._PropertyDeferred:
     """A copy of a property of Blender with other options."""
     return given.function(**{**given.keywords, "options": options})
 

@@ -37,7 +37,7 @@ PAINTING = {"SCULPT"} if bpy.app.version >= (5, 0, 0) else {"SCULPT", "PAINT_WEI
 Blender 4.3 adds none in Weight Paint, 5.2 does. Where both add one, the second changes nothing.
 """
 
-_problems: dict = {}
+_problems: dict[int, tuple[str, str]] = {}
 """Messages about changes that were impossible, by the session_uid of the curve.
 
 Each is stored with the digest of the curve at that time, and is out of date if that has changed.

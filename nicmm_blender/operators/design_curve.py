@@ -12,6 +12,7 @@ from .. import settings
 from ..outputs import writing
 from ..scene import curve_record, design_request, mesh_data, selection
 from ..scene.curve_record import CurveSettings
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError, counted
 from ..scene.surface import Surface, active_modifiers_text, read
 from . import polls
@@ -19,6 +20,7 @@ from .long_solves import LongSolves
 
 if TYPE_CHECKING:
     from ...nicmm_core import Design, SurfacePoints
+    from ..scene.design_request import Answer
 
 # For reports, by the core's name of the order and whether the points are the selected vertices.
 ORDER_NAMES = {
@@ -63,7 +65,7 @@ class NICMM_OT_design_curve(
         settings.take_from_sidebar(self, context.scene.nicmm_curves)
         return super().invoke(context, event)
 
-    def requests(self, context: bpy.types.Context) -> list:
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
         mesh_object = mesh_data.mesh_object(context)
         mesh_data.synchronise(mesh_object)
         surface = read(mesh_object, self.use_modifiers)
@@ -93,7 +95,9 @@ class NICMM_OT_design_curve(
             vertices, order = selection.selected_points(mesh_object, self.order)
         return selection.points_at(surface, vertices), order
 
-    def finish(self, context: bpy.types.Context, requests: list, answers: list) -> set:
+    def finish(
+        self, context: bpy.types.Context, requests: list[DesignRequest], answers: "list[Answer]"
+    ) -> set[str]:
         from ... import nicmm_core as nicmm
 
         (request,), (design,) = requests, answers
@@ -139,7 +143,7 @@ def _summary(
     return f"{summary}, on the mesh without its {shown}" if shown else summary
 
 
-def _repairs_text(repairs: dict) -> str:
+def _repairs_text(repairs: dict[str, int]) -> str:
     """What was repaired, such as "vertices joined (40), faces turned (12)"."""
     return ", ".join(f"{repair} ({number:,})" for repair, number in repairs.items())
 

@@ -154,7 +154,11 @@ def _unnoticed() -> Iterator[None]:
         _updates.is_reading = False
 
 
-def _add_request(designed: bpy.types.Object, mesh_object: bpy.types.Object, surfaces: dict) -> None:
+def _add_request(
+    designed: bpy.types.Object,
+    mesh_object: bpy.types.Object,
+    surfaces: dict[tuple[bpy.types.Object, bool], Surface],
+) -> None:
     """Add a request for a curve if it is outdated; `surfaces` caches the surfaces read so far."""
     from ... import nicmm_core as nicmm
 

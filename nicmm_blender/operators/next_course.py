@@ -6,6 +6,7 @@ operator searches for courses again, and the user chooses one of them.
 """
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.app.handlers import persistent
@@ -14,15 +15,22 @@ from bpy.props import IntProperty
 from ..outputs import edited_curve
 from ..outputs.edited_curve import Opened
 from ..scene import curve_record, surface_cache
+from ..scene.design_request import DesignRequest
 from ..scene.messages import InputError
 from ..settings import CURVE
 from . import polls
 from .long_solves import LongSolves
 
+if TYPE_CHECKING:
+    from ...nicmm_core import SurfaceCurve
+    from ..scene.design_request import Answer
+
 ALTERNATIVES = 4
 """Greatest number of courses besides the fairest one."""
 
-_found: dict = {}
+Key = tuple[str, bytes, bytes]
+
+_found: "dict[Key, list[SurfaceCurve]]" = {}
 """The courses of the last search by what they depend on, so that a next call takes no time."""
 
 
@@ -48,7 +56,7 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
         has_curve = edited_curve.active(context) is not None
         return polls.usable(cls, context, has_curve, polls.NO_CURVE, polls.TOOL)
 
-    def requests(self, context: bpy.types.Context) -> list:
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
         if self.options.is_repeat_last:
             self.course = 0  # it holds the number that was selected last
         edited = edited_curve.chosen(context, self.curve)
@@ -64,12 +72,14 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
         options = {**request.options, "alternatives": ALTERNATIVES}
         return [replace(request, start=None, options=options)]
 
-    def finish(self, context: bpy.types.Context, _requests: list, answers: list) -> set:
+    def finish(
+        self, context: bpy.types.Context, _requests: list[DesignRequest], answers: "list[Answer]"
+    ) -> set[str]:
         opened = self._opened
         if answers:
-            edited_curve.curves_of(answers)  # raises an answer that is an error
+            fairest = edited_curve.design_of(answers[0])
             _found.clear()
-            designs = [answers[0], *answers[0].alternatives]
+            designs = [fairest, *fairest.alternatives]
             _found[self._key] = [design.curves[0] for design in designs]
         if opened.curve_object is None:
             raise InputError(edited_curve.DELETED)
@@ -85,14 +95,14 @@ class NICMM_OT_next_course(LongSolves, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _key(opened: Opened) -> tuple:
+def _key(opened: Opened) -> Key:
     """Everything that the courses of a curve depend on."""
     points = opened.points
     on = curve_record.digest(opened.mesh_object, opened.surface, opened.settings)
     return on, points.faces.tobytes(), points.barycentric.tobytes()
 
 
-def _current(opened: Opened, courses: list) -> int | None:
+def _current(opened: Opened, courses: "list[SurfaceCurve]") -> int | None:
     """The index of the course that a curve takes; None if it takes none of them."""
     from ...nicmm_core.courses.comparison import current_course
 

@@ -17,7 +17,7 @@ class PartialCurve:
     """A polyline in world space, drawn in front of everything until it is removed."""
 
     def __init__(self) -> None:
-        self._positions: list = []
+        self._positions: list[list[float]] = []
         self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def show(self, points: np.ndarray, closed: bool) -> None:

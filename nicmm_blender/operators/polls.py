@@ -32,7 +32,7 @@ def usable(
     context: bpy.types.Context,
     has_object: bool,
     missing: str,
-    modes: tuple,
+    modes: tuple[set[str], str],
 ) -> bool:
     """Whether an operator can run; if not, set its message.
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that designs the curves of a mesh again."""
 
+from typing import TYPE_CHECKING
+
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
@@ -12,6 +14,9 @@ from ..scene.messages import InputError, counted
 from ..scene.surface import read
 from . import polls
 from .long_solves import LongSolves
+
+if TYPE_CHECKING:
+    from ..scene.design_request import Answer
 
 
 class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
@@ -40,7 +45,7 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
             return False
         return True
 
-    def requests(self, context: bpy.types.Context) -> list:
+    def requests(self, context: bpy.types.Context) -> list[DesignRequest]:
         chosen = None
         if self.use_panel:
             chosen = curve_record.settings_from(context.scene.nicmm_curves)
@@ -71,7 +76,9 @@ class NICMM_OT_update_curves(LongSolves, bpy.types.Operator):
             )
         return [each for each in curves if not curve_record.is_unfinished(each)] or curves
 
-    def finish(self, _context: bpy.types.Context, requests: list, answers: list) -> set:
+    def finish(
+        self, _context: bpy.types.Context, requests: list[DesignRequest], answers: "list[Answer]"
+    ) -> set[str]:
         total = len(requests) + len(self._failed)
         for name, request, answer in zip(self._names, requests, answers, strict=True):
             try:

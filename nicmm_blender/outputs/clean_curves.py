@@ -7,6 +7,7 @@ its record holds the exact curve.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from ..scene.surface import Surface
 
 if TYPE_CHECKING:
     from ...nicmm_core import Mesh, SurfaceCurve
+    from ...nicmm_core.splines.even_spacing import SampledCurve
 
 EVEN, EXACT, BEZIER = "EVEN", "EXACT", "BEZIER"
 
@@ -58,7 +60,7 @@ class Knots:
 Spline = Polyline | Knots
 
 
-def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list:
+def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list[Spline]:
     """The splines that show curves, each a `Polyline` or `Knots`."""
     if drawing.spline == BEZIER:
         return [_knots(surface, curve, drawing) for curve in curves]
@@ -68,7 +70,9 @@ def splines(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> l
     ]
 
 
-def on_surface(surface: Surface, curves: list[SurfaceCurve], drawing: Drawing) -> list:
+def on_surface(
+    surface: Surface, curves: list[SurfaceCurve], drawing: Drawing
+) -> Sequence[SurfaceCurve | SampledCurve]:
     """Curves of the core whose points are those of the polylines to draw."""
     if drawing.spline == EXACT:
         return curves
@@ -98,7 +102,9 @@ def _knots(surface: Surface, curve: SurfaceCurve, drawing: Drawing) -> Knots:
     return Knots(curve.closed, fitted.knots @ back, fitted.left @ back, fitted.right @ back, smooth)
 
 
-def _offset_points(surface: Surface, curve: SurfaceCurve, offset: float) -> np.ndarray:
+def _offset_points(
+    surface: Surface, curve: SurfaceCurve | SampledCurve, offset: float
+) -> np.ndarray:
     """Points of a curve in the mesh's local space, offset from the surface along its normals."""
     if not offset:
         return surface.points(curve.faces, curve.barycentric)

@@ -23,12 +23,13 @@ from . import curve_object, writing
 from .writing import ObjectSettings
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfaceCurve, SurfacePoints
+    from ...nicmm_core import Design, SurfaceCurve, SurfacePoints
     from ..scene.design_request import Answer
 
 MAPS = ("obstacle_group", "alignment_group")
 
 DELETED = "The curve was deleted while it was being designed. Undo to bring it back"
+MESH_DELETED = "The mesh was deleted while a curve was being drawn on it. Undo to bring it back"
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,12 @@ class Opened:
     remark: str
 
     @property
-    def mesh_object(self) -> bpy.types.Object | None:
-        """The mesh object."""
-        return by_uid(self.mesh_uid)
+    def mesh_object(self) -> bpy.types.Object:
+        """The mesh object; an error if it has been deleted."""
+        found = by_uid(self.mesh_uid)
+        if found is None:
+            raise InputError(MESH_DELETED)
+        return found
 
     @property
     def curve_object(self) -> bpy.types.Object | None:
@@ -189,15 +193,17 @@ def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
 
 
 def curves_of(answers: list[Answer]) -> list[SurfaceCurve]:
-    """The curves in the answers to `request`; an answer that is an error is raised."""
-    curves: list[SurfaceCurve] = []
-    for answer in answers:
-        if isinstance(answer, Exception):
-            raise answer
-        if not answer.curves:
-            raise InputError(sentence(str(answer.status)))
-        curves += answer.curves
-    return curves
+    """The curves in the answers to `request`; an error if an answer has none."""
+    return [curve for answer in answers for curve in design_of(answer).curves]
+
+
+def design_of(answer: Answer) -> Design:
+    """The design in an answer; an error if it has no curves. An error is raised again."""
+    if isinstance(answer, Exception):
+        raise answer
+    if not answer.curves:
+        raise InputError(sentence(str(answer.status)))
+    return answer
 
 
 def write(
@@ -215,23 +221,25 @@ def write(
         return rewrite(edited, points, curves)
     mesh_object = edited.mesh_object
     result = writing.as_object(mesh_object, edited.surface, curves, settings)
-    _record(result, edited, points, curves, writing.drawn_as(settings))
+    _record(result, mesh_object, edited, points, curves, writing.drawn_as(settings))
     curve_object.place(context, mesh_object, result)
     return result
 
 
 def rewrite(edited: Opened, points: SurfacePoints, curves: list[SurfaceCurve]) -> bpy.types.Object:
     """Write curves through points to the curve object, and return it."""
-    result = edited.curve_object
+    result, mesh_object = edited.curve_object, edited.mesh_object
     if result is None:
         raise InputError(DELETED)
     writing.redraw(result, edited.surface, curves)
-    _record(result, edited, points, curves, curve_record.drawn_as(result))
+    drawn = curve_record.drawn_as(result)
+    _record(result, mesh_object, edited, points, curves, drawn)
     return result
 
 
 def _record(
     result: bpy.types.Object,
+    mesh_object: bpy.types.Object,
     edited: Opened,
     points: SurfacePoints,
     curves: list[SurfaceCurve],
@@ -239,7 +247,7 @@ def _record(
 ) -> None:
     curve_settings = replace(edited.settings, method="NICMM")
     curve_record.write_record(
-        result, edited.mesh_object, edited.surface, curves, curve_settings, drawn, points
+        result, mesh_object, edited.surface, curves, curve_settings, drawn, points
     )
 
 

@@ -125,7 +125,7 @@ def apply(
     cut: CutMesh,
     polygons: CutPolygons,
     weights: np.ndarray,
-) -> tuple[list, list]:
+) -> tuple[list[bmesh.types.BMVert], list[bmesh.types.BMFace]]:
     """Cut a BMesh.
 
     Parameters
@@ -182,8 +182,8 @@ def apply(
 
 
 def _new_vertices(
-    edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list
-) -> list:
+    edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list[bmesh.types.BMVert]
+) -> list[bmesh.types.BMVert]:
     new_vertices = []
     for face, weight in zip(cut.new_face.tolist(), cut.new_barycentric, strict=True):
         around = [
@@ -205,9 +205,11 @@ def _new_vertices(
     return new_vertices
 
 
-def _split_edges(edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list) -> list:
+def _split_edges(
+    edited: bmesh.types.BMesh, surface: Surface, cut: CutMesh, vertices: list[bmesh.types.BMVert]
+) -> list[bmesh.types.BMEdge]:
     """Add the parts of the cut edges, with their attributes; return the old edges."""
-    along: dict = {}
+    along: dict[tuple[int, int], list[tuple[float, int]]] = {}
     n_input = len(surface.local_positions)
     for new, (face, weight) in enumerate(
         zip(cut.new_face.tolist(), cut.new_barycentric.tolist(), strict=True)
@@ -233,12 +235,16 @@ class _SourceTriangles:
     """Temporary faces for the triangles of polygons, as sources for interpolated corners."""
 
     def __init__(
-        self, edited: bmesh.types.BMesh, mesh: bpy.types.Mesh, surface: Surface, old_faces: dict
+        self,
+        edited: bmesh.types.BMesh,
+        mesh: bpy.types.Mesh,
+        surface: Surface,
+        old_faces: dict[int, bmesh.types.BMFace],
     ) -> None:
         self.edited, self.surface, self.old_faces = edited, surface, old_faces
         self.loop_starts = _loop_starts(mesh)
-        self.faces: dict = {}
-        self.helper_vertices: list = []
+        self.faces: dict[int, bmesh.types.BMFace] = {}
+        self.helper_vertices: list[bmesh.types.BMVert] = []
 
     def interpolate(
         self, face: bmesh.types.BMFace, place: int, triangle: int, weight: np.ndarray
@@ -253,7 +259,9 @@ class _SourceTriangles:
             loop = face.loops[place]
             loop.copy_from_face_interp(self._face(triangle, source, places), False, False)
 
-    def _face(self, triangle: int, source: bmesh.types.BMFace, places: list) -> bmesh.types.BMFace:
+    def _face(
+        self, triangle: int, source: bmesh.types.BMFace, places: list[int]
+    ) -> bmesh.types.BMFace:
         if len(source.loops) == 3:
             return source
         if triangle not in self.faces:

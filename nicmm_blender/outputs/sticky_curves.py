@@ -69,20 +69,20 @@ def write(
     radii = _radii(data)
     if not len(data.points):
         radii = np.zeros(1), np.array([drawing.radius / scale_of(curve_object, surface)])
-    curves = on_surface(surface, curves, drawing)
+    shown = on_surface(surface, curves, drawing)
     if len(data.curves):
         data.remove_curves()
-    if not curves:
+    if not shown:
         data[RADIUS] = float(radii[1].max())
         return
-    data.add_curves([len(curve.faces) for curve in curves])
-    faces = np.concatenate([curve.faces for curve in curves])
-    barycentric = np.concatenate([curve.barycentric for curve in curves])
+    data.add_curves([len(curve.faces) for curve in shown])
+    faces = np.concatenate([curve.faces for curve in shown])
+    barycentric = np.concatenate([curve.barycentric for curve in shown])
     points = to_object_space(curve_object, surface.points(faces, barycentric))
     data.points.foreach_set("position", points.astype(np.float32).ravel())
     shares = (np.arange(len(faces)) + 0.5) / len(faces)
     _set(data, "radius", "FLOAT", "POINT", np.interp(shares, *radii))
-    _set(data, "cyclic", "BOOLEAN", "CURVE", np.array([curve.closed for curve in curves]))
+    _set(data, "cyclic", "BOOLEAN", "CURVE", np.array([curve.closed for curve in shown]))
     _set(data, "face", "INT", "POINT", surface.polygons[faces])
     vertices = np.full(len(faces), len(surface.local_positions))
     _set(data, sticky_nodes.VERTICES, "INT", "POINT", vertices)

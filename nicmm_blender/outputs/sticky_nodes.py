@@ -84,7 +84,7 @@ def _new_group() -> bpy.types.NodeTree:
     return group
 
 
-def _in_triangle(column: _Column, surface: bpy.types.NodeSocket) -> tuple:
+def _in_triangle(column: _Column, surface: bpy.types.NodeSocket) -> list[bpy.types.NodeSocket]:
     """The position and normal of each point in its triangle."""
     position = column.node("GeometryNodeInputPosition", 1)
     normal = column.node("GeometryNodeInputNormal", 1)
@@ -99,7 +99,7 @@ def _in_triangle(column: _Column, surface: bpy.types.NodeSocket) -> tuple:
         for corner, weight in zip((first, second), weights.outputs, strict=False):
             value = column.added(value, column.vectors("SUBTRACT", corner, last), weight)
         found.append(value)
-    return tuple(found)
+    return found
 
 
 def _is_unchanged(column: _Column, surface: bpy.types.NodeSocket) -> bpy.types.NodeSocket:

@@ -368,7 +368,9 @@ def _take_inside(edited: bmesh.types.BMesh, other_data: bpy.types.Mesh) -> None:
         other.free()
 
 
-def _cut_in_blender(edited: bmesh.types.BMesh, cutting: _Cutting) -> tuple[list, list]:
+def _cut_in_blender(
+    edited: bmesh.types.BMesh, cutting: _Cutting
+) -> tuple[list[bmesh.types.BMVert], list[bmesh.types.BMFace]]:
     return mesh_cut.apply(
         edited,
         cutting.mesh_object.data,
@@ -379,7 +381,9 @@ def _cut_in_blender(edited: bmesh.types.BMesh, cutting: _Cutting) -> tuple[list,
     )
 
 
-def _chain_edges(edited: bmesh.types.BMesh, cutting: _Cutting, vertices: list) -> list:
+def _chain_edges(
+    edited: bmesh.types.BMesh, cutting: _Cutting, vertices: list[bmesh.types.BMVert]
+) -> list[bmesh.types.BMEdge]:
     pairs = cutting.cut.chain_edges.tolist()
     return [edited.edges.get((vertices[a], vertices[b])) for a, b in pairs]
 
@@ -422,7 +426,11 @@ def _region_layer(edited: bmesh.types.BMesh, region_as: str) -> bmesh.types.BMLa
     return layer
 
 
-def _select_only(edited: bmesh.types.BMesh, mode: str, elements: list) -> None:
+def _select_only(
+    edited: bmesh.types.BMesh,
+    mode: str,
+    elements: list[bmesh.types.BMEdge] | list[bmesh.types.BMFace],
+) -> None:
     edited.select_history.clear()
     for sequence in (edited.faces, edited.edges, edited.verts):
         for element in sequence:

@@ -106,7 +106,9 @@ def groups_of(settings: CurveSettings) -> list[str]:
     return [getattr(settings, name) for name in names]
 
 
-def arguments_of(settings: CurveSettings, weights: Callable[[str], np.ndarray | None]) -> dict:
+def arguments_of(
+    settings: CurveSettings, weights: Callable[[str], np.ndarray | None]
+) -> dict[str, Any]:
     """Settings as keyword arguments for the core.
 
     `weights` is a function from the name of a vertex group to its weights, and from "" to None.
@@ -197,7 +199,7 @@ def write_record(
     surface_cache.note_change()
 
 
-def _flat(arrays: list) -> list:
+def _flat(arrays: list[np.ndarray]) -> list[float]:
     """The values of arrays, one after another."""
     return [value for array in arrays for value in array.ravel().tolist()]
 
@@ -333,7 +335,7 @@ def mesh_of_context(context: bpy.types.Context) -> bpy.types.Object | None:
     return mesh_data.mesh_object(context)
 
 
-def curves_on(context: bpy.types.Context, mesh_object: bpy.types.Object) -> list:
+def curves_on(context: bpy.types.Context, mesh_object: bpy.types.Object) -> list[bpy.types.Object]:
     """Visible curve objects of the view layer that were designed on a mesh."""
     return [
         found
@@ -370,7 +372,7 @@ def lies_on(curve_object: bpy.types.Object, surface: Surface) -> bool:
     )
 
 
-def designed_on(mesh_object: bpy.types.Object) -> list:
+def designed_on(mesh_object: bpy.types.Object) -> list[bpy.types.Object]:
     """All curve objects designed on a mesh object, sorted by name."""
     found = [each for each in bpy.data.objects if has_record(each) and mesh_of(each) == mesh_object]
     return sorted(found, key=lambda each: each.name)
@@ -411,7 +413,7 @@ def surface_of(curve_object: bpy.types.Object, mesh_object: bpy.types.Object) ->
     return read(mesh_object, settings_of(curve_object).use_modifiers)
 
 
-def read_curves(curve_object: bpy.types.Object, surface: Surface) -> list:
+def read_curves(curve_object: bpy.types.Object, surface: Surface) -> list[SurfaceCurve]:
     """The recorded curves as curves of the core, on the current surface."""
     from ... import nicmm_core as nicmm
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -92,7 +92,7 @@ class _Cache:
 
     def clear(self) -> None:
         """Drop everything."""
-        self.surfaces: dict[tuple, Surface] = {}
+        self.surfaces: dict[tuple[int, str, bool], Surface] = {}
         self.computed: dict[bytes, _Computed] = {}
         self.read: set[int] = set()
         self.wanted: set[tuple[int, bool]] = set()
@@ -146,11 +146,11 @@ def cached_or_soon(mesh_object: bpy.types.Object, use_modifiers: bool) -> Surfac
     return found
 
 
-def _key(mesh_object: bpy.types.Object, use_modifiers: bool) -> tuple:
+def _key(mesh_object: bpy.types.Object, use_modifiers: bool) -> tuple[int, str, bool]:
     return mesh_object.session_uid, mesh_object.mode, use_modifiers
 
 
-def _drop_oldest(entries: dict, most: int) -> None:
+def _drop_oldest(entries: dict[Any, Any], most: int) -> None:
     while len(entries) > most:
         del entries[next(iter(entries))]
 

@@ -14,7 +14,7 @@ from .isolation import evaluated_in_isolation
 STORED = "nicmm_weights"
 
 
-def weights_on(mesh: bpy.types.Mesh, groups: list, group: str) -> np.ndarray:
+def weights_on(mesh: bpy.types.Mesh, groups: list[str], group: str) -> np.ndarray:
     """Weights (V,) of all vertices of a mesh in a vertex group; 0 outside the group.
 
     `mesh` may be the evaluated mesh of an object. It is not changed. `groups` are the names of all

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that each click of the tool runs: it calls the one for what is under the mouse."""
 
+from collections.abc import Callable
+
 import bpy
 
 from ..operators.error_reports import with_error_reports
@@ -12,7 +14,7 @@ from .picking import Kind
 PASS = {"PASS_THROUGH"}
 
 
-class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
+class NICMM_OT_draw_on_surface(SlicedOperator[bool], bpy.types.Operator):
     """Add a point to the designed curve, move or insert one, or activate the curve under the mouse
 
     The first click on a large mesh prepares the mesh in time slices before it acts.
@@ -90,7 +92,9 @@ class NICMM_OT_draw_on_surface(SlicedOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _call_of(hit: picking.Hit, remove: bool) -> tuple | None:
+def _call_of(
+    hit: picking.Hit, remove: bool
+) -> tuple[Callable[..., set[str]], dict[str, object]] | None:
     """The operator for what is under the mouse, with its arguments; None if there is none."""
     calls = bpy.ops.nicmm
     if remove:

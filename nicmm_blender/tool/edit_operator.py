@@ -19,7 +19,7 @@ from ..scene.messages import InputError
 from . import modes
 
 if TYPE_CHECKING:
-    from ...nicmm_core import SurfacePoints
+    from ...nicmm_core import SurfaceCurve, SurfacePoints
 
 OBJECT_SETTINGS = ("spline", "radius", "thickness", "offset")
 """Properties of a new curve object, shown in the redo panel."""
@@ -162,7 +162,9 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             self.points.add().position = position
 
 
-def _design_curves(context: bpy.types.Context, opened: Opened, points: "SurfacePoints") -> list:
+def _design_curves(
+    context: bpy.types.Context, opened: Opened, points: "SurfacePoints"
+) -> "list[SurfaceCurve]":
     """The curve through points, as a list; an error if there is none."""
     requests = edited_curve.request(opened, points)
     if not requests:

@@ -19,6 +19,7 @@ from ..operators.long_solves import answer_all
 from ..operators.sliced_operator import TIME_SLICE
 from ..outputs import edited_curve, writing
 from ..outputs.edited_curve import Opened
+from ..scene.design_request import DesignRequest
 from ..scene.viewports import NAVIGATION, redraw
 from . import overlay, picking
 from .changes_points import ChangesPoints
@@ -192,7 +193,7 @@ class PointDrag(ChangesPoints):
         return with_error_reports(self, lambda: self._commit(context, requests, design))
 
     def _commit(
-        self, context: bpy.types.Context, requests: list, design: Design | None
+        self, context: bpy.types.Context, requests: list[DesignRequest], design: Design | None
     ) -> set[str]:
         if design is not None:
             return self.end(context, requests, [design])

@@ -436,6 +436,18 @@ def test_a_curve_deleted_meanwhile_is_not_made_again(empty_scene, curve):
     assert not scenes.curves()
 
 
+def test_a_mesh_deleted_meanwhile_gets_a_message(empty_scene, curve):
+    edited_curve = module(empty_scene, "outputs.edited_curve")
+    opened = edited_curve.open_curve(bpy.context, curve)
+    bpy.data.objects.remove(opened.mesh_object)
+    error = module(empty_scene, "scene.messages").InputError
+    with pytest.raises(error, match="mesh was deleted"):
+        edited_curve.request(opened, opened.points)
+    with pytest.raises(error, match="mesh was deleted"):
+        edited_curve.rewrite(opened, opened.points, [opened.curve])
+    assert len(curve.data.splines) == 1
+
+
 def always(_fraction, _polyline):
     return True
 

@@ -304,6 +304,14 @@ def test_group_of_that_name_which_is_none_of_ours_is_left_alone(monkey, extensio
     assert not other.nodes
 
 
+def test_group_that_has_lost_an_input_is_left_alone(monkey, extension):
+    nodes = module(extension, "outputs.sticky_nodes")
+    group = nodes._new_group()
+    group.interface.remove(group.interface.items_tree[nodes.TUBE])
+    curves = sticky(monkey, tube=True)
+    assert len(rings(curves)) and curves.modifiers[0].node_group != group
+
+
 @pytest.mark.slow
 def test_linked_group_is_left_alone(monkey, extension, tmp_path):
     nodes = module(extension, "outputs.sticky_nodes")
