@@ -110,7 +110,7 @@ def tick(seconds: float = TIME_SLICE) -> float | None:
     if _has_to_wait():
         return WAIT
     if _updates.work.run_slice(seconds):
-        _write(_updates.work.result())
+        _write(_updates.work)
         return PAUSE if _updates.changed else None
     return PAUSE
 
@@ -188,14 +188,14 @@ def _add_request(
     _updates.curves.append((uid, curve_record.digest_of(designed)))
 
 
-def _write(answers: list[Answer]) -> None:
+def _write(work: time_slices.Work[list[Answer]]) -> None:
     """Write the new curves into their objects."""
     from ... import nicmm_core as nicmm
 
     requests, curves = _updates.requests, _updates.curves
     _updates.work, _updates.requests, _updates.curves = None, [], []
     objects = {found.session_uid: found for found in bpy.data.objects}
-    for request, (uid, before), answer in zip(requests, curves, answers, strict=True):
+    for request, (uid, before), answer in zip(requests, curves, work.result(), strict=True):
         designed, mesh_object = objects.get(uid), request.mesh_object()
         if designed is None or mesh_object is None:
             continue

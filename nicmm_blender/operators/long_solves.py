@@ -134,7 +134,7 @@ def answer_all(requests: list[DesignRequest], progress: Progress) -> list[Answer
 
 
 def _part(progress: Progress, done: int, total: int) -> Progress:
-    """The progress function of one part of the work, as many parts of which are done."""
+    """The progress function for the next of `total` parts of the work, after `done` parts."""
     return lambda fraction, polyline: progress((done + fraction) / total, polyline)
 
 

@@ -55,13 +55,12 @@ class Work(Generic[Result]):
 
     def run_slice(self, seconds: float) -> bool:
         """Continue for about this many seconds; return whether the work is done."""
-        if self._thread is None:
-            self._thread = self._start()
         if not self.done:
+            self._thread = self._thread or self._start()
             self._until = time.perf_counter() + seconds
             self._go.release()
             self._back.acquire()
-        if self.done:
+        if self.done and self._thread is not None:
             _parked.discard(self)
             self._thread.join()
         return self.done

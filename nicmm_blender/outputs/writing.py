@@ -326,8 +326,8 @@ def _part_as_object(
     region: Region,
 ) -> str:
     mesh_object = cutting.mesh_object
-    other_data = mesh_object.data.copy()
     inside = _faces_inside(cutting, region)
+    other_data = mesh_object.data.copy()
     with mesh_cut.editable(mesh_object) as edited:
         layer = edited.faces.layers.int.new(INSIDE)
         vertices, faces = _cut_in_blender(edited, cutting)
