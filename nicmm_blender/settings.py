@@ -34,7 +34,8 @@ CURVE = StringProperty(
 """The property of operators that names a designed curve."""
 
 
-def properties_of(options: Iterable[Option]) -> dict[str, bpy.props._PropertyDeferred]:
+# The type of an unregistered property is private, so its name is not evaluated at run time.
+def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
     """Blender properties for core options, by property name; options for points are left out."""
     return {
         curve_record.property_name(option): _property(option)
@@ -43,7 +44,7 @@ def properties_of(options: Iterable[Option]) -> dict[str, bpy.props._PropertyDef
     }
 
 
-def _property(option: Option) -> bpy.props._PropertyDeferred:
+def _property(option: Option) -> "bpy.props._PropertyDeferred":
     """The Blender property for a core option."""
     words = {"name": option.label, "description": option.description}
     if option.kind is Kind.SWITCH:
@@ -102,7 +103,7 @@ class EditingProperties:
     )
 
 
-def _tube_property(default: bool) -> bpy.props._PropertyDeferred:
+def _tube_property(default: bool) -> "bpy.props._PropertyDeferred":
     return BoolProperty(
         name="Tube",
         description="Show the sticky curve as a tube mesh. Before Blender 5.0 the viewport "
@@ -255,7 +256,7 @@ class OutputProperties:
     )
 
 
-def output_property(name: str) -> bpy.props._PropertyDeferred:
+def output_property(name: str) -> "bpy.props._PropertyDeferred":
     """The property of an output setting."""
     return OutputProperties.__annotations__[name]
 
@@ -267,8 +268,8 @@ PROPERTY_NAMES = (*DesignProperties.__annotations__, *OutputProperties.__annotat
 
 
 def with_options(
-    given: bpy.props._PropertyDeferred, options: set[str]
-) -> bpy.props._PropertyDeferred:
+    given: "bpy.props._PropertyDeferred", options: set[str]
+) -> "bpy.props._PropertyDeferred":
     """A copy of a property of Blender with other options."""
     return given.function(**{**given.keywords, "options": options})
 
