@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..errors import ArgumentError, MeshError, NicmmError
+from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
 from .vectors import cross, lengths
@@ -168,6 +169,7 @@ class Mesh:
         """Bounding-box trees over parts of the faces, each with the range of its faces."""
         trees = []
         for first in range(0, len(self.faces), MOST_FACES_PER_TREE):
+            checkpoint()
             faces = slice(first, first + MOST_FACES_PER_TREE)
             tree = igl.AABB()
             tree.init(self.vertices, self.faces[faces])

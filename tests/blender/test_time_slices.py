@@ -224,6 +224,54 @@ def test_short_work_does_not_wait_for_a_timer(counter, empty_scene):
 
 
 @pytest.fixture
+def preparing(empty_scene, no_patience, monkeypatch):
+    """A window with an operator that prepares a sphere for clicks, a search tree per time slice."""
+    core = scenes.installed_core().__name__
+    monkeypatch.setattr(import_module(f"{core}.geometry.mesh"), "MOST_FACES_PER_TREE", 300)
+    monkeypatch.setattr(import_module(f"{core}.progress"), "INTERVAL", 0.0)
+    monkeypatch.setattr(
+        scenes.module(empty_scene, "operators.sliced_operator"), "LONGEST_TIME_SLICE", 0.0
+    )
+    base = scenes.module(empty_scene, "operators.sliced_operator").SlicedOperator
+    cache = scenes.module(empty_scene, "scene.surface_cache")
+    surface = cache.get(scenes.sphere(4), True)  # 1,280 faces
+
+    class Preparing(base):
+        def begin(self, context):
+            return self.work_on(context, lambda progress: cache.prepare(surface, progress))
+
+        def progress_text(self):
+            return "Preparing"
+
+        def done(self, _context, result):
+            return {"FINISHED"}
+
+    window = Window(Preparing)
+    window.is_prepared = lambda: cache.is_prepared(surface)
+    return window
+
+
+def test_a_mesh_is_prepared_in_time_slices(preparing):
+    assert preparing.operator.begin(preparing.context) == {"RUNNING_MODAL"}
+    assert not preparing.is_prepared()
+    assert preparing.finish() == {"FINISHED"}
+    assert preparing.is_prepared()
+    assert len(preparing.texts) == 6  # a tree of 300 faces each, and the end
+
+
+def test_escape_stops_the_preparation_of_a_mesh(preparing):
+    before = threading.active_count()
+    preparing.operator.begin(preparing.context)
+    preparing.send("TIMER")
+    assert preparing.send("ESC", "PRESS") == {"CANCELLED"}
+    assert threading.active_count() == before
+    assert not preparing.is_prepared()
+    preparing.operator.begin(preparing.context)
+    assert preparing.finish() == {"FINISHED"}
+    assert preparing.is_prepared()
+
+
+@pytest.fixture
 def drawing(empty_scene, no_patience):
     """A window with an operator that designs a curve on a sphere and shows its length."""
     solves = scenes.module(empty_scene, "operators.long_solves").LongSolves

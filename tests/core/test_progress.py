@@ -9,6 +9,7 @@ import pytest
 import nicmm_core as nicmm
 from nicmm_core import progress, shapes
 from nicmm_core.courses import attempts
+from nicmm_core.geometry import mesh as mesh_module
 from nicmm_core.progress import CancelledError, checkpoint, placed, subrange, watched
 from tests.oracles.checker import judge_curve
 from tests.oracles.defects import defective_meshes
@@ -171,6 +172,20 @@ def test_points_of_every_stage_lie_near_the_mesh(at_every_checkpoint):
         margin = 0.05 * placed.diagonal
         assert (shown >= placed.vertices.min(axis=0) - margin).all()
         assert (shown <= placed.vertices.max(axis=0) + margin).all()
+
+
+def test_search_trees_can_be_cancelled_and_built_later(at_every_checkpoint, monkeypatch):
+    monkeypatch.setattr(mesh_module, "MOST_FACES_PER_TREE", len(LARGE.faces) // 4)
+    mesh = nicmm.Mesh(LARGE.vertices, LARGE.faces)
+    left = iter(range(2))
+    with (
+        pytest.raises(CancelledError),
+        watched(lambda *_: next(left, None) is not None),
+    ):
+        _ = mesh.face_trees
+    calls = []
+    with watched(lambda *_: calls.append(None)):
+        assert len(mesh.face_trees) == len(calls) == 4
 
 
 class TestWatched:

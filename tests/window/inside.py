@@ -324,6 +324,11 @@ class Helper:
         return any(each.bl_idname.startswith("NICMM") for each in running)
 
     @staticmethod
+    def is_in_time_slices():
+        """Whether an operator of the extension works in time slices."""
+        return bool(import_module(f"{MODULE}.operators.sliced_operator")._running)
+
+    @staticmethod
     def tool():
         """The tool of the current mode."""
         context = bpy.context
