@@ -64,6 +64,10 @@ seem to bend less than they do.
 MOST_DOUBLINGS = 2
 """Number of times that the nodes of courses are doubled at most."""
 
+KEPT_WHEN_DOUBLED, FEWEST_DOUBLED = 0.6, 12
+"""Share of the courses that are kept when nodes are doubled, the best ones by their energies with
+twice as many nodes; and the number that is kept anyway."""
+
 OF_CANDIDATES = (BatchConfig(iterations=8),)
 OF_DOUBLED = (BatchConfig(iterations=6),)
 OF_RECOMBINED = (BatchConfig(iterations=8),)
@@ -146,13 +150,13 @@ def find_courses(
         nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
     best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
-    nodes, visit = curves_of(nodes, best), nodes.by_curve(visit)[best].ravel()
+    nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_FINALISTS)
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
     for one in np.concatenate(_best(surface, nodes, simple, smoothness)).tolist():
-        own, visited = curves_of(nodes, np.array([one])), nodes.by_curve(visit)[one]
+        own, visited = _selected(nodes, visit, np.array([one]))
         for _ in range(2):
             yield own, visited
             own, visited = _resampled(surface, own, visited, 2)
@@ -205,7 +209,8 @@ def _resolved(
 ) -> tuple[Nodes, IntArray, int]:
     """Relaxed courses with as many nodes as their energies need, and how often these were doubled.
 
-    The median over the best courses decides, so that the nodes of all are doubled or none.
+    The median over the best courses decides whether nodes are doubled. Then the worst courses are
+    left out.
     """
     unpainted = replace(surface, feature_map=None)  # with lanes, energies may be negative
     for doublings in range(MOST_DOUBLINGS):
@@ -215,6 +220,10 @@ def _resolved(
         growth = after[best] / np.maximum(before[best], tolerances.TINY)
         if np.median(growth) < UNDER_RESOLVED:
             return nodes, visit, doublings
+        most = max(FEWEST_DOUBLED, int(KEPT_WHEN_DOUBLED * nodes.curves))
+        ascending = np.argsort(_energies(surface, doubled, smoothness), kind="stable")
+        kept = np.sort(ascending[:most])
+        doubled, visit_doubled = _selected(doubled, visit_doubled, kept)
         nodes, visit = _relaxed(surface, doubled, visit_doubled, smoothness, OF_DOUBLED)
     return nodes, visit, MOST_DOUBLINGS
 
@@ -225,6 +234,11 @@ def _resampled(
     """The curves with `times` as many nodes, and the control point at each node."""
     found, former = resampled(surface, nodes, visit >= 0, times)
     return found, np.where(former < 0, -1, visit[former])
+
+
+def _selected(nodes: Nodes, visit: IntArray, which: IntArray) -> tuple[Nodes, IntArray]:
+    """Some of the curves, by their indices, and the control point at each node."""
+    return curves_of(nodes, which), nodes.by_curve(visit)[which].ravel()
 
 
 def _energies(surface: CurveSurface, nodes: Nodes, smoothness: float) -> FloatArray:
