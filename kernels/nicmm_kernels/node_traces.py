@@ -25,7 +25,11 @@ from .library import (
     rows,
 )
 from .nodes import NodeArrays, NodePointers, SurfaceArrays, SurfacePointers
+from .threads import in_threads
 from .traces import FoundTraces, PointList
+
+STEPS_OF_A_THREAD = 1_000
+"""Least number of steps for which another thread is worthwhile."""
 
 
 class _NodePlaces(ctypes.Structure):
@@ -134,18 +138,30 @@ def trace_steps(
         The points in order: the face of the segment after each, and coordinates in it.
     """
     m = rows("start", start)
-    found = FoundTraces(m, limits.most_faces + 2)
-    steps = _StepTraces(
-        m, address("start", start, INT, m), address("end", end, INT, m),
-        found.reached.ctypes.data, found.counts.ctypes.data,
-    )  # fmt: skip
+    address("start", start, INT, m)
+    address("end", end, INT, m)
     placed = _places(places, nodes.count, limits)
-    while found.next_call(meanwhile):
-        _TRACE_STEPS(
-            surface.pointers, placed, nodes.pointers, nodes.curves, steps, found.crossings,
-            library.MOST_WORK, found.done,
+
+    def trace(
+        part: slice, meanwhile: Callable[[], object]
+    ) -> tuple[IntArray, tuple[IntArray, FloatArray]]:
+        count = part.stop - part.start
+        found = FoundTraces(count, limits.most_faces + 2)
+        steps = _StepTraces(
+            count, start[part].ctypes.data, end[part].ctypes.data, found.reached.ctypes.data,
+            found.counts.ctypes.data,
         )  # fmt: skip
-    return found.counts, *found.crossings_in_order()
+        while found.next_call(meanwhile):
+            _TRACE_STEPS(
+                surface.pointers, placed, nodes.pointers, nodes.curves, steps, found.crossings,
+                library.MOST_WORK, found.done,
+            )  # fmt: skip
+        return found.counts, found.crossings_in_order()
+
+    parts = in_threads(trace, m, meanwhile, STEPS_OF_A_THREAD)
+    counts = np.concatenate([counts for counts, _ in parts])
+    faces, barycentric = (np.concatenate(each) for each in zip(*(p for _, p in parts), strict=True))
+    return counts, faces, barycentric
 
 
 def trace_polyline(

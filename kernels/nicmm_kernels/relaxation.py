@@ -25,6 +25,7 @@ from .library import (
 )
 from .nodes import SurfaceArrays, SurfacePointers
 from .steps import RelaxationRules
+from .threads import in_threads
 
 
 class BatchRules(ctypes.Structure):
@@ -82,7 +83,7 @@ def relax_curves(
     batch: BatchRules,
     meanwhile: Callable[[], object],
 ) -> tuple[IntArray, FloatArray]:
-    """Relax c curves of n nodes each; every curve is relaxed on its own.
+    """Relax c curves of n nodes each, on their own and in several threads.
 
     Parameters
     ----------
@@ -108,12 +109,33 @@ def relax_curves(
     c, n = rows_of_curves("faces", faces)
     address("faces", faces, INT, c, n)
     address("barycentric", barycentric, FLOAT, c, n, 3)
-    of_fixed = first_fixed(fixed, c, n)
+    first_fixed(fixed, c, n)
     faces, barycentric = faces.copy(), barycentric.copy()
+
+    def relax(part: slice, meanwhile: Callable[[], object]) -> None:
+        given = faces[part], barycentric[part], fixed[part]
+        _relax_curves(surface, *given, closed, rules, batch, meanwhile)
+
+    in_threads(relax, c, meanwhile)
+    return faces, barycentric
+
+
+def _relax_curves(
+    surface: SurfaceArrays,
+    faces: IntArray,
+    barycentric: FloatArray,
+    fixed: BoolArray,
+    closed: bool,
+    rules: RelaxationRules,
+    batch: BatchRules,
+    meanwhile: Callable[[], object],
+) -> None:
+    """Relax some curves; their faces and coordinates are replaced."""
+    c, n = faces.shape
     iterations, quiet = np.zeros(c, dtype=np.int64), np.zeros(c, dtype=np.int64)
     dampings = np.full(c, rules.steps.least_damping)
     curves = _CurveBatch(
-        c, n, int(closed), faces.ctypes.data, barycentric.ctypes.data, of_fixed,
+        c, n, int(closed), faces.ctypes.data, barycentric.ctypes.data, fixed.ctypes.data,
         iterations.ctypes.data, quiet.ctypes.data, dampings.ctypes.data,
     )  # fmt: skip
     room, started = steps.PAIRS_OF_A_NODE * n, False
@@ -137,4 +159,3 @@ def relax_curves(
             room = steps.more_room(room, n)
         else:
             _RELAX.check(code)
-    return faces, barycentric

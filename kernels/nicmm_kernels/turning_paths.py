@@ -21,6 +21,7 @@ from .library import (
     in_several_calls,
     rows,
 )
+from .threads import in_threads
 
 
 class _Pairs(ctypes.Structure):
@@ -80,7 +81,7 @@ def turning_paths(
     arriving: StatePairs,
     meanwhile: Callable[[], object],
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Best paths from k control points to all states.
+    """Best paths from k control points to all states, in several threads.
 
     States are m hops between cells, then d departures from control points, then d arrivals. Going
     on from a state to another one costs the bending of both and the weight of the other one. Of
@@ -111,13 +112,20 @@ def turning_paths(
     """
     k, m, d = (_count("begins", given) for given in (begins, onward[0], leaving[0]))
     size = m + 2 * d
-    graph = _HopGraph(
-        k, address("begins", begins, INT, k + 1), address("weights", weights, FLOAT, size),
-        _pairs("onward", m, onward), _pairs("leaving", d, leaving), _pairs("arriving", d, arriving),
+    address("begins", begins, INT, k + 1)
+    of_weights = address("weights", weights, FLOAT, size)
+    pairs = (
+        _pairs("onward", m, onward), _pairs("leaving", d, leaving), _pairs("arriving", d, arriving)
     )  # fmt: skip
     costs = np.empty((k, size))
     previous, first = np.empty((k, size), dtype=np.int64), np.empty((k, size), dtype=np.int64)
-    arrays = (costs.ctypes.data, previous.ctypes.data, first.ctypes.data)
-    scratch = np.empty(_TURNING_ITEMS.result(m, d))
-    in_several_calls(_TURNING_PATHS, k, (graph, *arrays), scratch, meanwhile)
+
+    def search(part: slice, meanwhile: Callable[[], object]) -> None:
+        count = part.stop - part.start
+        graph = _HopGraph(count, begins[part.start :].ctypes.data, of_weights, *pairs)
+        arrays = [each[part].ctypes.data for each in (costs, previous, first)]
+        scratch = np.empty(_TURNING_ITEMS.result(m, d))
+        in_several_calls(_TURNING_PATHS, count, (graph, *arrays), scratch, meanwhile)
+
+    in_threads(search, k, meanwhile)
     return costs, previous, first

@@ -784,6 +784,7 @@ def test_segments_that_meet_are_those_of_brute_force(monkeypatch):
 
 def test_an_exception_between_two_calls_ends_the_function(monkeypatch):
     monkeypatch.setattr(nicmm_kernels.library, "MOST_WORK", 1)
+    monkeypatch.setattr(nicmm_kernels.threads, "thread_count", lambda: 1)
 
     def cancel():
         raise InterruptedError

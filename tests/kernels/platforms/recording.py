@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
+from nicmm_kernels import threads
 from nicmm_kernels.library import COUNT, NUMBER, POINTER, Kernel
 from numpy.core import _internal as numpy_internal
 
@@ -216,7 +217,8 @@ def record(designs: Iterable[Callable[[], object]]) -> Recording:
     """Compute designs, and record their calls of kernels.
 
     Of each design and kernel, these are the calls whose number is a power of two. Arrays of NumPy
-    start as zeros, so that recordings are small and always the same.
+    start as zeros, so that recordings are small and always the same. One thread makes all calls, so
+    that nothing else changes the memory of a call.
     """
     recording, numbers = Recording(), Counter[str]()
     owners: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
@@ -248,6 +250,7 @@ def record(designs: Iterable[Callable[[], object]]) -> Recording:
         mock.patch.object(numpy_internal, "_ctypes", noted),
         mock.patch.object(Kernel, "result", property(recorded)),
         mock.patch.object(np, "empty", np.zeros),
+        mock.patch.object(threads, "thread_count", lambda: 1),
     ):
         for design in designs:
             numbers.clear()

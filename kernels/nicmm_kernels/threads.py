@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shares the rows of a computation among threads.
+
+The library lets other threads of Python run while it computes. Every row is computed on its own, so
+results do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from functools import cache
+from threading import Event
+from typing import TypeVar
+
+THREADS_VARIABLE = "NICMM_THREADS"
+"""Environment variable with the number of threads, instead of that of the available processors."""
+
+MOST_THREADS = 8
+"""Greatest number of threads without this variable; more would hardly gain anything."""
+
+PATIENCE = 0.02
+"""Seconds between two calls of the caller's function while other threads compute."""
+
+Meanwhile = Callable[[], object]
+Result = TypeVar("Result")
+
+
+class _StoppedError(Exception):
+    """Another thread has failed or the caller has cancelled."""
+
+
+@cache
+def thread_count() -> int:
+    """Number of threads among which rows are shared."""
+    given = os.environ.get(THREADS_VARIABLE)
+    if given is not None:
+        return max(1, int(given))
+    available = getattr(os, "sched_getaffinity", None)
+    processors = len(available(0)) if available else os.cpu_count() or 1
+    return min(processors, MOST_THREADS)
+
+
+@cache
+def _executor() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(thread_count() - 1, thread_name_prefix="nicmm_kernels")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
+    os.register_at_fork(after_in_child=_executor.cache_clear)
+
+
+def in_threads(
+    compute: Callable[[slice, Meanwhile], Result],
+    count: int,
+    meanwhile: Meanwhile,
+    fewest: int = 1,
+) -> list[Result]:
+    """Compute consecutive parts of some rows in several threads, and return their results in order.
+
+    Parameters
+    ----------
+    compute : callable
+        Computes a slice of the rows, and calls a function from time to time. It must not wait for
+        other threads.
+    count : int
+        Number of rows.
+    meanwhile : callable
+        Called from the present thread; an error that it raises stops all threads.
+    fewest : int
+        Least number of rows for which another thread is worthwhile.
+    """
+    parts = min(thread_count(), count // fewest)
+    if parts <= 1:
+        return [compute(slice(0, count), meanwhile)]
+    bounds = [count * part // parts for part in range(parts + 1)]
+    slices = [slice(*pair) for pair in zip(bounds, bounds[1:], strict=False)]
+    stop = Event()
+
+    def check() -> None:
+        if stop.is_set():
+            raise _StoppedError
+
+    others = [_executor().submit(compute, rows, check) for rows in slices[1:]]
+    try:
+        first = compute(slices[0], meanwhile)
+        _wait(others, meanwhile)
+    except BaseException:
+        stop.set()
+        wait(others)
+        raise
+    return [first, *(other.result() for other in others)]
+
+
+def _wait(futures: list[Future[Result]], meanwhile: Meanwhile) -> None:
+    """Wait until all are done; raises the error of the first one that has failed."""
+    waiting = set(futures)
+    while waiting:
+        done, waiting = wait(waiting, PATIENCE, FIRST_EXCEPTION)
+        for future in done:
+            future.result()
+        if waiting:
+            meanwhile()
