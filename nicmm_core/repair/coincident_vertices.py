@@ -14,11 +14,11 @@ from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.grouping import distinct_rows, first_of_components
 from ..geometry.mesh import Mesh, edge_lengths, unique_edges
 from ..progress import checkpoint
-from .face_parts import FaceParts
+from .face_parts import FaceParts, whole_faces
 
 
-def joined_vertices(mesh: Mesh) -> tuple[IntArray, FloatArray]:
-    """Find the vertices of open edges that count as one vertex.
+def joined_vertices(mesh: Mesh, parts: FaceParts) -> tuple[IntArray, FloatArray]:
+    """Find the vertices of open edges of some distinct faces that count as one vertex.
 
     Vertices of edges with exactly one face are joined if their positions are equal, and those that
     are still at open edges then also if the gap between them is below `tolerances.GAP` and far
@@ -32,11 +32,10 @@ def joined_vertices(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     (V, 3) float array
         Positions; where a gap is closed, the mean of the positions joined.
     """
-    parts = distinct_faces(mesh)
     place = _at_equal_positions(mesh.vertices, open_edges(mesh, parts))
-    edges = open_edges(mesh, parts if vertices_stay(place) else parts.renumbered(place).distinct())
-    if not len(edges):
-        return place, mesh.vertices
+    if not vertices_stay(place):
+        parts = parts.with_faces(place[parts.faces]).distinct()
+    edges = open_edges(mesh, parts)
     pairs = _across_gaps(mesh, edges)
     if not len(pairs):
         return place, mesh.vertices
@@ -52,10 +51,12 @@ def joined_vertices(mesh: Mesh) -> tuple[IntArray, FloatArray]:
 
 def distinct_faces(mesh: Mesh) -> FaceParts:
     """The faces of a mesh; of faces with the same three corners, the first one."""
-    every = FaceParts(mesh.faces, np.arange(len(mesh.faces)))
-    if mesh.has_nonmanifold_edges or _has_lone_twins(mesh):
-        return every.distinct()
-    return every
+    every = whole_faces(mesh.faces)
+    # Two faces with the same corners share at least two edges with no others, or an edge of many.
+    one, other, third = mesh.face_neighbours.T
+    alike = ((one == other) & (one >= 0)) | ((other == third) & (other >= 0))
+    alike |= (third == one) & (third >= 0)
+    return every.distinct() if mesh.has_nonmanifold_edges or alike.any() else every
 
 
 def open_edges(mesh: Mesh, parts: FaceParts) -> IntArray:
@@ -70,13 +71,6 @@ def open_edges(mesh: Mesh, parts: FaceParts) -> IntArray:
 def vertices_stay(place: IntArray) -> bool:
     """Whether no vertex is joined with an earlier one."""
     return bool((place == np.arange(len(place))).all())
-
-
-def _has_lone_twins(mesh: Mesh) -> bool:
-    """Whether two faces have the same corners, and at least two of their edges no other faces."""
-    one, other, third = mesh.face_neighbours.T
-    alike = ((one == other) & (one >= 0)) | ((other == third) & (other >= 0))
-    return bool((alike | ((third == one) & (third >= 0))).any())
 
 
 def _at_equal_positions(vertices: FloatArray, edges: IntArray) -> IntArray:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import grouped, occurrences
-from ..geometry.mesh import Mesh, edge_keys, side_keys
+from ..geometry.mesh import Mesh
 from ..progress import checkpoint
 from .coincident_vertices import open_edges
 from .face_parts import FaceParts
@@ -54,9 +54,7 @@ def without_t_junctions(
         edge, middle, share = _vertices_on_edges(vertices, edges, tolerances.GAP * mesh.diagonal)
         if not len(edge):
             break
-        size = int(parts.faces.max()) + 1
-        own = edge_keys(edges[edge, 0], edges[edge, 1], size)
-        face = occurrences(side_keys(parts.faces, size), own)[1] // 3  # one, as the edge is open
+        _, face = parts.at_edges(*edges[edge].T)  # one for each edge, as it is open
         # One division for each face; its other sides are divided in the next rounds.
         first = grouped(face)
         chosen = first[0][first[1]]
