@@ -17,11 +17,10 @@ from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..progress import checkpoint
-from .coincident_vertices import distinct_faces, joined_vertices, vertices_stay
+from .degenerate_faces import without_flat_faces
 from .face_parts import FaceParts
-from .flat_faces import without_flat_faces
+from .open_edges import distinct_faces, joined_vertices, vertices_stay, without_t_junctions
 from .removed_faces import RemovedFaces
-from .t_junctions import without_t_junctions
 
 
 @dataclass(frozen=True, eq=False)
