@@ -68,7 +68,11 @@ class RemovedFaces:
                 here = self._in_face(here, int(np.append(after[point], back.faces)[-1]))
             parts += [into, here, out[::-1]]
             own += [False] * len(into) + [True] + [False] * len(out)
-        return self._without_repeats(curve, joined(parts), np.flatnonzero(own))
+        polyline, number = self._without_repeats(joined(parts), curve.closed)
+        number = number[own]
+        passed = number[curve.control_index[curve.control_index >= 0]]
+        polyline, left = without_backtracking(self._mesh, polyline, passed, curve.closed)
+        return with_points(self._mesh, curve, polyline, left[number])
 
     def _with_exact_controls(self, curve: SurfaceCurve, given: SurfacePoints) -> SurfacePoints:
         """The points of a curve, with exact control points where vertices were moved together."""
@@ -144,17 +148,69 @@ class RemovedFaces:
         return (corners[:, :, None] == own[:, None]).any(axis=2).all(axis=1)
 
     def _without_repeats(
-        self, curve: SurfaceCurve, polyline: SurfacePoints, number: IntArray
-    ) -> SurfaceCurve:
-        """A curve through other points; of consecutive points that are the same, the last stays."""
+        self, polyline: SurfacePoints, closed: bool
+    ) -> tuple[SurfacePoints, IntArray]:
+        """Keep the last of consecutive points that are the same; also new indices of points."""
         n = len(polyline)
         following = polyline[(np.arange(n) + 1) % n]
         own = self._faces[polyline.faces]
         there = weights_at(self._faces[following.faces], following.barycentric, own)
         same = self._hold(polyline.faces, following) & (there == polyline.barycentric).all(axis=1)
-        if not curve.closed or same.all():
+        if not closed or same.all():
             same[-1] = False
         kept = np.flatnonzero(~same)
         # A point that is left out is the same as the next one that is kept.
-        number = np.searchsorted(kept, number) % len(kept)
-        return with_points(self._mesh, curve, polyline[kept], number)
+        return polyline[kept], np.searchsorted(kept, np.arange(n)) % len(kept)
+
+
+def without_backtracking(
+    mesh: Mesh, polyline: SurfacePoints, kept: IntArray, closed: bool
+) -> tuple[SurfacePoints, IntArray]:
+    """Remove points at which a polyline turns back along an edge.
+
+    Where it crosses thin faces in turn, several of its points lie on one edge, and rounding may
+    change their order along it. The polyline would then touch itself.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    polyline : SurfacePoints
+        n points, each in the face of the segment that begins there.
+    kept : (k,) int array
+        Indices of points that stay, such as control points.
+    closed : bool
+        Whether the last point is joined to the first.
+
+    Returns
+    -------
+    SurfacePoints
+        The m points that remain.
+    (n,) int array
+        Index of each point among those that remain; that of the next one if it was removed.
+    """
+    which = np.arange(len(polyline))
+    free = ~np.isin(which, kept)
+    if not closed:
+        free[[0, -1]] = False
+    while len(which) > 3:
+        turning = np.flatnonzero(_turns_back(mesh, polyline[which]) & free[which])
+        if not len(turning):
+            break
+        which = np.delete(which, turning[0])
+    return polyline[which], np.searchsorted(which, np.arange(len(polyline))) % len(which)
+
+
+def _turns_back(mesh: Mesh, polyline: SurfacePoints) -> BoolArray:
+    """Whether the polyline arrives at and leaves each point, (n,), on the same side of an edge."""
+    corners, weights = mesh.faces[polyline.faces], polyline.barycentric
+    triple = np.stack([np.roll(np.arange(len(corners)), shift) for shift in (1, 0, -1)])
+    corners, weights = corners[triple], weights[triple]  # (3, n, 3)
+    end = np.where(weights > 0.0, corners, -1).max(axis=(0, 2))
+    start = np.where(weights > 0.0, corners, end[:, None]).min(axis=(0, 2))
+    at_end = corners == end[:, None]
+    on_edge = at_end | (corners == start[:, None]) | (weights <= 0.0)
+    share = np.where(at_end, weights, 0.0).sum(axis=2)
+    result: BoolArray = on_edge.all(axis=(0, 2)) & (
+        (share[1] - share[0]) * (share[2] - share[1]) < 0.0
+    )
+    return result
