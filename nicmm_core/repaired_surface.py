@@ -42,6 +42,10 @@ LARGEST_COPY = 200_000
 A canonical copy of it would take a large part of the time of a curve.
 """
 
+Copies = tuple[MappedMesh | Renumbered, ...]
+"""Copies of meshes, each made from the one before, with the maps `points_to`, `weights_to` and
+`curve_to` to it, and `curve_back` and `field_back` from it."""
+
 LOST = {
     MappedMesh: "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
     "non-manifold edge",
@@ -67,7 +71,7 @@ class Manifold:
     """
 
     repaired: MappedMesh
-    copies: tuple[MappedMesh | Renumbered, ...]
+    copies: Copies
     designer: SurfaceDesigner
 
     @property
@@ -124,7 +128,7 @@ class Manifold:
         )
 
 
-def _field_back(copies: tuple[MappedMesh | Renumbered, ...], design: Design) -> FloatArray:
+def _field_back(copies: Copies, design: Design) -> FloatArray:
     """The level set of a design on the given mesh."""
     values = design.field
     for copy in copies[::-1]:
@@ -197,7 +201,7 @@ class RepairedSurface:
 def _on_component(mapped: MappedMesh, component: int) -> Manifold:
     """A component of a manifold with its canonical copy and a designer."""
     mapped = replace(mapped, component=component)
-    copies: tuple[MappedMesh | Renumbered, ...] = (mapped,) if mapped.differs else ()
+    copies: Copies = (mapped,) if mapped.differs else ()
     mesh = mapped.mesh
     if len(mesh.faces) <= LARGEST_COPY or (mesh.face_component != component).any():
         copy = renumbered(mesh, component, exact=mapped.moved)

@@ -14,10 +14,11 @@ from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, points_of, with_points
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, in_faces, joined, nearest_points, snapped
+from ..geometry.surface_points import SurfacePoints, in_faces, joined
 from ..progress import checkpoint
 from .clean_surface import CleanSurface
 from .face_parts import FaceParts
+from .removed_faces import points_at
 from .strand_separation import separated
 
 
@@ -99,17 +100,9 @@ class MappedMesh:
         return found
 
     def _at_position(self, position: FloatArray) -> SurfacePoints:
-        """The point of the mesh nearest to a position, (1, 3), in every face that contains it.
-
-        The result is empty if that point is farther away than a face without area is wide.
-        """
-        nearest, distance = nearest_points(self.mesh, position - self.origin)
-        if not distance[0] <= tolerances.ON_SURFACE * self.original.diagonal:
-            return nearest[:0]
-        nearest = snapped(nearest)
-        corners = self.mesh.faces[nearest.faces[0]][nearest.barycentric[0] > 0.0]
-        faces = self.mesh.faces_with(corners)
-        return in_faces(self.mesh, nearest[np.zeros(len(faces), dtype=np.int64)], faces)
+        """A point of a removed face, given by its position, (1, 3), in every face that holds it."""
+        farthest = tolerances.ON_SURFACE * self.original.diagonal
+        return points_at(self.mesh, position - self.origin, farthest)
 
     def common_component(self, points: SurfacePoints) -> int | None:
         """The component of largest area that contains all points, or None if there is none."""
@@ -125,9 +118,11 @@ class MappedMesh:
 
     def points_to(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the given mesh to the component, each to its first representation."""
-        here = self.mesh.face_component == self.component
-        found = self.representations(points)
-        return joined([point[np.flatnonzero(here[point.faces])[:1]] for point in found])
+        found = []
+        for point in self.representations(points):
+            here = self.mesh.face_component[point.faces] == self.component
+            found.append(point[np.flatnonzero(here)[:1]])
+        return joined(found)
 
     def weights_to(self, weights: FloatArray) -> FloatArray:
         """Map weights at vertices of the given mesh, (V,), to the mesh.

@@ -19,7 +19,14 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, with_points
 from ..geometry.grouping import shortest_chain
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, in_faces, joined, weights_at
+from ..geometry.surface_points import (
+    SurfacePoints,
+    in_faces,
+    joined,
+    nearest_points,
+    snapped,
+    weights_at,
+)
 
 
 class RemovedFaces:
@@ -161,6 +168,20 @@ class RemovedFaces:
         kept = np.flatnonzero(~same)
         # A point that is left out is the same as the next one that is kept.
         return polyline[kept], np.searchsorted(kept, np.arange(n)) % len(kept)
+
+
+def points_at(mesh: Mesh, position: FloatArray, farthest: float) -> SurfacePoints:
+    """The point of a mesh nearest to a position, (1, 3), in every face that contains it.
+
+    So a point of a removed face is found on a mesh without that face. The result is empty if the
+    nearest point is farther away than a face without area is wide.
+    """
+    nearest, distance = nearest_points(mesh, position)
+    if not distance[0] <= farthest:
+        return nearest[:0]
+    nearest = snapped(nearest)
+    faces = mesh.faces_with(mesh.faces[nearest.faces[0]][nearest.barycentric[0] > 0.0])
+    return in_faces(mesh, nearest[np.zeros(len(faces), dtype=np.int64)], faces)
 
 
 def without_backtracking(
