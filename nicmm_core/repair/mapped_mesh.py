@@ -158,10 +158,12 @@ class MappedMesh:
         """Map a curve on the given mesh to the mesh; None if that lacks a part of the curve."""
         points, segment = self.in_given.through(self.original, curve)
         pieces = [self.in_mesh.in_parents(points)]
-        # A segment in a removed face has no length, or almost; any face at its start serves.
-        for removed in np.flatnonzero(self.clean.removed[curve.faces]):
-            pieces.append(self._at_position(curve.points[[removed]])[:1])
-            segment = np.append(segment, np.full(len(pieces[-1]), removed))
+        # A segment in a face without area has no length, or almost; any face at its start serves.
+        flat = self.clean.removed[curve.faces] | np.isin(curve.faces, self.in_given.parent)
+        flat[segment] = False
+        for point in np.flatnonzero(flat):
+            pieces.append(self._at_position(curve.points[[point]])[:1])
+            segment = np.append(segment, np.full(len(pieces[-1]), point))
         order = np.argsort(segment, kind="stable")
         found, number = np.unique(segment[order], return_index=True)
         if len(found) < len(curve.faces):

@@ -175,11 +175,8 @@ def _along_edge(
 ) -> tuple[SurfacePoints, IntArray]:
     """Move a point along its edge, towards the nearer end."""
     barycentric = polyline.barycentric.copy()
-    here = barycentric[point]
-    small, large = np.where(here > 0.0, here, np.inf).argmin(), here.argmax()
-    if small == large:  # both are one half
-        small, large = np.flatnonzero(here > 0.0)
-    step = share * SHARE * REACH * here[small]
+    _, small, large = np.argsort(barycentric[point], kind="stable")
+    step = share * SHARE * REACH * barycentric[point, small]
     barycentric[point, small] -= step
     barycentric[point, large] += step
     return SurfacePoints(polyline.faces, barycentric), np.arange(len(polyline))
