@@ -17,7 +17,7 @@ import numpy as np
 
 from ..geometry import tolerances
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import grouped
+from ..geometry.grouping import components, grouped
 from ..geometry.mesh import Mesh, joined_corners, side_corners, side_keys
 from ..geometry.orientation import turned_faces
 from ..progress import checkpoint
@@ -31,9 +31,6 @@ from .straight_edges import straightened
 SEGMENTS = 2
 """Number of segments of each piece of an edge. Each copy of the point between them belongs to only
 one pair of faces, so no two edges of the result have the same ends."""
-
-MOST_FACES = 100
-"""Number of faces at a vertex up to which `is_manifold` walks around the vertices of a mesh."""
 
 MOST_COMPARED = 32
 """Number of faces at an edge up to which all pairs of them are compared."""
@@ -97,33 +94,19 @@ def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMe
 
 
 def is_manifold(mesh: Mesh) -> bool:
-    """Whether a mesh is certainly an oriented manifold, so that its faces need no pairing.
+    """Whether a mesh is an oriented manifold, so that its faces need no pairing.
 
-    At every edge there are at most two faces, which are consistently oriented and differ in a
-    corner, and the faces at each vertex form one fan. The result is False, too, if a vertex has
-    more than `MOST_FACES` faces.
+    At every edge there are at most two faces, which are consistently oriented, and the faces at
+    each vertex form one fan.
     """
-    vertex, corner = mesh.faces.ravel(), np.arange(mesh.faces.size)
-    degree = np.bincount(vertex)
-    if not mesh.is_oriented or mesh.has_nonmanifold_edges or degree.max() > MOST_FACES:
+    if not mesh.is_oriented or mesh.has_nonmanifold_edges:
         return False
-    # Walk around each vertex, from the end of its fan if the fan is open, and count the corners.
-    after, before = (corner - corner % 3 + (corner + k) % 3 for k in (1, 2))
-    across = mesh.opposite_sides
-    following = np.where(across[after] == after, -1, after[across[after]])
-    at_rim = across[before] == before
-    start = np.full(len(degree), -1)
-    start[vertex] = corner
-    start[vertex[at_rim]] = corner[at_rim]
-    here = start = start[degree > 0]
-    visited = np.zeros(len(degree), dtype=np.int64)
-    while len(here):
-        checkpoint()
-        visited[vertex[here]] += 1
-        here = following[here]
-        going = (here >= 0) & (here != start)
-        here, start = here[going], start[going]
-    return bool((visited == degree).all())
+    # The next corner around the vertex of each corner is across the side after it.
+    corner, across = np.arange(mesh.faces.size), mesh.opposite_sides
+    after = corner - corner % 3 + (corner + 1) % 3
+    following = np.where(across[after] == after, corner, after[across[after]])
+    n_fans, _ = components(len(corner), corner, following)
+    return n_fans == np.count_nonzero(mesh.referenced)
 
 
 def sides_by_edge(faces: IntArray) -> tuple[IntArray, list[IntArray]]:
