@@ -89,8 +89,18 @@ def manifold(clean: CleanSurface, usable: IntArray, connected: bool) -> MappedMe
         "non-manifold edges separated": len(several),
     }
     repairs = {name: count for name, count in repairs.items() if count}
-    straight = straightened(mesh, clean.divisions)
-    return MappedMesh(clean, mesh, parts, *straight, place, origin, moved, repairs)
+    straight, in_straight = straightened(mesh, clean.divisions)
+    return MappedMesh(
+        clean=clean,
+        manifold=mesh,
+        in_given=parts,
+        mesh=straight,
+        in_mesh=in_straight,
+        place=place,
+        origin=origin,
+        moved=moved,
+        repairs=repairs,
+    )
 
 
 def is_manifold(mesh: Mesh) -> bool:

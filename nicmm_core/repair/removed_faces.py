@@ -64,6 +64,7 @@ class RemovedFaces:
         before, after = np.roll(curve.faces, 1), curve.faces.copy()
         if not curve.closed:
             before[0], after[-1] = exact.faces[[0, -1]]
+        # Points that the face before them, or the face after them, does not hold.
         leaves = ~(self._hold(before, exact) & self._hold(after, exact)) | (exact.faces != after)
         parts: list[SurfacePoints] = []
         own: list[bool] = []
