@@ -12,7 +12,7 @@ import numpy as np
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components, first_of_components
-from ..geometry.mesh import edge_lengths, triangle_areas, unique_edges
+from ..geometry.mesh import edge_lengths, feet_on_edges, triangle_areas, unique_edges
 from ..progress import checkpoint
 from .face_parts import FaceParts
 
@@ -140,8 +140,7 @@ def _without_caps(
     apart = ~(parts.faces[beyond] == divisions[rank, :1]).any(axis=1)
     beyond, divisions = beyond[apart], divisions[rank[apart]]
     middle, start, end = divisions.T
-    along, offset = vertices[end] - vertices[start], vertices[middle] - vertices[start]
-    share = np.einsum("kd,kd->k", offset, along) / np.einsum("kd,kd->k", along, along)
+    share, _ = feet_on_edges(vertices, divisions[:, 1:], middle)
     divided = parts.divided(beyond, start, end, middle, share.clip(0.0, 1.0))
     left = np.ones(len(divided.faces), dtype=bool)
     left[caps[removed]] = False

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import distinct_rows, first_of_components, occurrences
-from ..geometry.mesh import Mesh, edge_lengths, unique_edges
+from ..geometry.mesh import Mesh, edge_lengths, feet_on_edges, unique_edges
 from ..progress import checkpoint
 from .face_parts import FaceParts, whole_faces
 
@@ -171,7 +171,7 @@ def _vertices_on_edges(
     inside = tree.query_ball_point(middle[crossed], radius[crossed] - tolerance)
     edge = np.repeat(crossed, np.array([len(each) for each in inside], dtype=np.int64))
     vertex = rim[np.array([number for each in inside for number in each], dtype=np.int64)]
-    share, height = _along(vertices, edges[edge], vertex)
+    share, height = feet_on_edges(vertices, edges[edge], vertex)
     margin = 2.0 * radius[edge] * np.minimum(share, 1.0 - share)
     on_edge = (height <= tolerance) & (height <= tolerances.GAP_SHARE * margin)
     on_edge[on_edge] = _has_edge_along(vertices, edges, edge[on_edge], vertex[on_edge], tolerance)
@@ -181,17 +181,6 @@ def _vertices_on_edges(
     return edge[chosen], vertex[chosen], share[chosen]
 
 
-def _along(
-    vertices: FloatArray, edges: IntArray, points: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Fraction along each edge of the foot of a vertex, and its distance from the line, (k,)."""
-    start = vertices[edges[:, 0]]
-    way, offset = vertices[edges[:, 1]] - start, vertices[points] - start
-    squared = np.maximum(np.einsum("kd,kd->k", way, way), tolerances.TINY)
-    share = np.einsum("kd,kd->k", offset, way) / squared
-    return share, np.linalg.norm(offset - share[:, None] * way, axis=1)
-
-
 def _has_edge_along(
     vertices: FloatArray, edges: IntArray, edge: IntArray, vertex: IntArray, tolerance: float
 ) -> BoolArray:
@@ -199,9 +188,9 @@ def _has_edge_along(
     rank, place = occurrences(edges.ravel(), vertex)
     other_end, on = edges[place // 2, 1 - place % 2], edges[edge[rank]]
     # Either end of one edge lies on the other edge.
-    share, height = _along(vertices, on, other_end)
+    share, height = feet_on_edges(vertices, on, other_end)
     found = (height <= tolerance) & (share >= 0.0) & (share <= 1.0)
     for end in on.T:
-        share, height = _along(vertices, np.stack([vertex[rank], other_end], axis=1), end)
+        share, height = feet_on_edges(vertices, np.stack([vertex[rank], other_end], axis=1), end)
         found |= (height <= tolerance) & (share > 0.0) & (share < 1.0)
     return np.isin(np.arange(len(vertex)), rank[found & (place // 2 != edge[rank])])

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..geometry import tolerances
 from ..geometry.array_types import IntArray
-from ..geometry.mesh import Mesh
+from ..geometry.mesh import Mesh, feet_on_edges
 from ..progress import checkpoint
 from .face_parts import FaceParts, whole_faces
 
@@ -42,9 +41,7 @@ def straightened(mesh: Mesh, divisions: IntArray) -> tuple[Mesh, FaceParts]:
         return mesh, parts
     ends = np.full((len(mesh.vertices), 2), -1)
     ends[divisions[:, 0]] = divisions[:, 1:]
-    start, way = mesh.vertices[ends[:, 0]], mesh.vertices[ends[:, 1]] - mesh.vertices[ends[:, 0]]
-    squared = np.maximum(np.einsum("vd,vd->v", way, way), tolerances.TINY)
-    share = np.einsum("vd,vd->v", mesh.vertices - start, way) / squared
+    share, _ = feet_on_edges(mesh.vertices, ends, np.arange(len(ends)))
     faces, parent, corners = mesh.faces.copy(), parts.parent, parts.corners.copy()
     while True:
         checkpoint()
