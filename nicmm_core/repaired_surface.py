@@ -46,13 +46,6 @@ Copies = tuple[MappedMesh | Renumbered, ...]
 """Copies of meshes, each made from the one before, with the maps `points_to`, `weights_to` and
 `curve_to` to it, and `curve_back` and `field_back` from it."""
 
-LOST = {
-    MappedMesh: "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
-    "non-manifold edge",
-    Renumbered: "start and control_points lie on different components of the mesh",
-}
-"""Why a curve cannot be mapped to a copy of a mesh."""
-
 
 @dataclass(frozen=True)
 class Manifold:
@@ -102,8 +95,16 @@ class Manifold:
         """
         for copy in self.copies:
             mapped = copy.curve_to(curve)
+            if mapped is None and copy is self.repaired:
+                raise CurveError(
+                    "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at "
+                    f"a non-manifold edge{WITHOUT_START}"
+                )
             if mapped is None:
-                raise CurveError(f"{LOST[type(copy)]}{WITHOUT_START}")
+                raise CurveError(
+                    "start and control_points lie on different components of the mesh"
+                    f"{WITHOUT_START}"
+                )
             curve = mapped
         return curve
 
