@@ -41,12 +41,10 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
     "checks, clean surface, manifold": [
         (design, "checked_options"),
         (design, "locate_control_points"),
-        (repaired_surface, "clean_surface"),
+        (design, "clean_surfaces"),
         (repaired_surface, "manifold"),
-        (repaired_surface, "request_on"),
     ],
     "canonical copy": [
-        (repaired_surface, "straightened"),
         (repaired_surface, "renumbered"),
         (coarse_start, "renumbered"),
         (repaired_surface.Manifold, "request"),

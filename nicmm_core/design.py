@@ -23,6 +23,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,10 +35,11 @@ from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, check_connected, locate_control_points
-from .path.via_points import ViaPoints, located_via_points
+from .path.via_points import ViaPoints, located_via_points, with_via_points
 from .progress import INTERVAL, CancelledError, Progress, checkpoint, placed, watched
+from .repair.clean_surface import clean_surfaces
 from .repair.free_surface import check_reachable, free_faces
-from .repaired_surface import CleanSurfaces, Manifold, RepairedSurface, is_on, start_on
+from .repaired_surface import Manifold, RepairedSurface, is_on, start_on
 from .request import Request, same_request
 from .status import Status
 
@@ -75,8 +77,6 @@ class Designer:
                 f"mesh is a {type(mesh).__name__}; pass nicmm_core.Mesh(vertices, faces)"
             )
         self.mesh = mesh
-        self._clean = CleanSurfaces(mesh)
-        self._whole = RepairedSurface(self._clean, np.arange(len(mesh.faces)))
         self._free: _Free | None = None  # of the last request with obstacles
         # Reentrant, since a progress function may design another curve with the same Designer.
         self._lock = threading.RLock()
@@ -168,6 +168,11 @@ class Designer:
         finally:
             self._lock.release()
 
+    @cached_property
+    def _whole(self) -> RepairedSurface:
+        """The surface of all faces."""
+        return RepairedSurface(clean_surfaces(self.mesh), np.arange(len(self.mesh.faces)))
+
     def _on_manifold(self, request: Request) -> tuple[Manifold, Request]:
         """The first manifold that connects the points, and the request on it."""
         surface = self._surface_off_obstacles(request)
@@ -175,6 +180,10 @@ class Designer:
         if found is not None:
             return found
         check_connected(self.mesh, request.points)
+        if request.via_points:
+            with_via_points(
+                self.mesh, request.points, request.via_points, request.order, request.closed
+            )
         if surface is not self._whole and self._whole.find(request) is not None:
             check_reachable(surface.most_connected, request.named_points)
         raise UnreachableError(PARTS)
@@ -187,9 +196,9 @@ class Designer:
         last = self._free
         same = last is not None and last.clearance == clearance
         if last is None or not (same and np.array_equal(last.obstacles, obstacles)):
-            free = free_faces(self._whole.first, obstacles, clearance)
+            free = free_faces(next(self._whole.manifolds()), obstacles, clearance)
             every = len(free) == len(self.mesh.faces)
-            surface = self._whole if every else RepairedSurface(self._clean, free)
+            surface = self._whole if every else RepairedSurface(self._whole.surfaces, free)
             last = self._free = _Free(obstacles, clearance, surface)
         return last.surface
 

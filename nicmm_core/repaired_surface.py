@@ -1,17 +1,22 @@
 """Finds a manifold for each request, and maps requests, starts and designs between it and the mesh.
 
-The surface is cleaned (`repair.clean_surface`) and made a manifold (`repair.nonmanifold`). If that
-separates the points of the request, ways that connect more or clean less are tried in turn. Edges
-that only cleaning has divided become whole again (`repair.straight_edges`). The curve is designed
-on a canonical copy of the component of the points (`geometry.numbering`), which depends only on the
-surface, so neither the numbering nor the position or size of the mesh affects the curve.
+A curve is designed on a copy of a copy of the given mesh, and mapped back through both:
+
+given mesh → repaired mesh (`repair.mapped_mesh`) → canonical copy (`geometry.numbering`).
+
+The surface is cleaned (`repair.clean_surface`), made a manifold (`repair.nonmanifold`), and edges
+that only cleaning has divided become whole again (`repair.straight_edges`). If that separates the
+points of the request, manifolds that connect more or are cleaned less are tried in turn. The
+canonical copy of the component of the points depends only on the surface, so neither the numbering
+nor the position or size of the mesh affects the curve.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from itertools import product
 
 import numpy as np
 
@@ -22,12 +27,11 @@ from .geometry.array_types import FloatArray, IntArray
 from .geometry.curve import SurfaceCurve, checked_curve, curve_on_mesh, weights_in_faces
 from .geometry.mesh import Mesh, same_mesh
 from .geometry.numbering import Renumbered, renumbered
-from .geometry.surface_points import SurfacePoints, coincide
+from .geometry.surface_points import SurfacePoints, coincide, joined
 from .path.via_points import with_via_points
-from .repair.clean_surface import Cleaning, CleanSurface, clean_surface
+from .repair.clean_surface import CleanSurface
 from .repair.mapped_mesh import MappedMesh
 from .repair.nonmanifold import manifold
-from .repair.straight_edges import StraightenedMesh, straightened
 from .request import Request, mapped_request
 from .start import WITHOUT_START, Resumable
 from .surface_designer import SurfaceDesigner
@@ -38,9 +42,9 @@ LARGEST_COPY = 200_000
 A canonical copy of it would take a large part of the time of a curve.
 """
 
-WAYS = tuple((cleaning, connected) for cleaning in Cleaning for connected in (False, True))
-"""Ways to make a manifold, in the order in which they are tried: how much is cleaned, and whether
-all faces at an edge of more than two faces are connected."""
+Copies = tuple[MappedMesh | Renumbered, ...]
+"""Copies of meshes, each made from the one before, with the maps `points_to`, `weights_to` and
+`curve_to` to it, and `curve_back` and `field_back` from it."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +54,17 @@ class Manifold:
     Attributes
     ----------
     repaired : MappedMesh
-        A manifold made from the faces of the given mesh.
-    straight : StraightenedMesh or None
-        The manifold without vertices that divide straight edges, or None if it has no such vertex.
-    copy : Renumbered or None
-        Canonical copy of the component of the request; None if the mesh is large and connected.
+        A manifold made from the faces of the given mesh, with the component of the request.
+    copies : tuple
+        The copies from the given mesh to the mesh of the designer, each made from the one before:
+        the repaired mesh, unless it is the given mesh itself, and the canonical copy of a
+        component, unless the mesh is large and connected.
     designer : SurfaceDesigner
         Designer on the last of these meshes.
     """
 
     repaired: MappedMesh
-    straight: StraightenedMesh | None
-    copy: Renumbered | None
+    copies: Copies
     designer: SurfaceDesigner
 
     @property
@@ -69,79 +72,69 @@ class Manifold:
         """The mesh of the designer."""
         return self.designer.mesh
 
-    @property
-    def copies(self) -> tuple[StraightenedMesh | Renumbered, ...]:
-        """The copies that lead from the manifold to the mesh of the designer."""
-        return tuple(copy for copy in (self.straight, self.copy) if copy is not None)
-
     def in_original(self, positions: FloatArray) -> FloatArray:
         """Map positions on the mesh of the designer, (n, 3), to the given mesh."""
-        if self.copy is not None:
-            positions = self.copy.in_original(positions)
-        return positions + self.repaired.origin
+        for copy in self.copies[::-1]:
+            positions = copy.in_original(positions)
+        return positions
 
     def request(self, request: Request) -> Request:
-        """Map a request from the repaired mesh to the mesh of the designer."""
+        """Map a request from the given mesh to the mesh of the designer."""
         for copy in self.copies:
             request = mapped_request(request, copy.points_to, copy.weights_to)
         return request
 
-    def curve(self, curve: SurfaceCurve) -> SurfaceCurve | None:
+    def curve(self, curve: SurfaceCurve) -> SurfaceCurve:
         """Map a curve from the given mesh to that of the designer.
-
-        None if the curve enters faces that curves may not enter, or cannot be mapped at a
-        non-manifold edge.
 
         Raises
         ------
         CurveError
-            If the curve lies on another component.
+            If the curve enters faces that curves may not enter, cannot be mapped at a non-manifold
+            edge, or lies on another component.
         """
-        mapped = self.repaired.curve_to(curve)
-        if mapped is None:
-            return None
         for copy in self.copies:
-            mapped = copy.curve_to(mapped)
+            mapped = copy.curve_to(curve)
+            if mapped is None and copy is self.repaired:
+                raise CurveError(
+                    "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at "
+                    f"a non-manifold edge{WITHOUT_START}"
+                )
             if mapped is None:
                 raise CurveError(
                     "start and control_points lie on different components of the mesh"
                     f"{WITHOUT_START}"
                 )
-        return mapped
+            curve = mapped
+        return curve
 
     def design_on_original(self, design: Design, points: SurfacePoints) -> Design:
-        """Map a design to the given mesh, on which its control points are given."""
+        """Map a design to the given mesh, on which its control points are given.
+
+        It continues only on a mesh that equals the given one.
+        """
+        curves, resumable = design.curves, design.resumable
         for copy in self.copies[::-1]:
-            design = _mapped(design, copy.curve_back, copy.field_back)
+            curves = [copy.curve_back(curve) for curve in curves]
         if self.repaired.differs:
-            curve_back = partial(self.repaired.curve_back, points=points)
-            design = _mapped(design, curve_back, self.repaired.field_back)
-        return _given_on(self.repaired, design)
-
-
-class CleanSurfaces:
-    """The surface of a mesh, cleaned as much as each `Cleaning` says; each is made once."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
-        self._made: dict[Cleaning, CleanSurface | None] = {}
-
-    def __getitem__(self, cleaning: Cleaning) -> CleanSurface | None:
-        """A clean surface; None if no face would remain."""
-        if cleaning not in self._made:
-            self._made[cleaning] = clean_surface(self.mesh, cleaning)
-        return self._made[cleaning]
-
-    def repeats(self, cleaning: Cleaning) -> bool:
-        """Whether a clean surface has the same faces as the one that is cleaned more."""
-        if cleaning is Cleaning.FULL:
-            return False
-        one, other = self[cleaning], self[Cleaning(cleaning - 1)]
-        return (
-            one is not None
-            and other is not None
-            and np.array_equal(one.parts.faces, other.parts.faces)
+            removed = self.repaired.clean.removed_faces
+            curves = [removed.led_across(curve, points) for curve in curves]
+        return replace(
+            design,
+            curves=curves,
+            alternatives=[self.design_on_original(other, points) for other in design.alternatives],
+            find_field=partial(_field_back, self.copies, design),
+            resumable=resumable and replace(resumable, given=self.repaired.original),
+            repairs=dict(self.repaired.repairs),
         )
+
+
+def _field_back(copies: Copies, design: Design) -> FloatArray:
+    """The level set of a design on the given mesh."""
+    values = design.field
+    for copy in copies[::-1]:
+        values = copy.field_back(values)
+    return values
 
 
 class RepairedSurface:
@@ -151,27 +144,32 @@ class RepairedSurface:
 
     Parameters
     ----------
-    clean : CleanSurfaces
+    surfaces : list of CleanSurface
+        The surface of the mesh, cleaned less and less.
     usable : (u,) int array
         Faces that curves may enter, ascending.
     """
 
-    def __init__(self, clean: CleanSurfaces, usable: IntArray) -> None:
-        self._clean, self._usable = clean, usable
-        self._made: dict[tuple[Cleaning, bool], MappedMesh | None] = {}
-        self._manifolds: dict[tuple[Cleaning, bool, int], Manifold] = {}  # the last is a component
+    def __init__(self, surfaces: list[CleanSurface], usable: IntArray) -> None:
+        self.surfaces = surfaces
+        self._manifold = cache(lambda clean, connected: manifold(clean, usable, connected))
+        self._on_component = cache(_on_component)
 
-    @property
-    def first(self) -> MappedMesh:
-        """The manifold that is tried first."""
-        return next(made for way in WAYS if (made := self._manifold_of(*way)) is not None)
+    def manifolds(self) -> Iterator[MappedMesh]:
+        """The manifolds in the order in which they are tried: with less cleaning later.
+
+        At an edge of more than two faces, first the straightest pairs of faces are connected, then
+        all faces. Manifolds that connect no more than the one before are left out.
+        """
+        for clean, connected in product(self.surfaces, (False, True)):
+            made = self._manifold(clean, connected)
+            if made is not None:
+                yield made
 
     @property
     def most_connected(self) -> MappedMesh:
-        """The manifold on which most of the surface is connected."""
-        ways = [(c, connected) for c in (Cleaning.VERTICES, Cleaning.FULL) for connected in (1, 0)]
-        made = (self._manifold_of(cleaning, bool(connected)) for cleaning, connected in ways)
-        return next((one for one in made if one is not None), self.first)
+        """The manifold with the fewest components."""
+        return min(self.manifolds(), key=lambda made: int(made.mesh.face_component.max()))
 
     def find(self, request: Request) -> tuple[Manifold, Request] | None:
         """Find a manifold on which the points of a request are connected.
@@ -181,68 +179,35 @@ class RepairedSurface:
 
         Raises
         ------
-        ControlPointError, UnreachableError
-            If via points coincide with control points or lie on another component.
+        ControlPointError
+            If via points coincide with control points.
         """
-        for way in WAYS:
-            found = self._manifold_of(*way)
-            there = None if found is None else request_on(found, request)
-            if found is not None and there is not None:
-                if there.via_points:
-                    with_via_points(
-                        found.mesh, there.points, there.via_points, there.order, there.closed
-                    )
-                made = self._component(found, way, there)
-                return made, made.request(there)
+        points = joined([request.points, *request.via_points.values()])
+        for mapped in self.manifolds():
+            component = mapped.common_component(points)
+            if component is None:
+                continue
+            found = self._on_component(mapped, component)
+            there = found.request(request)
+            if coincide(found.mesh, there.points):  # on the two sides of a gap that was closed
+                continue
+            if there.via_points:
+                with_via_points(
+                    found.mesh, there.points, there.via_points, there.order, there.closed
+                )
+            return found, there
         return None
 
-    def _manifold_of(self, cleaning: Cleaning, connected: bool) -> MappedMesh | None:
-        """The manifold made in one way; None if another way makes the same one."""
-        way = cleaning, connected
-        if way not in self._made:
-            clean = None if self._clean.repeats(cleaning) else self._clean[cleaning]
-            self._made[way] = None if clean is None else manifold(clean, self._usable, connected)
-        return self._made[way]
 
-    def _component(
-        self, mapped: MappedMesh, way: tuple[Cleaning, bool], request: Request
-    ) -> Manifold:
-        """The component of a request on the manifold made in one way."""
-        component = int(mapped.mesh.face_component[request.points.faces[0]])
-        key = (*way, component)
-        if key not in self._manifolds:
-            inside = mapped.mesh.face_component == component
-            if inside.all() and len(inside) > LARGEST_COPY:
-                made = Manifold(mapped, None, None, SurfaceDesigner(mapped.mesh))
-            else:
-                straight = straightened(mapped.mesh, mapped.divisions)
-                mesh = mapped.mesh
-                if straight is not None:
-                    mesh = straight.mesh
-                    component = int(mesh.face_component[straight.parent[request.points.faces[0]]])
-                copy = renumbered(mesh, component, exact=mapped.moved)
-                made = Manifold(mapped, straight, copy, SurfaceDesigner(copy.mesh))
-            self._manifolds[key] = made
-        return self._manifolds[key]
-
-
-def request_on(mapped: MappedMesh, request: Request) -> Request | None:
-    """Map a request to a mapped mesh; None if its points are not connected there, or coincide."""
-    if not mapped.differs:
-        components = mapped.mesh.face_component[request.points.faces]
-        return request if (components == components[0]).all() else None
-    sets = [request.points, *request.via_points.values()]
-    representations = [mapped.representations(points) for points in sets]
-    component = mapped.common_component([point for of_set in representations for point in of_set])
-    if component is None:
-        return None
-    on_component = [mapped.points(of_set, component) for of_set in representations]
-    points = on_component[0]
-    if coincide(mapped.mesh, points):  # on the two sides of a gap that was closed
-        return None
-    there = mapped_request(request, lambda given: given, mapped.weights_to)
-    via_points = dict(zip(request.via_points, on_component[1:], strict=True))
-    return replace(there, points=points, via_points=via_points)
+def _on_component(mapped: MappedMesh, component: int) -> Manifold:
+    """A component of a manifold with its canonical copy and a designer."""
+    mapped = replace(mapped, component=component)
+    copies: Copies = (mapped,) if mapped.differs else ()
+    mesh = mapped.mesh
+    if len(mesh.faces) <= LARGEST_COPY or (mesh.face_component != component).any():
+        copy = renumbered(mesh, component, exact=mapped.moved)
+        copies, mesh = (*copies, copy), copy.mesh
+    return Manifold(mapped, copies, SurfaceDesigner(mesh))
 
 
 def is_on(manifold: Manifold, start: Resumable) -> bool:
@@ -302,13 +267,7 @@ def start_on(manifold: Manifold, start: Design | SurfaceCurve) -> Resumable | Su
     curve = replace(curve, faces=segment_faces, barycentric=weights)
     if not curve.closed:
         curve = _between_ends(original, curve)
-    mapped = manifold.curve(curve)
-    if mapped is None:
-        raise CurveError(
-            "start enters an obstacle of weight 1 or its clearance, or cannot be mapped at a "
-            f"non-manifold edge{WITHOUT_START}"
-        )
-    return mapped
+    return manifold.curve(curve)
 
 
 def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
@@ -316,32 +275,3 @@ def _between_ends(mesh: Mesh, curve: SurfaceCurve) -> SurfaceCurve:
     index = curve.control_index
     kept = slice(index[0], index[-1] + 1)
     return curve_on_mesh(mesh, False, curve.faces[kept], curve.barycentric[kept], index - index[0])
-
-
-def _given_on(repaired: MappedMesh, design: Design) -> Design:
-    """The design with its repairs; it continues only on a mesh that equals the original."""
-    resumable = design.resumable
-    return replace(
-        design,
-        resumable=None if resumable is None else replace(resumable, given=repaired.original),
-        alternatives=[_given_on(repaired, other) for other in design.alternatives],
-        repairs=dict(repaired.repairs),
-    )
-
-
-def _mapped(
-    design: Design,
-    curve: Callable[[SurfaceCurve], SurfaceCurve],
-    field: Callable[[FloatArray], FloatArray],
-) -> Design:
-    """A design whose curves and level set are mapped to another mesh by two functions."""
-    return replace(
-        design,
-        curves=[curve(each) for each in design.curves],
-        alternatives=[_mapped(other, curve, field) for other in design.alternatives],
-        find_field=partial(_mapped_field, design, field),
-    )
-
-
-def _mapped_field(design: Design, field: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    return field(design.field)

@@ -77,9 +77,17 @@ def points_of(curve: SurfaceCurve) -> SurfacePoints:
     return SurfacePoints(curve.faces, curve.barycentric)
 
 
-def with_points(mesh: Mesh, curve: SurfaceCurve, points: SurfacePoints) -> SurfaceCurve:
-    """The curve through other points, one for each of its own, on any mesh."""
-    return curve_on_mesh(mesh, curve.closed, points.faces, points.barycentric, curve.control_index)
+def with_points(
+    mesh: Mesh, curve: SurfaceCurve, points: SurfacePoints, number: IntArray | None = None
+) -> SurfaceCurve:
+    """The curve through other points, on any mesh.
+
+    ``number`` has the new index of each of its own points; by default the indices stay.
+    """
+    index = curve.control_index
+    if number is not None:
+        index = np.where(index >= 0, number[index], -1)
+    return curve_on_mesh(mesh, curve.closed, points.faces, points.barycentric, index)
 
 
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
@@ -147,7 +155,7 @@ def checked_curve(
             f"curve is not on this mesh: its point {first} has face {faces[first]} and coordinates "
             f"{barycentric[first].tolist()}; pass the mesh that it was designed on"
         )
-    barycentric = without_small_weights(barycentric, np.full(len(faces), ROUNDED))
+    barycentric = without_small_weights(barycentric)
     curve = replace(curve, barycentric=barycentric)
     return curve, _segment_faces(mesh, curve, across_gaps)
 
@@ -213,9 +221,11 @@ def _readable(curve: SurfaceCurve) -> SurfaceCurve:
     )
 
 
-def without_small_weights(barycentric: FloatArray, margin: FloatArray) -> FloatArray:
-    """Set barycentric coordinates up to a margin, (n,), to zero, and scale the rest to sum 1."""
-    kept = np.where(barycentric <= margin[:, None], 0.0, barycentric)
+def without_small_weights(
+    barycentric: FloatArray, margin: FloatArray | float = ROUNDED
+) -> FloatArray:
+    """Set barycentric coordinates up to a margin, or (n,), to zero, and scale the rest to sum 1."""
+    kept = np.where(barycentric <= np.asarray(margin)[..., None], 0.0, barycentric)
     return kept / kept.sum(axis=1, keepdims=True)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from scipy import sparse
@@ -137,3 +137,19 @@ def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -
     while path[-1] != start:
         path.append(int(previous[path[-1]]))
     return path[::-1]
+
+
+def shortest_chain(
+    start: int, neighbours: Callable[[int], Iterable[int]], is_end: Callable[[int], bool]
+) -> list[int]:
+    """Nodes of a path of the fewest arcs from a node to an end; empty if there is none."""
+    previous = {start: start}
+    queue = [start]
+    for node in queue:
+        if is_end(node):
+            return path_between(previous, start, node)
+        for beyond in neighbours(node):
+            if beyond not in previous:
+                previous[beyond] = node
+                queue.append(beyond)
+    return []

@@ -14,6 +14,7 @@ from ..errors import ArgumentError, MeshError, NicmmError
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .grouping import components, grouped
+from .tolerances import TINY
 from .vectors import cross, lengths
 
 LARGEST, SMALLEST = 1e50, 1e-50
@@ -255,6 +256,21 @@ def edge_lengths(vertices: FloatArray, edges: IntArray) -> FloatArray:
     """Length of each edge, shape (E,)."""
     start, end = (np.take(vertices, of_edge, axis=0) for of_edge in edges.T)
     return lengths((end - start).T)
+
+
+def feet_on_edges(
+    vertices: FloatArray, edges: IntArray, points: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Foot of the perpendicular from a vertex, (E,), to the line of each edge, (E, 2).
+
+    Returns its position as a fraction from the first end to the second, (E,), and the distance of
+    the vertex from it, (E,).
+    """
+    start, end, point = (np.take(vertices, of, axis=0) for of in (*edges.T, points))
+    way, offset = end - start, point - start
+    squared = np.maximum(np.einsum("ed,ed->e", way, way), TINY)
+    share = np.einsum("ed,ed->e", offset, way) / squared
+    return share, lengths((offset - share[:, None] * way).T)
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:

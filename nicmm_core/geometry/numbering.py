@@ -22,7 +22,7 @@ import numpy as np
 from ..progress import checkpoint
 from .array_types import BoolArray, FloatArray, IntArray
 from .curve import SurfaceCurve, points_of, with_points
-from .mesh import LARGEST, Mesh, area_vectors
+from .mesh import Mesh, area_vectors
 from .surface_points import SurfacePoints, in_first_faces
 from .tolerances import TINY
 
@@ -57,6 +57,34 @@ SYMMETRIC = 1e-6
 
 
 @dataclass(frozen=True)
+class PrincipalFrame:
+    """The surface's centroid and principal axes.
+
+    Attributes
+    ----------
+    centre : (3,) float array
+        Centroid of the surface.
+    axes : (3, 3) float array
+        Unit vectors along the axes, one in each column, each pointing to where the surface reaches
+        farther. If the surface is symmetric along an axis, its largest component is positive.
+    unit : float
+        Square root of the area of the surface.
+    """
+
+    centre: FloatArray
+    axes: FloatArray
+    unit: float
+
+    def coordinates(self, positions: FloatArray) -> FloatArray:
+        """Coordinates of positions, (n, 3), along the axes, in units of the frame."""
+        return (positions - self.centre) @ self.axes / self.unit
+
+    def positions(self, coordinates: FloatArray) -> FloatArray:
+        """Positions from coordinates, (n, 3)."""
+        return self.unit * coordinates @ self.axes.T + self.centre
+
+
+@dataclass(frozen=True)
 class Renumbered:
     """A mesh and the canonical copy of one of its components, with V' vertices and F' faces.
 
@@ -66,39 +94,26 @@ class Renumbered:
         The given mesh.
     mesh : Mesh
         The copy; its area is 1.
-    number : (V,) int array
-        Index in the copy of each original vertex, or -1 if it belongs to no face of the component.
+    vertex : (V',) int array
+        Original vertex of each vertex of the copy.
     face : (F',) int array
         Original face of each face of the copy.
     corner : (F', 3) int array
         Index, in the original face, of each corner of each face of the copy.
-    centre : (3,) float array
-        Origin of the copy's coordinates, in the space of the original.
-    axes : (3, 3) float array
-        Axes of the copy's coordinates, one in each column.
-    unit : float
-        Length in the original of a unit of length in the copy.
+    frame : PrincipalFrame
+        The frame in which the coordinates of the copy are given.
     """
 
     original: Mesh
     mesh: Mesh
-    number: IntArray
+    vertex: IntArray
     face: IntArray
     corner: IntArray
-    centre: FloatArray
-    axes: FloatArray
-    unit: float
+    frame: PrincipalFrame
 
     def in_original(self, positions: FloatArray) -> FloatArray:
         """Map positions on the copy, (n, 3), to the original, up to the rounding of coordinates."""
-        return self.unit * positions @ self.axes.T + self.centre
-
-    @cached_property
-    def _place(self) -> IntArray:
-        """Face of the copy of each original face, or -1, (F,)."""
-        place = np.full(len(self.original.faces), -1)
-        place[self.face] = np.arange(len(self.face))
-        return place
+        return self.frame.positions(positions)
 
     def points_to(self, points: SurfacePoints) -> SurfacePoints:
         """Map points of the component to the copy, each in the first face that contains it."""
@@ -112,20 +127,16 @@ class Renumbered:
 
     def weights_to(self, weights: FloatArray) -> FloatArray:
         """Map weights at the vertices of the original, (V,), to the vertices of the copy, (V',)."""
-        inside = self.number >= 0
-        result = np.empty(len(self.mesh.vertices))
-        result[self.number[inside]] = weights[inside]
-        return result
+        return weights[self.vertex]
 
     def field_back(self, values: FloatArray) -> FloatArray:
         """Map lengths at the vertices of the copy, (V',), to the vertices of the original, (V,).
 
         Vertices outside the component get the greatest value.
         """
-        result = np.full(len(self.number), values.max())
-        inside = self.number >= 0
-        result[inside] = values[self.number[inside]]
-        return self.unit * result
+        result = np.full(len(self.original.vertices), values.max())
+        result[self.vertex] = values
+        return self.frame.unit * result
 
     def curve_to(self, curve: SurfaceCurve) -> SurfaceCurve | None:
         """Map a curve on the original to the copy; None if it is on another component."""
@@ -137,12 +148,18 @@ class Renumbered:
         """Map a curve on the copy to the original."""
         return with_points(self.original, curve, self.points_back(points_of(curve)))
 
+    @cached_property
+    def _place(self) -> IntArray:
+        """Face of the copy of each original face, or -1, (F,)."""
+        place = np.full(len(self.original.faces), -1)
+        place[self.face] = np.arange(len(self.face))
+        return place
+
     def _in_copy(self, points: SurfacePoints) -> SurfacePoints:
         """Points of the component in the faces of the copy that replace theirs."""
         faces = self._place[points.faces]
-        return SurfacePoints(
-            faces, np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
-        )
+        weights = np.take_along_axis(points.barycentric, self.corner[faces], axis=1)
+        return SurfacePoints(faces, weights)
 
 
 def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbered:
@@ -156,28 +173,23 @@ def renumbered(mesh: Mesh, component: int = 0, exact: bool = False) -> Renumbere
         Whether coordinates are not rounded, as for copies of a vertex that must stay apart.
     """
     inside = np.flatnonzero(mesh.face_component == component)
-    given, areas = mesh.faces[inside], mesh.face_areas[inside]
-    vertex = np.flatnonzero(np.bincount(given.ravel(), minlength=len(mesh.vertices)))
-    unit = max(float(np.sqrt(areas.sum())), TINY)
-    centre, axes, places = _in_frame(mesh.vertices, given, areas)
-    with np.errstate(over="ignore"):
-        places = (places / unit).clip(-LARGEST, LARGEST)
-    places[vertex], integers = _rounded_soundly(places, vertex, given, exact)
+    used = np.bincount(mesh.faces[inside].ravel(), minlength=len(mesh.vertices)) > 0
+    vertex, faces = np.flatnonzero(used), (np.cumsum(used) - 1)[mesh.faces[inside]]
+    frame = principal_frame(mesh.vertices[vertex], faces, mesh.face_areas[inside])
+    checkpoint()
+    places = frame.coordinates(mesh.vertices[vertex])
+    places, integers = _rounded_soundly(places, faces, exact)
     order = np.lexsort(integers.T[::-1])
     checkpoint()
-    number = np.full(len(mesh.vertices), -1)
-    number[vertex[order]] = np.arange(len(order))
-    faces = number[given]
-    first = faces.argmin(axis=1)
-    corner = (np.arange(3) + first[:, None]) % 3
+    faces = np.argsort(order)[faces]
+    corner = (np.arange(3) + faces.argmin(axis=1)[:, None]) % 3
     low, middle, high = np.sort(faces, axis=1).T
     face = np.lexsort((high, low * len(order) + middle))
-    corner = corner[face]
-    vertices = places[vertex[order]]
-    which = _turned(mesh, vertices, np.take_along_axis(faces[face], corner, axis=1))
-    corner[which] = corner[which][:, [0, 2, 1]]
-    copy = Mesh(vertices, np.take_along_axis(faces[face], corner, axis=1))
-    return Renumbered(mesh, copy, number, inside[face], corner, centre, axes, unit)
+    places, faces, corner = places[order], faces[face], corner[face]
+    turned = _turned(mesh, places, np.take_along_axis(faces, corner, axis=1))
+    corner[turned] = corner[turned][:, [0, 2, 1]]
+    copy = Mesh(places, np.take_along_axis(faces, corner, axis=1))
+    return Renumbered(mesh, copy, vertex[order], inside[face], corner, frame)
 
 
 def _turned(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> BoolArray:
@@ -205,22 +217,21 @@ def _turned(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> BoolArray:
 
 
 def _rounded_soundly(
-    places: FloatArray, vertex: IntArray, faces: IntArray, exact: bool
+    places: FloatArray, faces: IntArray, exact: bool
 ) -> tuple[FloatArray, IntArray]:
-    """Coordinates of some vertices, (n, 3), rounded as coarsely as the faces allow; as integers.
+    """Coordinates, (n, 3), rounded as coarsely as the faces allow; the same as integers.
 
     They are not rounded if the faces allow no resolution, or if `exact` is set.
     """
     before = area_vectors(places, faces)
     greatest = SOUND * np.linalg.norm(before, axis=1)
-    rounded = places.copy()
     for resolution in RESOLUTIONS:
-        integers = _integers(places[vertex], resolution)
-        rounded[vertex] = resolution * integers
+        integers = _integers(places / resolution)
+        rounded = resolution * integers
         change = area_vectors(rounded, faces) - before
         if not exact and (np.linalg.norm(change, axis=1) <= greatest).all():
-            return rounded[vertex], integers
-    return places[vertex], integers
+            return rounded, integers
+    return places, integers
 
 
 def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatArray) -> IntArray:
@@ -230,58 +241,17 @@ def frame_coordinates(vertices: FloatArray, faces: IntArray, face_areas: FloatAr
     ----------
     vertices : (V, 3) float array
     faces : (F, 3) int array
-        The faces that determine the frame and the unit, the square root of their area.
+        The faces that determine the frame.
     face_areas : (F,) float array
     """
-    places = _in_frame(vertices, faces, face_areas)[2]
-    unit = max(float(np.sqrt(face_areas.sum())), TINY)
-    return _integers(places, RESOLUTIONS[0] * unit)
-
-
-def _in_frame(
-    vertices: FloatArray, faces: IntArray, face_areas: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centre, (3,), and signed axes, (3, 3), of the principal frame; vertices in it, (V, 3)."""
     frame = principal_frame(vertices, faces, face_areas)
-    axes = frame.signed_axes()
-    with np.errstate(over="ignore", invalid="ignore"):  # vertices without faces may be anywhere
-        places = np.nan_to_num((vertices - frame.centre) @ axes)
-    checkpoint()
-    return frame.centre, axes, places
+    with np.errstate(over="ignore"):  # vertices without faces may be anywhere
+        return _integers(frame.coordinates(vertices) / RESOLUTIONS[0])
 
 
-def _integers(places: FloatArray, resolution: float) -> IntArray:
-    """Coordinates rounded to integers, in units of a resolution."""
-    with np.errstate(over="ignore"):
-        return np.round((places / max(resolution, TINY)).clip(-FARTHEST, FARTHEST)).astype(np.int64)
-
-
-@dataclass(frozen=True)
-class PrincipalFrame:
-    """The surface's centroid and principal axes.
-
-    Attributes
-    ----------
-    centre : (3,) float array
-        Centroid of the surface.
-    axes : (3, 3) float array
-        Unit vectors along the axes, one in each column, with arbitrary sign.
-    skewness : (3,) float array
-        Skewness along each axis; positive if the surface reaches farther in the axis's direction.
-    """
-
-    centre: FloatArray
-    axes: FloatArray
-    skewness: FloatArray
-
-    def signed_axes(self) -> FloatArray:
-        """The axes, each pointing to where the surface reaches farther, shape (3, 3).
-
-        If the surface is symmetric along an axis, the largest component of this axis is positive.
-        """
-        largest = self.axes[np.abs(self.axes).argmax(axis=0), np.arange(3)]
-        signs = np.where(np.abs(self.skewness) > SYMMETRIC, self.skewness, largest)
-        return self.axes * np.where(signs < 0.0, -1.0, 1.0)
+def _integers(coordinates: FloatArray) -> IntArray:
+    """Coordinates rounded to integers."""
+    return np.round(coordinates.clip(-FARTHEST, FARTHEST)).astype(np.int64)
 
 
 def principal_frame(
@@ -290,7 +260,8 @@ def principal_frame(
     """Compute the principal frame of a surface from the centroids and areas of its faces."""
     first, second, third = (np.take(vertices, corner, axis=0) for corner in faces.T)
     offset = (first + second + third) / 3.0
-    share = face_areas / face_areas.sum()
+    area = face_areas.sum()
+    share = face_areas / area
     centre = share @ offset
     offset -= centre
     squares, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
@@ -298,7 +269,10 @@ def principal_frame(
     deviation = float(np.sqrt(squares.sum()))
     along = offset @ axes / max(deviation, TINY)
     skewness = share @ (along * along * along)
-    return PrincipalFrame(centre, axes, skewness)
+    largest = axes[np.abs(axes).argmax(axis=0), np.arange(3)]
+    signs = np.where(np.abs(skewness) > SYMMETRIC, skewness, largest)
+    axes *= np.where(signs < 0.0, -1.0, 1.0)
+    return PrincipalFrame(centre, axes, max(float(np.sqrt(area)), TINY))
 
 
 def _settled(squares: FloatArray, axes: FloatArray) -> FloatArray:

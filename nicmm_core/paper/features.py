@@ -33,7 +33,7 @@ def in_principal_frame(vertices: FloatArray, faces: IntArray, face_areas: FloatA
     model, unless the axes are undetermined, as for a sphere.
     """
     frame = principal_frame(vertices, faces, face_areas)
-    axes = frame.signed_axes()
+    axes = frame.axes.copy()
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return (vertices - frame.centre) @ axes
 

@@ -21,7 +21,7 @@ from ..errors import ArgumentError, UnreachableError
 from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.surface_points import locate_control_points
-from ..repair.clean_surface import Cleaning, clean_surface
+from ..repair.clean_surface import without_doubled_faces
 from ..repair.nonmanifold import manifold
 from .features import BASE_CHANNELS
 from .losses import LossWeights, balanced, loss_terms, total_loss
@@ -301,9 +301,7 @@ def _random_problems(
 
 def _manifold(mesh: Mesh) -> Mesh:
     """A manifold with the same surface, on which problems can be built."""
-    clean = clean_surface(mesh, Cleaning.FACES)
-    assert clean is not None  # a mesh has faces
-    made = manifold(clean, np.arange(len(mesh.faces)), connected=False)
+    made = manifold(without_doubled_faces(mesh), np.arange(len(mesh.faces)), connected=False)
     return mesh if made is None else made.mesh
 
 

@@ -1,42 +1,29 @@
 """The surface that the faces of a mesh describe, whichever vertices they share.
 
-Vertices of open edges that coincide are joined, doubled faces are left out, faces without area are
-removed, and open edges are divided where vertices of other open edges lie on them. So meshes that
-differ only in these have the same clean surface, or, where faces are divided, almost the same.
+It is cleaned in three steps. Doubled faces are left out. Vertices of open edges that coincide are
+joined. Open edges are divided where vertices of other open edges lie on them, and faces without
+area are removed. So meshes that differ only in these have the same clean surface, or, where faces
+are divided, almost the same.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, IntArray
+from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.mesh import Mesh
 from ..progress import checkpoint
-from .coincident_vertices import distinct_faces, joined_vertices, vertices_stay
+from .degenerate_faces import without_flat_faces
 from .face_parts import FaceParts
-from .flat_faces import without_flat_faces
-from .t_junctions import without_t_junctions
+from .open_edges import distinct_faces, joined_vertices, vertices_stay, without_t_junctions
+from .removed_faces import RemovedFaces
 
 
-class Cleaning(IntEnum):
-    """How much is cleaned; later values clean less.
-
-    Removing a face without area may separate what it connected, for example two fans that meet at
-    an edge without length.
-    """
-
-    FULL = 0
-    VERTICES = 1
-    """Vertices are joined, and faces without area stay."""
-    FACES = 2
-    """Only doubled faces are left out."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CleanSurface:
     """The clean surface of a mesh.
 
@@ -44,79 +31,113 @@ class CleanSurface:
     ----------
     original : Mesh
         The given mesh, with V vertices and F faces.
-    mesh : Mesh
-        The clean mesh, which has the same vertices; the given one if it is clean.
+    vertices : (V, 3) float array
+        Positions of its vertices; where gaps are closed, they differ from the given ones.
     parts : FaceParts
-        Its faces, with the given face of each.
+        The faces of the surface, with the given face of each.
     joined : (V,) int array
         The first of the given vertices that were joined with each.
     place : (V,) int array
-        The vertex of the mesh at which each given vertex lies. It differs from `joined` where an
+        The vertex of the surface at which each given vertex lies. It differs from `joined` where an
         edge without length was removed.
-    removed : (F,) bool array
-        Given faces of which no part remains, since they are doubled or have no area.
     divisions : (d, 3) int array
         Vertices at which edges were divided, and the two ends of the edge of each.
     repairs : dict of str to int
-        How often each repair was made, without those that were not.
+        How often each repair was made.
     """
 
     original: Mesh
-    mesh: Mesh
+    vertices: FloatArray
     parts: FaceParts
     joined: IntArray
     place: IntArray
-    removed: BoolArray
     divisions: IntArray
     repairs: dict[str, int]
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The surface as a mesh; the given one if it is clean."""
+        if self.parts.faces is self.original.faces and self.vertices is self.original.vertices:
+            return self.original
+        return Mesh(self.vertices, self.parts.faces)
+
+    @cached_property
+    def removed(self) -> BoolArray:
+        """Given faces of which no part remains, since they are doubled or have no area, (F,)."""
+        removed = np.ones(len(self.original.faces), dtype=bool)
+        removed[self.parts.parent] = False
+        return removed
+
+    @cached_property
+    def removed_faces(self) -> RemovedFaces:
+        """These faces, which curves on the given mesh have to cross."""
+        return RemovedFaces(self.original, self.joined[self.original.faces], self.removed)
+
+
+def clean_surfaces(mesh: Mesh) -> list[CleanSurface]:
+    """The clean surface of a mesh, followed by its surface after fewer steps.
+
+    Removing a face without area may separate what it connected, for example two fans that meet at
+    an edge without length. Steps that change nothing, or leave no face, are left out.
+    """
+    distinct = without_doubled_faces(mesh)
+    joined = with_joined_vertices(distinct)
+    return list(dict.fromkeys([without_faces_of_no_area(joined), joined, distinct]))
 
 
 def joined_surface(mesh: Mesh) -> CleanSurface:
     """The surface of a mesh with coincident vertices joined, without doubled faces."""
-    surface = clean_surface(mesh, Cleaning.VERTICES) or clean_surface(mesh, Cleaning.FACES)
-    assert surface is not None  # a mesh has faces
-    return surface
+    return with_joined_vertices(without_doubled_faces(mesh))
 
 
-def clean_surface(mesh: Mesh, cleaning: Cleaning) -> CleanSurface | None:
-    """Clean the surface of a mesh; None if no face would remain."""
-    parts = distinct_faces(mesh)
-    doubled = len(mesh.faces) - len(parts.faces)
-    joined, vertices = np.arange(len(mesh.vertices)), mesh.vertices
-    if cleaning <= Cleaning.VERTICES:
-        joined, vertices = joined_vertices(mesh)
-        # Both ends of a side may have been joined; a face without area is left out then.
-        distinct = parts if vertices_stay(joined) else parts.renumbered(joined).distinct()
-        doubled += len(parts.faces) - len(distinct.faces)
-        parts = distinct
-    place, flat = joined, 0
-    joints = divisions = np.zeros((0, 3), dtype=np.int64)
-    if cleaning is Cleaning.FULL:
-        parts, joints = without_t_junctions(mesh, vertices, parts)
-        before = len(np.unique(parts.parent))
-        short = tolerances.SAME_POSITION * mesh.diagonal
-        parts, merged, divisions = without_flat_faces(vertices, parts, short)
-        flat = before - len(np.unique(parts.parent))
-        place, divisions = merged[joined], np.concatenate([merged[joints], divisions])
-    if not len(parts.faces):
-        return None
-    checkpoint()
+def without_doubled_faces(mesh: Mesh) -> CleanSurface:
+    """The surface of a mesh on which faces with the same corners count once."""
+    parts, vertex = distinct_faces(mesh), np.arange(len(mesh.vertices))
     repairs = {
-        "vertices joined": int((joined != np.arange(len(joined))).sum()),
-        "doubled faces left out": doubled,
-        "faces without area removed": flat,
+        "vertices joined": 0,
+        "doubled faces left out": len(mesh.faces) - len(parts.faces),
+        "faces without area removed": 0,
+        "T-junctions closed": 0,
+    }
+    divisions = np.zeros((0, 3), dtype=np.int64)
+    return CleanSurface(mesh, mesh.vertices, parts, vertex, vertex, divisions, repairs)
+
+
+def with_joined_vertices(surface: CleanSurface) -> CleanSurface:
+    """A surface on which vertices of open edges that coincide are one vertex."""
+    joined, vertices = joined_vertices(surface.original, surface.parts)
+    if vertices_stay(joined):
+        return surface
+    # Both ends of a side may have been joined; a face without area is left out then.
+    parts = surface.parts.with_faces(joined[surface.parts.faces]).distinct()
+    if not len(parts.faces):
+        return surface
+    repairs = surface.repairs | {
+        "vertices joined": int((joined != surface.joined).sum()),
+        "doubled faces left out": len(surface.original.faces) - len(parts.faces),
+    }
+    return replace(
+        surface, vertices=vertices, parts=parts, joined=joined, place=joined, repairs=repairs
+    )
+
+
+def without_faces_of_no_area(surface: CleanSurface) -> CleanSurface:
+    """A surface without T-junctions and faces of no area."""
+    mesh, vertices = surface.original, surface.vertices
+    parts, joints = without_t_junctions(mesh, vertices, surface.parts)
+    short = tolerances.SAME_POSITION * mesh.diagonal
+    parts, merged, divisions = without_flat_faces(vertices, parts, short)
+    if parts is surface.parts or not len(parts.faces):
+        return surface
+    checkpoint()
+    repairs = surface.repairs | {
+        "faces without area removed": len(surface.parts.faces) - len(np.unique(parts.parent)),
         "T-junctions closed": len(joints),
     }
-    removed = np.ones(len(mesh.faces), dtype=bool)
-    removed[parts.parent] = False
-    same = parts.faces is mesh.faces and vertices is mesh.vertices
-    return CleanSurface(
-        mesh,
-        mesh if same else Mesh(vertices, parts.faces),
-        parts,
-        joined,
-        place,
-        removed,
-        divisions,
-        {name: count for name, count in repairs.items() if count},
+    return replace(
+        surface,
+        parts=parts,
+        place=merged[surface.joined],
+        divisions=np.concatenate([merged[joints], divisions]),
+        repairs=repairs,
     )

@@ -45,7 +45,7 @@ def free_faces(mapped: MappedMesh, obstacles: FloatArray, clearance: float) -> I
     """
     faces = mapped.original.faces
     # Of several coincident vertices, for example on a seam, the caller may have marked only one.
-    place = mapped.original_place
+    place = mapped.clean.place
     hard_places = np.zeros(place.max() + 1, dtype=bool)
     hard_places[place[obstacles >= HARD]] = True
     hard = hard_places[place]
@@ -68,7 +68,7 @@ def _distances(mapped: MappedMesh, hard: BoolArray, farthest: float) -> FloatArr
     distance = np.where(here >= HARD, 0.0, np.inf)
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
     propagate(surface, distance, farthest)
-    return mapped.field_back(distance)
+    return mapped.field_back(np.minimum(distance, farthest))
 
 
 def check_reachable(free: MappedMesh, named: dict[str, SurfacePoints]) -> None:

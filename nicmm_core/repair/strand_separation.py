@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..geometry.array_types import IntArray
 from ..geometry.crossings import crossing_segments
-from ..geometry.grouping import path_between
+from ..geometry.grouping import shortest_chain
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import SurfacePoints, joined, weights_at
+from ..geometry.surface_points import SurfacePoints, in_faces, joined
 
 REACH = 0.05
 """Greatest distance by which a strand is moved, in lengths of the edges there."""
@@ -65,91 +66,82 @@ def separated(
     number = np.arange(len(polyline))
     for _ in range(ROUNDS):
         touching = _touching(mesh, place, polyline, number[fixed])
-        if not touching:
+        if not len(touching):
             break
-        # Backward, so that points not yet processed keep their indices.
-        for point in touching[::-1]:
-            corners = int((polyline.barycentric[point] > 0.0).sum())
-            move = _round_vertex if corners == 1 else _along_edge
-            polyline, step = _moved(mesh, polyline, point, closed, move)
-            number = np.where(number >= 0, step[number], -1)
-    for point in _passed_segments(mesh, place, polyline, closed)[::-1]:
-        polyline, step = _moved(mesh, polyline, point, closed, _into_face)
-        number = np.where(number >= 0, step[number], -1)
-    return polyline, number
+        polyline, number = _moved(mesh, polyline, number, touching, closed, _aside)
+    passed = _passed_segments(mesh, place, polyline, closed)
+    return _moved(mesh, polyline, number, passed, closed, _into_face)
+
+
+def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntArray) -> IntArray:
+    """Points, except fixed ones, that coincide with another point on the original, ascending."""
+    here = polyline.barycentric > 0.0
+    places = np.where(here, place[mesh.faces[polyline.faces]], -1)
+    order = np.argsort(places, axis=1, kind="stable")
+    weights = np.where(here, polyline.barycentric, 0.0)
+    keys = np.concatenate(
+        [np.take_along_axis(each, order, axis=1) for each in (places, weights)], axis=1
+    )
+    on_edges = np.flatnonzero(here.sum(axis=1) < 3)
+    pairs = cKDTree(keys[on_edges]).query_pairs(SAME_POINT, p=np.inf, output_type="ndarray")
+    one, other = on_edges[pairs].T
+    stays = np.isin(np.arange(len(polyline)), fixed)
+    later = np.where(stays[other], one, other)
+    return np.unique(later[~stays[later]])
 
 
 def _passed_segments(
     mesh: Mesh, place: IntArray, polyline: SurfacePoints, closed: bool
-) -> list[int]:
+) -> IntArray:
     """Segments along an edge, if other strands have points on copies of this edge, ascending."""
-    n = len(polyline)
     here = polyline.barycentric > 0.0
-    corners = mesh.faces[polyline.faces]
-    on_edge: dict[tuple[int, ...], list[int]] = {}
-    for point in np.flatnonzero(here.sum(axis=1) == 2).tolist():
-        ends = tuple(sorted(place[corners[point][here[point]]].tolist()))
-        on_edge.setdefault(ends, []).append(point)
-    found = []
-    for point in range(n if closed else n - 1):
-        following = (point + 1) % n
-        both = {
-            *corners[point][here[point]].tolist(),
-            *corners[following][here[following]].tolist(),
-        }
-        if len(both) == 2:
-            ends = tuple(sorted(place[list(both)].tolist()))
-            if set(on_edge.get(ends, ())) - {point, following}:
-                found.append(point)
-    return found
+    following = np.roll(np.arange(len(polyline)), -1)
+    ends = in_faces(mesh, polyline[following], polyline.faces).barycentric
+    both = here | (ends > 0.0)
+    along = both.sum(axis=1) == 2
+    if not closed:
+        along[-1] = False
+    places = place[mesh.faces[polyline.faces]]
+    point, segment = (np.sort(np.where(which, places, -1), axis=1) for which in (here, both))
+    on_edge = here.sum(axis=1) == 2
+    along = np.flatnonzero(along)
+    same = (segment[along, None] == point).all(axis=2).sum(axis=1)
+    return along[same > on_edge[along].astype(int) + on_edge[following[along]]]
 
 
-def _touching(mesh: Mesh, place: IntArray, polyline: SurfacePoints, fixed: IntArray) -> list[int]:
-    """Points, except fixed ones, that coincide with another point on the original, ascending."""
-    stays = np.zeros(len(polyline), dtype=bool)
-    stays[fixed] = True
-    here = polyline.barycentric > 0.0
-    places = np.where(here, place[mesh.faces[polyline.faces]], -1)
-    order = np.argsort(places, axis=1, kind="stable")
-    rows = np.arange(len(places))[:, None]
-    places = places[rows, order]
-    weights = np.where(here, polyline.barycentric, 0.0)[rows, order]
-    on_mesh = here.sum(axis=1) < 3
-    first: dict[tuple[int, ...], list[int]] = {}
-    found = []
-    # Fixed points come first, so the points that coincide with them are moved.
-    for point in np.lexsort((np.arange(len(stays)), ~stays)).tolist():
-        if not on_mesh[point]:
-            continue
-        key = tuple(places[point].tolist())
-        others = first.setdefault(key, [])
-        same = [o for o in others if np.abs(weights[o] - weights[point]).max() <= SAME_POINT]
-        if same and not stays[point]:
-            found.append(point)
-        else:
-            others.append(point)
-    return sorted(found)
+Move = Callable[[Mesh, SurfacePoints, int, float], tuple[SurfacePoints, IntArray]]
+"""Changes a polyline at one point by a share of the greatest distance; new index of each point."""
 
 
 def _moved(
     mesh: Mesh,
     polyline: SurfacePoints,
-    point: int,
+    number: IntArray,
+    points: IntArray,
     closed: bool,
-    move: Callable[[Mesh, SurfacePoints, int, float], tuple[SurfacePoints, IntArray]],
+    move: Move,
 ) -> tuple[SurfacePoints, IntArray]:
-    """Move one point, by less at every attempt until the polyline is simple.
+    """Move points, each by less at every attempt until the polyline is simple.
 
-    Returns the polyline and the new index of each point. If no attempt succeeds, the polyline is
-    unchanged.
+    If no attempt succeeds, a point stays. Returns the polyline and the new index of each of the
+    points whose present index is given.
     """
-    share = 1.0
-    for _ in range(ATTEMPTS):
-        changed, number = move(mesh, polyline, point, share)
-        if not len(crossing_segments(mesh.faces, changed, closed)):
-            return changed, number
-        share *= 0.1
-    return polyline, np.arange(len(polyline))
+    # Backward, so that points not yet processed keep their indices.
+    for point in points[::-1].tolist():
+        for share in 0.1 ** np.arange(ATTEMPTS):
+            changed, step = move(mesh, polyline, point, float(share))
+            if not len(crossing_segments(mesh.faces, changed, closed)):
+                polyline, number = changed, np.where(number >= 0, step[number], -1)
+                break
+    return polyline, number
+
+
+def _aside(
+    mesh: Mesh, polyline: SurfacePoints, point: int, share: float
+) -> tuple[SurfacePoints, IntArray]:
+    """Lead the polyline around the vertex at a point, or move the point along its edge."""
+    at_vertex = (polyline.barycentric[point] > 0.0).sum() == 1
+    return (_round_vertex if at_vertex else _along_edge)(mesh, polyline, point, share)
 
 
 def _round_vertex(
@@ -158,7 +150,13 @@ def _round_vertex(
     """Replace a point at a vertex by points on the edges that meet there."""
     n, faces = len(polyline), polyline.faces
     vertex = int(mesh.faces[faces[point]][polyline.barycentric[point].argmax()])
-    fan = _faces_between(mesh, vertex, int(faces[point - 1]), int(faces[point]))
+
+    def beside(face: int) -> list[int]:
+        """The faces across the sides at the vertex."""
+        across = mesh.face_neighbours[face]
+        return across[(mesh.faces[face] != vertex) & (across >= 0)].tolist()
+
+    fan = shortest_chain(int(faces[point - 1]), beside, lambda face: face == faces[point])
     near = (polyline.barycentric * (mesh.faces[faces] == vertex)).sum(axis=1)
     near[point] = 0.0
     reach = share * min(REACH, SHARE * (1.0 - float(near.max())))
@@ -177,11 +175,8 @@ def _along_edge(
 ) -> tuple[SurfacePoints, IntArray]:
     """Move a point along its edge, towards the nearer end."""
     barycentric = polyline.barycentric.copy()
-    here = barycentric[point]
-    small, large = np.where(here > 0.0, here, np.inf).argmin(), here.argmax()
-    if small == large:  # both are one half
-        small, large = np.flatnonzero(here > 0.0)
-    step = share * SHARE * REACH * here[small]
+    _, small, large = np.argsort(barycentric[point], kind="stable")
+    step = share * SHARE * REACH * barycentric[point, small]
     barycentric[point, small] -= step
     barycentric[point, large] += step
     return SurfacePoints(polyline.faces, barycentric), np.arange(len(polyline))
@@ -193,8 +188,7 @@ def _into_face(
     """Insert a point into a segment along an edge, which bends it into the face of the segment."""
     n, face = len(polyline), int(polyline.faces[point])
     following = (point + 1) % n
-    corners = mesh.faces[polyline.faces[following]]
-    end = weights_at(corners[None], polyline.barycentric[[following]], mesh.faces[[face]])[0]
+    end = in_faces(mesh, polyline[np.array([following])], np.array([face])).barycentric[0]
     middle = 0.5 * (polyline.barycentric[point] + end)
     reach = share * REACH
     middle = (1.0 - reach) * middle + reach * (middle == 0.0)
@@ -202,18 +196,3 @@ def _into_face(
         np.insert(polyline.faces, point + 1, face),
         np.insert(polyline.barycentric, point + 1, middle, axis=0),
     ), np.arange(n) + (np.arange(n) > point)
-
-
-def _faces_between(mesh: Mesh, vertex: int, start: int, end: int) -> list[int]:
-    """The shortest chain of adjacent faces around a vertex from one face to another."""
-    previous = {start: start}
-    queue = [start]
-    for face in queue:
-        if face == end:
-            break
-        for corner, beyond in zip(mesh.faces[face], mesh.face_neighbours[face], strict=True):
-            # Do not cross the side opposite the vertex.
-            if corner != vertex and beyond >= 0 and int(beyond) not in previous:
-                previous[int(beyond)] = face
-                queue.append(int(beyond))
-    return path_between(previous, start, end)

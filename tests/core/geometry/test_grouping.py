@@ -16,6 +16,7 @@ from nicmm_core.geometry.grouping import (
     first_of_components,
     grouped,
     occurrences,
+    shortest_chain,
 )
 from nicmm_core.geometry.surface_points import first_hits, nearest_points
 
@@ -101,3 +102,11 @@ def test_occurrences_are_those_of_a_direct_comparison():
 def test_first_nodes_of_components():
     first = first_of_components(6, np.array([4, 5, 2]), np.array([2, 3, 4]))
     assert first.tolist() == [0, 1, 2, 3, 2, 3]
+
+
+def test_the_shortest_chain_to_any_end():
+    beside = {0: [1, 2], 1: [3], 2: [4], 3: [5], 4: [2, 6], 5: [], 6: [5]}
+    assert shortest_chain(0, beside.get, lambda node: node in (5, 6)) == [0, 1, 3, 5]
+    assert shortest_chain(4, beside.get, lambda node: node == 5) == [4, 6, 5]
+    assert shortest_chain(2, beside.get, lambda node: node == 2) == [2]
+    assert shortest_chain(1, beside.get, lambda node: node == 0) == []

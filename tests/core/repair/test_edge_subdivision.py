@@ -23,7 +23,7 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     number = np.where(chosen, np.cumsum(chosen) - 1, -1)
     segments = generator.integers(2, 5, size=chosen.sum())
     edge_of_side = number[edge.ravel()]
-    parts = subdivided(faces, low, high, edge_of_side, segments, len(mesh.vertices))
+    parts, first_child = subdivided(faces, edge_of_side, segments, len(mesh.vertices))
 
     # The parts of every face cover it once, with its orientation.
     area = np.bincount(parts.parent, weights=np.linalg.det(parts.corners))
@@ -50,7 +50,7 @@ def test_parts_cover_the_faces_and_meet_along_the_cut_edges(seed):
     assert abs(lengths.sum() - 4.0) < 1e-12
     # The parts along a subdivided side contain its segments in order.
     for side in np.flatnonzero(edge_of_side >= 0).tolist():
-        run = parts.first_child[side] + np.arange(segments[edge_of_side[side]])
+        run = first_child[side] + np.arange(segments[edge_of_side[side]])
         middles = places[run][:, :2].mean(axis=1)
         line = mesh.vertices[faces.ravel()[[low[side], high[side]]]]
         along = (middles - line[0]) @ (line[1] - line[0])

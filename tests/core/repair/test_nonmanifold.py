@@ -14,9 +14,9 @@ from nicmm_core.geometry.mesh import (
     unique_edges,
 )
 from nicmm_core.geometry.surface_points import locate_points
-from nicmm_core.repair.clean_surface import Cleaning
-from nicmm_core.repair.nonmanifold import _Sides, is_manifold
-from nicmm_core.repaired_surface import WAYS, CleanSurfaces, RepairedSurface
+from nicmm_core.repair.clean_surface import clean_surfaces
+from nicmm_core.repair.nonmanifold import cut, is_manifold, sides_by_edge
+from nicmm_core.repaired_surface import RepairedSurface
 from nicmm_core.surface_designer import SurfaceDesigner
 from tests.core.checks import grid, joined
 from tests.oracles import corpus
@@ -27,18 +27,17 @@ pytestmark = pytest.mark.usefixtures("one_attempt_each")
 
 MESHES = dict(defective_meshes())
 
+HEIGHTS = ("1e-13", "1e-10", "1e-07")
 
-FULL, VERTICES, FACES = Cleaning
-
-OTHER_WAYS = {
-    **dict.fromkeys(("soup", "seam"), (FACES, False)),
+UNDONE = {
+    **dict.fromkeys(("soup", "seam"), "vertices joined"),
     **dict.fromkeys(
         ("collapsed edges", "collapsed faces", "caps", "caps far away", "fans without area"),
-        (VERTICES, False),
+        "faces without area removed",
     ),
-    **{f"caps of height {height}": (VERTICES, False) for height in ("1e-13", "1e-10", "1e-07")},
+    **{f"caps of height {height}": "faces without area removed" for height in HEIGHTS},
 }
-"""The second way in which the manifold of a mesh is made, where cleaning changes the mesh."""
+"""The repair that is left out of the second surface of a mesh, where cleaning changes the mesh."""
 
 
 def nonmanifold_vertices(mesh):
@@ -50,9 +49,9 @@ def nonmanifold_vertices(mesh):
 
 
 def repairs_of(mesh):
-    """The manifold made in each way; None for one that connects no more than the previous ones."""
-    surface = RepairedSurface(CleanSurfaces(mesh), np.arange(len(mesh.faces)))
-    return [surface._manifold_of(*way) for way in WAYS]
+    """The manifolds in the order in which they are tried."""
+    surface = RepairedSurface(clean_surfaces(mesh), np.arange(len(mesh.faces)))
+    return list(surface.manifolds())
 
 
 def first_repair(mesh):
@@ -73,10 +72,9 @@ def test_a_good_curve_unless_an_error_is_due(name, request_number):
     ids=["sphere", "disc", "Möbius strip", "needles", "hole"],
 )
 def test_meshes_without_defects_are_their_own_copy(mesh):
-    first, *others = repairs_of(mesh)
-    assert first.mesh is mesh and not first.differs
-    assert not any(others)
-    assert not first.repairs
+    (only,) = repairs_of(mesh)
+    assert only.mesh is mesh and not only.differs
+    assert not only.repairs
 
 
 @pytest.mark.parametrize("seed", [None, *range(8)])
@@ -90,9 +88,9 @@ def test_a_mesh_taken_for_a_manifold_needs_no_cut(seed):
         number[generator.choice(len(number), seed, replace=False)] = generator.integers(len(number))
         meshes = [nicmm.Mesh(ball.vertices, faces_between(number[ball.faces]))]
     for mesh in meshes:
-        sides = _Sides(mesh.faces)
-        needs_none = not sides.nonmanifold_edges and np.array_equal(
-            sides.cut(sides.plain_pairs, len(mesh.vertices))[0], mesh.faces
+        pairs, several = sides_by_edge(mesh.faces)
+        needs_none = not several and np.array_equal(
+            cut(mesh.faces, pairs, len(mesh.vertices))[0], mesh.faces
         )
         assert needs_none or not is_manifold(mesh)
     if seed in (None, 0):
@@ -108,39 +106,39 @@ def faces_between(faces):
 def test_repairs_are_manifolds_of_the_same_faces(name):
     mesh = MESHES[name]
     repairs = repairs_of(mesh)
-    there = [way for way, mapped in zip(WAYS, repairs, strict=True) if mapped is not None]
-    expected = [(FULL, False)]
-    if name in OTHER_WAYS:
-        expected.append(OTHER_WAYS[name])
-    elif mesh.has_nonmanifold_edges and name != "duplicate faces":
-        expected.append((FULL, True))
-    assert there == expected
-    for mapped in filter(None, repairs):
-        assert_manifold(mapped.mesh)
-        assert (mapped.mesh.face_areas > 0.0).all()
-        of_faces = mesh.vertices[mesh.faces[mapped.face]]
-        if mapped.corners is not None:
-            np.testing.assert_allclose(mapped.corners.sum(axis=2), 1.0, atol=1e-15)
-            of_faces = mapped.corners @ of_faces
+    first, *others = clean_surfaces(mesh)
+    assert len(others) == (name in UNDONE)
+    for other in others:
+        assert first.repairs[UNDONE[name]] and not other.repairs[UNDONE[name]]
+    with_all_connected = mesh.has_nonmanifold_edges and name != "duplicate faces"
+    assert len(repairs) == 1 + len(others) + with_all_connected
+    for mapped in repairs:
+        for made in (mapped.manifold, mapped.mesh):
+            assert_manifold(made)
+            assert (made.face_areas > 0.0).all()
+            assert made.is_oriented or name == "Möbius strip"
+        manifold, parts = mapped.manifold, mapped.in_given
+        np.testing.assert_allclose(parts.corners.sum(axis=2), 1.0, atol=1e-15)
+        of_faces = parts.corners @ mesh.vertices[mesh.faces[parts.parent]]
         places = np.zeros((mapped.place.max() + 1, 3))
-        places[mapped.place[mapped.mesh.faces]] = of_faces
-        width = tolerances.DEGENERATE_SINE * mesh.mean_edge_length if len(mapped.divisions) else 0.0
+        places[mapped.place[manifold.faces]] = of_faces
+        divided = len(mapped.clean.divisions) > 0
+        width = divided * tolerances.DEGENERATE_SINE * mesh.mean_edge_length
         np.testing.assert_allclose(
-            places[mapped.place[mapped.mesh.faces]], of_faces, atol=1e-12 * mesh.diagonal + width
+            places[mapped.place[manifold.faces]], of_faces, atol=1e-12 * mesh.diagonal + width
         )
-        moved = mapped.mesh.vertices[mapped.mesh.faces] + mapped.origin - of_faces
+        moved = manifold.vertices[manifold.faces] + mapped.origin - of_faces
         start, end = mesh.vertices[mesh.edges].transpose(1, 0, 2)
         assert np.abs(moved).max() <= 1e-3 * np.linalg.norm(end - start, axis=1).max() + 1e-9
-        assert mapped.mesh.is_oriented or name == "Möbius strip"
 
 
 @pytest.mark.parametrize("name", MESHES)
 def test_parts_of_a_face_cover_it_once(name):
     mesh = MESHES[name]
-    for mapped in filter(None, repairs_of(mesh)):
-        if mapped.corners is not None:
-            area = np.bincount(mapped.face, weights=np.abs(np.linalg.det(mapped.corners)))
-            np.testing.assert_allclose(area[np.unique(mapped.face)], 1.0, atol=1e-12)
+    for mapped in repairs_of(mesh):
+        for parts in (mapped.in_given, mapped.in_mesh):
+            area = np.bincount(parts.parent, weights=np.abs(np.linalg.det(parts.corners)))
+            np.testing.assert_allclose(area[np.unique(parts.parent)], 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 8, 9, 40])
@@ -151,8 +149,7 @@ def test_all_faces_at_one_edge_are_connected(count):
     mesh = nicmm.Mesh(
         np.concatenate([[[0, 0, 0], [0, 0, 1]], around]), [[0, 1, 2 + i] for i in range(count)]
     )
-    straight, connected, *others = repairs_of(mesh)
-    assert not any(others)
+    straight, connected = repairs_of(mesh)
     assert len(np.unique(straight.mesh.face_component)) == -(-count // 2)
     assert len(np.unique(connected.mesh.face_component)) == 1
     assert len(connected.mesh.faces) <= count * (2 * np.log2(count) + 4)
@@ -179,7 +176,7 @@ def test_only_vertices_of_faces_without_area_move():
     vertices = grid(4).vertices.copy()
     faces = grid(4).faces
     vertices[faces[5, 0]] = vertices[faces[5, 1]]
-    copy = repairs_of(nicmm.Mesh(vertices, faces))[WAYS.index((VERTICES, False))]
+    copy = repairs_of(nicmm.Mesh(vertices, faces))[1]
     offset = copy.mesh.vertices - vertices
     offset -= np.median(offset, axis=0)
     flat = triangle_heights(vertices[faces]) <= tolerances.DEGENERATE_SINE

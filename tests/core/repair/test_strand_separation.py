@@ -93,7 +93,7 @@ def test_a_strand_that_enters_and_leaves_by_one_face():
     corner, beside = vertex(2, 2), vertex(3, 2)
     face = next(f for f in MESH.faces.tolist() if {corner, beside} <= set(f))
     third = next(v for v in face if v not in (corner, beside))
-    start, end = {beside: 0.5, third: 0.5}, {beside: 0.9, third: 0.1}
+    start, end = {beside: 0.5, third: 0.5}, {corner: 0.1, beside: 0.8, third: 0.1}
     path = polyline(start, {corner: 1.0}, end)
     far = along(vertex(0, 0), vertex(0, 1))
     points = SurfacePoints(

@@ -5,7 +5,7 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.surface_points import SurfacePoints
-from nicmm_core.repair.backtracking import without_backtracking
+from nicmm_core.repair.removed_faces import without_backtracking
 
 MESH = nicmm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 1, 2], [1, 0, 3]])
 
