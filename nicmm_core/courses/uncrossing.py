@@ -90,12 +90,13 @@ def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: 
     any_order : bool
     """
     n = len(control)
-    sequence = np.arange(n)
-    left = [(one, other) for one, other in crossings.tolist()]
-    while left:
-        place = np.empty(n, dtype=np.int64)
-        place[sequence] = np.arange(n)
-        steps = [sorted(_step(place, node) for node in pair) for pair in left]
+    sequence, place = np.arange(n), np.arange(n)
+    left = crossings
+    while len(left):
+        # The place of the step between two nodes that were neighbours in the given sequence; those
+        # of the step from the last node to the first are not neighbours now.
+        low, high = np.sort([place[left], place[(left + 1) % n]], axis=0)
+        steps = np.sort(np.where(high - low > 1, high, low), axis=1)
         before = np.append(0, np.cumsum(control[sequence]))
         move = _exchange(steps, before) or _reversal(steps, before, closed, any_order)
         if move is None:
@@ -105,8 +106,8 @@ def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: 
             for first, end in move.parts
         ]
         sequence = np.concatenate(parts)
-        gone = {node for number in move.removed for node in left[number]}
-        left = [pair for pair in left if gone.isdisjoint(pair)]
+        place[sequence] = np.arange(n)
+        left = left[~np.isin(left, left[move.removed]).any(axis=1)]
     return sequence
 
 
@@ -121,27 +122,18 @@ class _Move:
     removed: list[int]
 
 
-def _step(place: IntArray, node: int) -> int:
-    """The position of the step between a node and its successor in the original sequence."""
-    low, high = sorted((int(place[node]), int(place[(node + 1) % len(place)])))
-    return high if high - low > 1 else low  # from the last node to the first
-
-
-def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
+def _exchange(steps: IntArray, before: IntArray) -> _Move | None:
     """Exchange the shortest pair of strands between two of their crossings.
 
     Parameters
     ----------
-    steps : list of [int, int]
-        Positions of the two steps of each crossing, ascending.
+    steps : (p, 2) int array
+        Places of the two steps of each crossing, ascending.
     before : (n + 1,) int array
-        Number of control points before each position.
+        Number of control points before each place.
     """
-    if len(steps) < 2:
-        return None
-    places = np.array(steps)  # (p, 2)
-    begin, first_end = places[:, :1], places[:, 1:]  # (p, 1), of the first crossing
-    end, second_end = places[:, 0], places[:, 1]  # (p,), of the second crossing
+    begin, first_end = steps[:, :1], steps[:, 1:]  # (p, 1), of the first crossing
+    end, second_end = steps.T  # (p,), of the second crossing
     low, high = np.minimum(first_end, second_end), np.maximum(first_end, second_end)  # (p, p)
     free = (before[end + 1] == before[begin + 1]) & (before[high + 1] == before[low + 1])
     possible = free & (begin < end) & (end < low) & (low < high)
@@ -151,31 +143,34 @@ def _exchange(steps: list[list[int]], before: IntArray) -> _Move | None:
     one, other = np.unravel_index(int(size.argmin()), size.shape)
     start, stop = int(begin[one, 0]), int(end[other])
     least, most = int(low[one, other]), int(high[one, other])
-    here, there = (start + 1, stop + 1), (least + 1, most + 1)
+    nearer, farther = (start + 1, stop + 1), (least + 1, most + 1)
     if second_end[other] < first_end[one, 0]:  # the strands run in opposite directions
-        here, there = here[::-1], there[::-1]
+        nearer, farther = nearer[::-1], farther[::-1]
     rest = (most + 1, len(before) - 1)
-    parts = [(0, start + 1), there, (stop + 1, least + 1), here, rest]
+    parts = [(0, start + 1), farther, (stop + 1, least + 1), nearer, rest]
     return _Move(parts, [int(one), int(other)])
 
 
-def _reversal(
-    steps: list[list[int]], before: IntArray, closed: bool, any_order: bool
-) -> _Move | None:
+def _reversal(steps: IntArray, before: IntArray, closed: bool, any_order: bool) -> _Move | None:
     """Reverse the shortest loop, preferably one with at most one control point."""
     n = len(before) - 1
-    best, least = None, (True, n)
-    for number, (begin, end) in enumerate(steps):
-        inside = int(before[end + 1] - before[begin + 1])
-        outside = int(before[-1]) - inside
-        loops = [(inside > 1, end - begin, [(0, begin + 1), (end + 1, begin + 1), (end + 1, n)])]
-        if closed:
-            around = [(0, 1), (n, end + 1), (begin + 1, end + 1), (begin + 1, 1)]
-            loops.append((outside > 1, n - end + begin, around))
-        for changes_order, size, parts in loops:
-            if (changes_order, size) < least and (any_order or not changes_order):
-                best, least = _Move(parts, [number]), (changes_order, size)
-    return best
+    begins, ends = steps.T
+    inside = before[ends + 1] - before[begins + 1]
+    sizes, points = [ends - begins], [inside]
+    if closed:  # the rest of the curve is a loop, too
+        sizes.append(n - sizes[0])
+        points.append(before[-1] - inside)
+    changes_order = np.stack(points, axis=1) > 1
+    rank = np.stack(sizes, axis=1) + n * changes_order
+    number, around = np.unravel_index(int(rank.argmin()), rank.shape)
+    if changes_order[number, around] and not any_order:
+        return None
+    begin, end = steps[number].tolist()
+    if around:
+        parts = [(0, 1), (n, end + 1), (begin + 1, end + 1), (begin + 1, 1)]
+    else:
+        parts = [(0, begin + 1), (end + 1, begin + 1), (end + 1, n)]
+    return _Move(parts, [int(number)])
 
 
 def _in_order(surface: CurveSurface, nodes: Nodes, order: IntArray) -> Nodes:
