@@ -112,18 +112,20 @@ class Improvement:
         return self.attempts.limited(relaxation_config(self.request))
 
     def _search_again(self, further: list[Iterator[InitialCurve]]) -> None:
-        """Try the courses of one repeated search, other parts, and the courses of more searches."""
-        found = True
-        for courses in further[:1]:
-            if self.attempts.should_search_again():
-                found = self._try_courses(courses)
-        self._try_other_parts()
-        for courses in further[1:]:
-            if not (found and self.attempts.should_search_again()):
+        """Try the courses of repeated searches, and other parts after those that help.
+
+        Other parts do not mend kinks, so further searches come first then.
+        """
+        attempts, parts_tried = self.attempts, False
+        for courses in further:
+            if not (attempts.should_search_again() and self._try_courses(courses)):
                 break
-            found = self._try_courses(courses)
-            if self.attempts.searches_without_gain == 0:
+            gained = attempts.searches_without_gain == 0
+            if not attempts.is_kinked and (gained or not parts_tried):
                 self._try_other_parts()
+                parts_tried = True
+        if not parts_tried:
+            self._try_other_parts()
 
     def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.

@@ -61,10 +61,16 @@ class StartSearch:
     ----------
     mesh : Mesh
         A connected mesh.
+
+    Attributes
+    ----------
+    transferred : int
+        Number of courses so far that have been transferred from the coarse mesh.
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
+        self.transferred = 0
         self._mapped: tuple[Request, CurveSurface] | None = None  # of the last request with maps
 
     def courses(
@@ -131,6 +137,7 @@ class StartSearch:
         there, unit = self.surface(request), self.unit
         if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, seed):
+                self.transferred += 1
                 yield None if found is None else InitialCurve(*found, there, unit)
             return
         for course in self._courses.courses(request, seed):

@@ -114,20 +114,27 @@ class SurfaceDesigner:
 
     def _designed(self, request: Request, max_iterations: int | None, started: float) -> Design:
         """Relax the best course, or the initial path if no course is found."""
+        search, before = self._search, self._search.transferred
         with subrange(0.0, START_FRACTION):
-            courses = self._search.courses(request)
+            courses = search.courses(request)
             start = next(courses, None)
             by_course = start is not None
             if start is None:
-                start = self._search.by_path(request)
+                start = search.by_path(request)
         with subrange(START_FRACTION, 1.0):
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return self._relaxed_design(request, start, first, started)
             n_points = len(request.points) + sum(map(len, request.via_points.values()))
-            attempts = Attempts(start.surface, request.smoothness, n_points, relaxed=[first])
+            attempts = Attempts(
+                start.surface,
+                request.smoothness,
+                n_points,
+                lambda: search.transferred - before,
+                relaxed=[first],
+            )
             improvement = Improvement(
-                self._search,
+                search,
                 request,
                 partial(_relaxed_unless_cancelled, request),
                 attempts,

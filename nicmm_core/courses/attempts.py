@@ -7,6 +7,7 @@ then bends strongly, the parts that bend most are searched for again, and furthe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from ..relaxation.curve_energies import energies_of, scaled_bending
@@ -52,13 +53,13 @@ MOST_FAILURES = 4
 On rough meshes each of them takes long.
 """
 
-MOST_WORK = 3_000
+MOST_WORK = 2_200
 """Work of all attempts together above which no further one is begun.
 
-In moves of all nodes (`Work`). It takes about four seconds, and longer on rough meshes.
+In moves of all nodes. It takes about one second, and two to three on rough meshes.
 """
 
-RESERVED = 800
+RESERVED = 600
 """Part of that work that must be left after a further search, for other attempts at kinks."""
 
 WORK_OF_SEARCH = 40
@@ -66,6 +67,9 @@ WORK_OF_SEARCH = 40
 
 WORK_OF_PART = 100
 """Approximate work of a search for a part, in the same unit."""
+
+WORK_OF_TRANSFER = 40
+"""Approximate work of transferring a course from the coarse mesh, in the same unit."""
 
 
 @dataclass
@@ -78,6 +82,8 @@ class Attempts:
     smoothness : float
     n_points : int
         Number of control points and via points.
+    transferred : callable
+        Returns the number of courses so far that have been transferred from a coarse mesh.
     searches, parts : int
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     relaxed : list of Relaxed
@@ -92,6 +98,7 @@ class Attempts:
     surface: CurveSurface
     smoothness: float
     n_points: int
+    transferred: Callable[[], int]
     searches: int = 1
     parts: int = 0
     relaxed: list[Relaxed] = field(default_factory=list)
@@ -169,19 +176,20 @@ class Attempts:
 
     def should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
-        return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
+        return self.is_kinked and self._is_affordable(self.relaxed[self.best].work)
 
     def should_try_path(self) -> bool:
         """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
         mean = self._work_of_relaxations / len(self.relaxed)
-        return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+        return self.is_kinked and self._is_affordable(self._work_of_search + mean)
 
     def limited(self, config: RelaxationConfig) -> RelaxationConfig:
         """Settings with which another relaxation does at most the work that is left."""
         return replace(config, work=min(config.work, MOST_WORK - self._work))
 
     @property
-    def _is_kinked(self) -> bool:
+    def is_kinked(self) -> bool:
+        """Whether even the best curve has kinks."""
         return self._bending > KINKED
 
     @property
@@ -191,7 +199,8 @@ class Attempts:
     @property
     def _work(self) -> float:
         of_searches = self.searches * self._work_of_search + self.parts * WORK_OF_PART
-        return of_searches + self._work_of_relaxations
+        of_transfers = self.transferred() * WORK_OF_TRANSFER
+        return of_searches + of_transfers + self._work_of_relaxations
 
     @property
     def _work_of_relaxations(self) -> float:

@@ -95,8 +95,10 @@ def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: 
     while len(left):
         # The place of the step between two nodes that were neighbours in the given sequence; those
         # of the step from the last node to the first are not neighbours now.
-        low, high = np.sort([place[left], place[(left + 1) % n]], axis=0)
-        steps = np.sort(np.where(high - low > 1, high, low), axis=1)
+        first, second = place[left], place[(left + 1) % n]
+        low, high = np.minimum(first, second), np.maximum(first, second)
+        steps = np.where(high - low > 1, high, low)
+        steps.sort(axis=1)
         before = np.append(0, np.cumsum(control[sequence]))
         move = _exchange(steps, before) or _reversal(steps, before, closed, any_order)
         if move is None:
@@ -107,7 +109,9 @@ def reordered(crossings: IntArray, control: BoolArray, closed: bool, any_order: 
         ]
         sequence = np.concatenate(parts)
         place[sequence] = np.arange(n)
-        left = left[~np.isin(left, left[move.removed]).any(axis=1)]
+        gone = np.zeros(n, dtype=bool)
+        gone[left[move.removed]] = True
+        left = left[~gone[left].any(axis=1)]
     return sequence
 
 
@@ -140,7 +144,7 @@ def _exchange(steps: IntArray, before: IntArray) -> _Move | None:
     if not possible.any():
         return None
     size = np.where(possible, end - begin + high - low, np.iinfo(np.int64).max)
-    one, other = np.unravel_index(int(size.argmin()), size.shape)
+    one, other = divmod(int(size.argmin()), len(steps))
     start, stop = int(begin[one, 0]), int(end[other])
     least, most = int(low[one, other]), int(high[one, other])
     nearer, farther = (start + 1, stop + 1), (least + 1, most + 1)
@@ -148,7 +152,7 @@ def _exchange(steps: IntArray, before: IntArray) -> _Move | None:
         nearer, farther = nearer[::-1], farther[::-1]
     rest = (most + 1, len(before) - 1)
     parts = [(0, start + 1), farther, (stop + 1, least + 1), nearer, rest]
-    return _Move(parts, [int(one), int(other)])
+    return _Move(parts, [one, other])
 
 
 def _reversal(steps: IntArray, before: IntArray, closed: bool, any_order: bool) -> _Move | None:
@@ -162,7 +166,7 @@ def _reversal(steps: IntArray, before: IntArray, closed: bool, any_order: bool) 
         points.append(before[-1] - inside)
     changes_order = np.stack(points, axis=1) > 1
     rank = np.stack(sizes, axis=1) + n * changes_order
-    number, around = np.unravel_index(int(rank.argmin()), rank.shape)
+    number, around = divmod(int(rank.argmin()), len(sizes))
     if changes_order[number, around] and not any_order:
         return None
     begin, end = steps[number].tolist()
@@ -170,7 +174,7 @@ def _reversal(steps: IntArray, before: IntArray, closed: bool, any_order: bool) 
         parts = [(0, 1), (n, end + 1), (begin + 1, end + 1), (begin + 1, 1)]
     else:
         parts = [(0, begin + 1), (end + 1, begin + 1), (end + 1, n)]
-    return _Move(parts, [int(number)])
+    return _Move(parts, [number])
 
 
 def _in_order(surface: CurveSurface, nodes: Nodes, order: IntArray) -> Nodes:

@@ -38,6 +38,6 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
             self.discrete_curve = curve
 
     results = [Result(each.curve) for each in curves]
-    before = attempts.Attempts(surface, 1.0, 3, relaxed=results[:2]).energies
-    after = attempts.Attempts(surface, 1.0, 3, relaxed=results).energies
+    before = attempts.Attempts(surface, 1.0, 3, lambda: 0, relaxed=results[:2]).energies
+    after = attempts.Attempts(surface, 1.0, 3, lambda: 0, relaxed=results).energies
     assert after[:2] == before
