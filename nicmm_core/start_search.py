@@ -18,13 +18,13 @@ from .courses.course_surface import CourseSurface
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
 from .geometry.mesh import Mesh
-from .maps.guidance import surface_unit
+from .mapped_surface import MappedSurface
 from .path.initial_path import find_initial_path, path_curve
 from .progress import checkpoint
-from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
+from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
-from .request import Request, same_maps
+from .request import Request
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,8 @@ class StartSearch:
 
     Attributes
     ----------
+    surface : MappedSurface
+        The surface for relaxation.
     transferred : int
         Number of courses so far that have been transferred from the coarse mesh.
     """
@@ -71,7 +73,7 @@ class StartSearch:
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self.transferred = 0
-        self._mapped: tuple[Request, CurveSurface] | None = None  # of the last request with maps
+        self.surface = MappedSurface(mesh)
 
     def courses(
         self, request: Request, seed: int = 0, most_failures: int | None = None
@@ -105,7 +107,7 @@ class StartSearch:
 
     def by_path(self, request: Request) -> InitialCurve:
         """The initial path."""
-        surface = self.surface(request)
+        surface = self.surface.of(request)
         path = find_initial_path(
             self.mesh,
             request.points,
@@ -114,54 +116,34 @@ class StartSearch:
             request.closed,
             request.via_points,
         )
-        return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.unit)
-
-    def surface(self, request: Request) -> CurveSurface:
-        """The surface for relaxation, with the maps of a request."""
-        if not request.has_maps:
-            return self._surface
-        last = self._mapped
-        if last is None or not same_maps(last[0], request):
-            obstacles, alignment = request.obstacles, request.alignment
-            mapped = with_maps(self._surface, obstacles, alignment, self.unit)
-            last = self._mapped = request, mapped
-        return last[1]
-
-    @cached_property
-    def unit(self) -> float:
-        """Square root of the area of the mesh."""
-        return surface_unit(self.mesh)
+        return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.surface.unit)
 
     def _joined_courses(self, request: Request, seed: int) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
-        there, unit = self.surface(request), self.unit
+        mapped, unit = self.surface.of(request), self.surface.unit
         if self._coarse_starts.is_large:
             for found in self._coarse_starts.courses(request, seed):
                 self.transferred += 1
-                yield None if found is None else InitialCurve(*found, there, unit)
+                yield None if found is None else InitialCurve(*found, mapped, unit)
             return
         for course in self._courses.courses(request, seed):
             checkpoint()
             curve = simple_curve(
-                self._surface,
+                self.surface.without_maps,
                 course.places,
                 course.control_nodes,
                 request.points[course.visited],
                 request.closed,
             )
-            yield None if curve is None else InitialCurve(curve, course.visited, there, unit)
-
-    @cached_property
-    def _surface(self) -> CurveSurface:
-        return curve_surface(self.mesh)
+            yield None if curve is None else InitialCurve(curve, course.visited, mapped, unit)
 
     @cached_property
     def _courses(self) -> CourseSurface:
-        return CourseSurface(self.mesh)
+        return CourseSurface(self.surface)
 
     @cached_property
     def _coarse_starts(self) -> CoarseStarts:
-        return CoarseStarts(self._surface)
+        return CoarseStarts(self.surface.without_maps)
 
 
 def is_new(start: InitialCurve, curves: list[DiscreteCurve]) -> bool:

@@ -94,7 +94,7 @@ class SurfaceDesigner:
         started: float,
     ) -> Design:
         """Move a start to the control points and relax it."""
-        surface = self._search.surface(request)
+        surface = self._search.surface.of(request)
         curve, visited = moved_start(surface, start, request)
         collisions, unsettled = 0, None
         if isinstance(start, Resumable):
@@ -105,7 +105,7 @@ class SurfaceDesigner:
             curve,
             visited,
             surface,
-            self._search.unit,
+            self._search.surface.unit,
             collisions=collisions,
             unsettled=unsettled,
         )

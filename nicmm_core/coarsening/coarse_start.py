@@ -15,6 +15,7 @@ from ..geometry.array_types import IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.numbering import Renumbered, renumbered
 from ..geometry.surface_points import SurfacePoints, locate_control_points
+from ..mapped_surface import MappedSurface
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..relaxation.discrete_curve import DiscreteCurve, noded
@@ -42,7 +43,7 @@ class _CoarseSurface:
         component = int(self.coarse.mesh.face_component[points.faces[0]])
         if component not in self.copies:
             copy = renumbered(self.coarse.mesh, component)
-            self.copies[component] = copy, CourseSurface(copy.mesh)
+            self.copies[component] = copy, CourseSurface(MappedSurface(copy.mesh))
         return self.copies[component]
 
 

@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry import tolerances
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import IntArray
 from ..geometry.mesh import Mesh
 from ..geometry.normals import unsigned_normals
 from ..geometry.refinement import Refined, refined
 from ..geometry.surface_points import SurfacePoints, in_first_faces, joined
-from ..maps.guidance import surface_unit
+from ..mapped_surface import MappedSurface
 from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
-from ..relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
-from ..request import Request
+from ..relaxation.curve_nodes import CurveSurface, curve_surface
+from ..request import Request, mapped_request
 from .course_search import find_courses
 from .hop_graph import SEARCH_CELLS, HopGraph, build_hop_graph, distances_along_edges
 
@@ -75,13 +75,13 @@ class CourseSurface:
 
     Parameters
     ----------
-    mesh : Mesh
-        A connected mesh. The courses depend on its numbering and its coordinates, so pass a
-        canonical copy (`geometry.numbering`).
+    given : MappedSurface
+        A connected surface. The courses depend on the numbering and the coordinates of its mesh, so
+        pass a canonical copy (`geometry.numbering`).
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
+    def __init__(self, given: MappedSurface) -> None:
+        self._given, self._mesh = given, given.mesh
 
     @cached_property
     def _refined(self) -> Refined:
@@ -91,17 +91,18 @@ class CourseSurface:
         return refined(self._mesh, times)
 
     @cached_property
-    def _surface(self) -> CurveSurface:
+    def _surface(self) -> MappedSurface:
+        """The surface that is searched."""
         mesh = self._refined.mesh
         if len(mesh.faces) == len(self._mesh.faces):
-            return curve_surface(self._mesh)
+            return self._given
         normals = self._refined.interpolation @ unsigned_normals(self._mesh)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         own = curve_surface(mesh)
         # Vertex normals have arbitrary signs, so interpolated ones may cancel.
         sound = length > tolerances.ROUNDED
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
-        return replace(own, vertex_normals=normals)
+        return MappedSurface(mesh, replace(own, vertex_normals=normals))
 
     def courses(self, request: Request, seed: int = 0) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
@@ -122,7 +123,7 @@ class CourseSurface:
         """
         request = _with_rounded_points(self._mesh, request)
         on_refined = self._refined.in_parts(request.points)
-        along = distances_along_edges(self._surface, on_refined)
+        along = distances_along_edges(self._surface.without_maps, on_refined)
         size = len(self._refined.mesh.vertices)
         visited = np.arange(len(on_refined))
         if request.order == "shortest":
@@ -133,7 +134,7 @@ class CourseSurface:
             )
             fixed = waypoints.is_control
             on_refined = self._refined.in_parts(waypoints.points)
-            along = distances_along_edges(self._surface, on_refined)
+            along = distances_along_edges(self._surface.without_maps, on_refined)
         else:
             fixed, on_refined = np.ones(len(visited), dtype=bool), on_refined[visited]
             along = along[visited][:, np.append(np.arange(size), size + visited)]
@@ -157,16 +158,15 @@ class CourseSurface:
 
     @cached_property
     def _graph(self) -> HopGraph:
-        return build_hop_graph(self._surface)
+        return build_hop_graph(self._surface.without_maps)
 
     def _with_maps(self, request: Request) -> CurveSurface:
-        """The surface with the maps of a request."""
-
-        def at_vertices(values: FloatArray | None) -> FloatArray | None:
-            return None if values is None else self._refined.interpolation @ values
-
-        obstacles, alignment = at_vertices(request.obstacles), at_vertices(request.alignment)
-        return with_maps(self._surface, obstacles, alignment, surface_unit(self._refined.mesh))
+        """The surface that is searched, with the maps of a request."""
+        if self._surface is self._given:
+            return self._given.of(request)
+        return self._surface.of(
+            mapped_request(request, self._refined.in_parts, self._refined.interpolation.__matmul__)
+        )
 
 
 def _with_rounded_points(mesh: Mesh, request: Request) -> Request:

@@ -5,9 +5,17 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import shapes
-from nicmm_core.courses.course_surface import MOST_CROSSED, CourseSurface, edges_crossed
+from nicmm_core.courses.course_surface import (
+    FEWEST_VERTICES,
+    MOST_CROSSED,
+    CourseSurface,
+    edges_crossed,
+)
 from nicmm_core.courses.hop_graph import SEARCH_CELLS
 from nicmm_core.design import Designer
+from nicmm_core.mapped_surface import MappedSurface
+from nicmm_core.maps.guidance import feature_map
+from nicmm_core.relaxation import curve_nodes
 from tests.core.checks import assert_valid_design
 
 
@@ -48,6 +56,22 @@ def test_no_courses_are_sought_on_needles():
     designer = Designer(tube)
     points = [0, count + count // 3, 2 * count // 3]
     assert_valid_design(tube, designer.design(points, order="shortest"))
-    surface = CourseSurface(tube)
+    surface = CourseSurface(MappedSurface(tube))
     request = designer.design(points, order="shortest").resumable.request
     assert not list(surface.courses(request))
+
+
+def test_the_feature_map_is_computed_once_for_a_request(monkeypatch):
+    """All searches and relaxations of a request use the same φ_fea."""
+    body = shapes.creature(3, subdivisions=1)
+    computed = []
+
+    def counted(mesh, *arguments):
+        computed.append(mesh)
+        return feature_map(mesh, *arguments)
+
+    monkeypatch.setattr(curve_nodes, "feature_map", counted)
+    lane = (body.vertices[:, 2] > 0.0).astype(float)
+    Designer(body).design([3, 200, 650, 900], order="shortest", alignment=lane, alternatives=2)
+    refined = len(body.vertices) < FEWEST_VERTICES
+    assert len(computed) == 1 + refined

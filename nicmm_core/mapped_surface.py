@@ -1,0 +1,45 @@
+"""The surface of a mesh with the maps of requests; φ_fea is computed once for the same maps."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from .geometry.mesh import Mesh
+from .maps.guidance import surface_unit
+from .relaxation.curve_nodes import CurveSurface, curve_surface, with_maps
+from .request import Request, same_maps
+
+
+class MappedSurface:
+    """A connected surface, with or without the maps of a request.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A connected mesh.
+    surface : CurveSurface, optional
+        Its surface, by default with the vertex normals of the mesh.
+    """
+
+    def __init__(self, mesh: Mesh, surface: CurveSurface | None = None) -> None:
+        self.mesh, self._given = mesh, surface
+        self._latest: tuple[Request, CurveSurface] | None = None
+
+    @cached_property
+    def without_maps(self) -> CurveSurface:
+        """The surface alone."""
+        return curve_surface(self.mesh) if self._given is None else self._given
+
+    @cached_property
+    def unit(self) -> float:
+        """Square root of the area of the mesh."""
+        return surface_unit(self.mesh)
+
+    def of(self, request: Request) -> CurveSurface:
+        """The surface with the maps of a request, which are those of the vertices of the mesh."""
+        if not request.has_maps:
+            return self.without_maps
+        if self._latest is None or not same_maps(self._latest[0], request):
+            maps = request.obstacles, request.alignment
+            self._latest = request, with_maps(self.without_maps, *maps, self.unit)
+        return self._latest[1]
