@@ -13,6 +13,7 @@ import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -24,7 +25,7 @@ from ..geometry.surface_points import locate_control_points
 from ..repair.clean_surface import without_doubled_faces
 from ..repair.nonmanifold import manifold
 from .features import BASE_CHANNELS
-from .losses import LossWeights, balanced, loss_terms, total_loss
+from .losses import EnergySurface, LossWeights, balanced, loss_terms, total_loss
 from .network import (
     DISTANCE_CHANNEL,
     NORMAL_CHANNELS,
@@ -38,6 +39,9 @@ from .tensors import network_input, surface_tensors
 from .torch_threads import single_thread
 from .training_maps import random_maps
 from .weights_file import save_weights
+
+Report = Callable[[str, int, int, float], None]
+"""Function of the stage, the numbers of sets done and in total, and the mean loss."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ def pretrain(
     network_config: NetworkConfig | None = None,
     config: PretrainingConfig | None = None,
     weights: LossWeights | None = None,
-    progress: Callable[[str, int, int, float], None] | None = None,
+    progress: Report | None = None,
 ) -> list[float]:
     """Train on random control points of the meshes and write the weights (Eq. 9).
 
@@ -124,6 +128,45 @@ def pretrain(
     config = config or PretrainingConfig()
     weights = weights or LossWeights()
     report = progress or (lambda stage, done, total, loss: None)
+    _check(meshes, output, config)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    torch.manual_seed(config.seed)
+    channels = BASE_CHANNELS + (config.map_share > 0.0)
+    network = CurveNetwork(network_config or NetworkConfig(), channels).to(device)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+    checkpoint = Path(output).with_suffix(".checkpoint.pt")
+    configuration = repr((network.config, config, weights, _fingerprint(meshes)))
+    losses = _resume(checkpoint, configuration, network, optimiser)
+
+    # The tensors of a set on 4,000 vertices take about 2 MB, so all sets stay on the device.
+    prepared = [
+        _PreparedSet(
+            surface_tensors(problem, device),
+            network_input(problem, device),
+            balanced(weights, problem),
+        )
+        for problem in _random_problems(meshes, config, report)
+    ]
+    for epoch in range(len(losses), config.epochs):
+        for group in optimiser.param_groups:
+            group["lr"] = _learning_rate(config, epoch)
+        losses.append(_train_epoch(network, optimiser, prepared, config, epoch, report))
+        _save_checkpoint(checkpoint, configuration, network, optimiser, losses)
+    save_weights(output, network)
+    checkpoint.unlink(missing_ok=True)
+    return losses
+
+
+class _PreparedSet(NamedTuple):
+    """A set of points on its surface, as tensors."""
+
+    surface: EnergySurface
+    inputs: NetworkInput
+    weights: LossWeights
+
+
+def _check(meshes: Sequence[Mesh], output: str | Path, config: PretrainingConfig) -> None:
+    """Raise ArgumentError if training cannot begin."""
     if not meshes:
         raise ArgumentError("meshes is empty; name at least one mesh to train on")
     for name in ("sets", "batch", "epochs"):
@@ -139,60 +182,58 @@ def pretrain(
         raise ArgumentError(f"map_share is {config.map_share}; it is a share of all sets, 0 … 1")
     if not Path(output).resolve().parent.is_dir():
         raise ArgumentError(f"output is {output}, whose folder does not exist; create it first")
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    torch.manual_seed(config.seed)
-    channels = BASE_CHANNELS + (config.map_share > 0.0)
-    network = CurveNetwork(network_config or NetworkConfig(), channels).to(device)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
-    checkpoint = Path(output).with_suffix(".checkpoint.pt")
-    configuration = repr((network.config, config, weights, _fingerprint(meshes)))
-    losses = _resume(checkpoint, configuration, network, optimiser)
 
-    # The tensors of a set on 4,000 vertices take about 2 MB, so all sets stay on the device.
-    prepared = [
-        (
-            surface_tensors(problem, device),
-            network_input(problem, device),
-            balanced(weights, problem),
-        )
-        for problem in _random_problems(meshes, config, report)
-    ]
-    for epoch in range(len(losses), config.epochs):
-        generator = np.random.default_rng([config.seed, epoch])
-        order = generator.permutation(len(prepared))
-        total = 0.0
-        for group in optimiser.param_groups:
-            group["lr"] = _learning_rate(config, epoch)
-        done = 0
-        for first in range(0, len(order), config.batch):
-            chosen = order[first : first + config.batch]
-            optimiser.zero_grad()
-            for index in chosen:
-                surface, inputs, set_weights = prepared[index]
-                phi = network(randomly_reoriented(inputs, generator))
-                loss = total_loss(loss_terms(surface, phi), set_weights)
-                (loss / len(chosen)).backward()
-                total += loss.item()
-                done += 1
-                all_done = epoch * len(order) + done
-                report("training", all_done, config.epochs * len(order), total / done)
-            # Single sets with a bad loop would derail the training.
-            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-            optimiser.step()
-        losses.append(total / len(order))
-        state = {
-            "configuration": configuration,
-            "network": network.state_dict(),
-            "optimiser": optimiser.state_dict(),
-            "losses": losses,
-        }
-        # Written under another name first: an interruption must not destroy the last checkpoint.
-        partial = checkpoint.with_suffix(".partial")
-        torch.save(state, partial)
-        partial.replace(checkpoint)
-    save_weights(output, network)
-    checkpoint.unlink(missing_ok=True)
-    return losses
+
+def _train_epoch(
+    network: CurveNetwork,
+    optimiser: torch.optim.Optimizer,
+    prepared: list[_PreparedSet],
+    config: PretrainingConfig,
+    epoch: int,
+    report: Report,
+) -> float:
+    """Train on all sets once, in random order, and return their mean loss."""
+    generator = np.random.default_rng([config.seed, epoch])
+    order = generator.permutation(len(prepared))
+    total, done = 0.0, 0
+    for first in range(0, len(order), config.batch):
+        chosen = order[first : first + config.batch]
+        optimiser.zero_grad()
+        for index in chosen:
+            each = prepared[index]
+            phi = network(randomly_reoriented(each.inputs, generator))
+            loss = total_loss(loss_terms(each.surface, phi), each.weights)
+            (loss / len(chosen)).backward()
+            total += loss.item()
+            done += 1
+            all_done = epoch * len(order) + done
+            report("training", all_done, config.epochs * len(order), total / done)
+        # Single sets with a bad loop would derail the training.
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+    return total / len(order)
+
+
+def _save_checkpoint(
+    checkpoint: Path,
+    configuration: str,
+    network: CurveNetwork,
+    optimiser: torch.optim.Optimizer,
+    losses: list[float],
+) -> None:
+    """Save the state after an epoch.
+
+    It is written under another name first: an interruption must not destroy the last checkpoint.
+    """
+    state = {
+        "configuration": configuration,
+        "network": network.state_dict(),
+        "optimiser": optimiser.state_dict(),
+        "losses": losses,
+    }
+    partial = checkpoint.with_suffix(".partial")
+    torch.save(state, partial)
+    partial.replace(checkpoint)
 
 
 def randomly_reoriented(inputs: NetworkInput, generator: np.random.Generator) -> NetworkInput:
@@ -256,7 +297,7 @@ def _fingerprint(meshes: Sequence[Mesh]) -> str:
 def _random_problems(
     meshes: Sequence[Mesh],
     config: PretrainingConfig,
-    report: Callable[[str, int, int, float], None],
+    report: Report,
 ) -> Iterator[Problem]:
     """Problems of random sets of vertices, evenly distributed over the meshes.
 

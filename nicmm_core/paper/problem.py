@@ -159,13 +159,11 @@ def build_problem(
         elements = build_finite_elements(vertices, working.faces, without_laplacian, bundle)
     distance = signed_distance(plain, loop, edge_length, side)
     length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
-    smoother = build_smoother(
-        elements, loop.control_vertices, length, None if bundle is None else plain
-    )
+    base = None if bundle is None else plain
+    smoother = build_smoother(elements, loop.control_vertices, length, base)
     checkpoint(SMOOTHED_SHARE)
-    initial_distance, _ = keep_topology(
-        working, loop, distance, smoother.smoothed(distance), bundle
-    )
+    smoothed = smoother.smoothed(distance)
+    initial_distance, _ = keep_topology(working, loop, distance, smoothed, bundle)
     if phi_fea is not None:
         phi_fea = working.interpolation @ phi_fea
     features = input_features(
