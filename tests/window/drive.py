@@ -259,12 +259,17 @@ def draw(blender: Blender) -> None:
     check(blender.do("value = helper.curve().data.splines[0].use_cyclic_u"), "a closed curve")
     undo_and_redo(blender, states, "clicks")
     blender.shot("2-five-points")
+    drag_points(blender, states[-1])
+    change_points(blender)
 
+
+def drag_points(blender: Blender, drawn: str) -> None:
+    """Drag points of a curve in a given state; Esc, undo and redo."""
     step("Drag one")
     blender.do("helper.frames.clear()")
     drag(blender, pixel_of(blender, DRAGGED), 40, (0.5, -1.5))
     blender.mouse("mouseup", 1)
-    blender.wait(f"helper.state() != {states[-1]!r}", "the dragged curve")
+    blender.wait(f"helper.state() != {drawn!r}", "the dragged curve")
     report_moves(blender)
     before = state(blender)
     step("Esc and right click during a drag change nothing")
@@ -291,6 +296,9 @@ def draw(blender: Blender) -> None:
     blender.key("ctrl+shift+z")
     blender.wait(f"helper.state() == {after!r}", "redo of the drag")
 
+
+def change_points(blender: Blender) -> None:
+    """Insert a point and remove it; another course; a point that cannot be reached."""
     step("Insert on the curve, remove with Ctrl-click")
     middle = "[helper.line()[int(len(helper.line()) * 0.07)]]"
     (on_curve,) = blender.do(f"value = helper.pixels({middle})")
