@@ -1,9 +1,8 @@
 """Improves the first curve of a request by further attempts, while their gain justifies the work.
 
-In turn: other courses of the first search, the courses of a repeated search, the best curve with
-other parts, the courses of more searches, and for kinks the same start with more tension and the
-initial path. At last come courses for alternatives. `courses.attempts` decides whether each
-of them is made.
+In turn: other courses of the first search, the courses of repeated searches, the best curve with
+other parts, and for kinks the same start with more tension and the initial path. At last come
+courses for alternatives. `courses.attempts` decides whether each of them is made.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from .courses.attempts import (
     COURSES_OF_A_SEARCH,
     FURTHER_SEARCHES,
     MOST_FAILURES,
+    RELAXED_OF_A_PART,
     SEARCHES_FOR_PARTS,
     Attempts,
 )
-from .courses.bent_part import bent_part
+from .courses.bent_part import bent_parts
 from .errors import NicmmError
-from .geometry.array_types import FloatArray
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
@@ -88,8 +87,10 @@ class Improvement:
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         if by_course:
             self._try_other_courses(courses)
-            attempts.end_search()
-            self._search_again(further)
+            for repeated in further:
+                if not (attempts.should_search_again() and self._try_courses(repeated)):
+                    break
+            self._try_other_parts()
         if attempts.should_tighten():
             self.attempt(self.starts[attempts.best], attempts.limited(TIGHTENED))
         if by_course and attempts.should_try_path():
@@ -111,34 +112,19 @@ class Improvement:
         """Settings with at most the work that is left."""
         return self.attempts.limited(relaxation_config(self.request))
 
-    def _search_again(self, further: list[Iterator[InitialCurve]]) -> None:
-        """Try the courses of repeated searches, and other parts after those that help.
-
-        Other parts do not mend kinks, so further searches come first then.
-        """
-        attempts, parts_tried = self.attempts, False
-        for courses in further:
-            if not (attempts.should_search_again() and self._try_courses(courses)):
-                break
-            gained = attempts.searches_without_gain == 0
-            if not attempts.is_kinked and (gained or not parts_tried):
-                self._try_other_parts()
-                parts_tried = True
-        if not parts_tried:
-            self._try_other_parts()
-
     def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.
 
         On rough meshes hardly any course is simple, and each failure takes long.
         """
+        before = len(self.starts)
         self.attempts.searches += 1
         start = next(courses, None)
         if start is None:
             return False
         self.attempt(start, self._config)
         self._try_other_courses(courses)
-        self.attempts.end_search()
+        self.attempts.end_repeated_search(before)
         return True
 
     def _try_other_courses(self, courses: Iterator[InitialCurve]) -> None:
@@ -160,22 +146,22 @@ class Improvement:
 
     def _try_other_parts(self) -> None:
         """Try the best curve with other courses in the parts that bend most."""
-        attempts = self.attempts
-        tried: list[FloatArray] = []
-        attempts.searches_without_gain = 0  # those before say nothing about parts
+        attempts, changed = self.attempts, self.attempts.best
+        parts = bent_parts(attempts.curves[changed])
         for _ in range(SEARCHES_FOR_PARTS):
-            if not attempts.should_try_another_part():
+            part = next(parts, None)
+            if part is None or not attempts.should_try_another_part():
                 break
-            best = attempts.best
-            curve = attempts.curves[best]
-            part = bent_part(curve, tried)
-            if part is None:
-                break
-            tried.append(part.middle)
+            before, curve = len(self.starts), attempts.curves[changed]
             attempts.parts += 1
-            courses = self.search.with_other_part(self.request, self.starts[best], curve, part)
-            for start in itertools.islice(courses, COURSES_OF_A_PART):
+            courses = self.search.with_other_part(self.request, self.starts[changed], curve, part)
+            promising = (
+                start
+                for start in itertools.islice(courses, COURSES_OF_A_PART)
+                if isinstance(start.curve, DiscreteCurve) and attempts.is_promising(start.curve)
+            )
+            for start in itertools.islice(promising, RELAXED_OF_A_PART):
                 self.attempt(start, attempts.limited(WARM))
-            attempts.end_search(of_part=True)
-            if attempts.searches_without_gain == 0:
-                tried = []  # the best curve is another one now
+            if attempts.gained_since(before):
+                changed = attempts.best
+                parts = bent_parts(attempts.curves[changed])

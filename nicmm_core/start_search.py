@@ -14,6 +14,7 @@ from .coarsening.coarse_start import CoarseStarts
 from .courses.attempts import MOST_FAILURES
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import is_apart
+from .courses.course_search import PART, WHOLE, SearchSize
 from .courses.course_surface import CourseSurface
 from .geometry.array_types import IntArray
 from .geometry.curve import SurfaceCurve
@@ -76,14 +77,18 @@ class StartSearch:
         self.surface = MappedSurface(mesh)
 
     def courses(
-        self, request: Request, seed: int = 0, most_failures: int | None = None
+        self,
+        request: Request,
+        seed: int = 0,
+        most_failures: int | None = None,
+        search: SearchSize = WHOLE,
     ) -> Iterator[InitialCurve]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
 
         The search ends after `most_failures` courses in a row that are not simple.
         """
         failures = 0
-        for start in self._joined_courses(request, seed):
+        for start in self._joined_courses(request, seed, search):
             failures = failures + 1 if start is None else 0
             if start is not None:
                 yield start
@@ -93,16 +98,17 @@ class StartSearch:
     def with_other_part(
         self, request: Request, start: InitialCurve, curve: DiscreteCurve, part: BentPart
     ) -> Iterator[InitialCurve]:
-        """A curve with other courses of one part that are apart from each other, the best first."""
-        found: list[DiscreteCurve] = []
+        """A curve with other courses of one part.
+
+        They are apart from each other and from the curve; the best comes first.
+        """
+        known = [curve]
         part_request = request_for_part(request, curve, part)
-        for course in self.courses(part_request, most_failures=MOST_FAILURES):
-            if not is_new(course, found):
-                continue
+        for course in self.courses(part_request, most_failures=MOST_FAILURES, search=PART):
             assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
-            if changed is not None:
-                found.append(course.curve)
+            if changed is not None and is_apart(start.surface, changed, known):
+                known.append(changed)
                 yield replace(start, curve=changed)
 
     def by_path(self, request: Request) -> InitialCurve:
@@ -118,15 +124,17 @@ class StartSearch:
         )
         return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.surface.unit)
 
-    def _joined_courses(self, request: Request, seed: int) -> Iterator[InitialCurve | None]:
+    def _joined_courses(
+        self, request: Request, seed: int, search: SearchSize
+    ) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
         mapped, unit = self.surface.of(request), self.surface.unit
         if self._coarse_starts.is_large:
-            for found in self._coarse_starts.courses(request, seed):
+            for found in self._coarse_starts.courses(request, seed, search):
                 self.transferred += 1
                 yield None if found is None else InitialCurve(*found, mapped, unit)
             return
-        for course in self._courses.courses(request, seed):
+        for course in self._courses.courses(request, seed, search):
             checkpoint()
             curve = simple_curve(
                 self.surface.without_maps,

@@ -9,6 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from ..courses.course_search import WHOLE, SearchSize
 from ..courses.course_surface import CourseSurface, edges_crossed
 from ..errors import NicmmError
 from ..geometry.array_types import IntArray
@@ -60,7 +61,7 @@ class CoarseStarts:
         self._mesh, self._fine = surface.mesh, surface
 
     def courses(
-        self, request: Request, seed: int = 0
+        self, request: Request, seed: int = 0, search: SearchSize = WHOLE
     ) -> Iterator[tuple[DiscreteCurve, IntArray] | None]:
         """Yield the courses on the coarse mesh, the best first, as curves on the fine mesh.
 
@@ -73,7 +74,7 @@ class CoarseStarts:
             on_coarse = _on_coarse(self._mesh, here.coarse, request)
             copy, surface = here.copy_under(on_coarse.points)
             on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
-            for course in surface.courses(on_copy, seed):
+            for course in surface.courses(on_copy, seed, search):
                 checkpoint()
                 places = copy.points_back(course.places)
                 nodes = noded(here.surface, places, course.control_nodes, request.closed)

@@ -1,12 +1,13 @@
 """Decides whether to make another attempt at a curve, from the curves relaxed so far.
 
 The farther a curve winds around limbs, the more courses a search misses. A search with other
-lengths and another tension finds others, so it is made if the curve bends. If even the best curve
-then bends strongly, the parts that bend most are searched for again, and further searches follow.
+lengths and another tension finds others, so it is made if the curve bends, and more of them follow
+if even the best curve bends strongly. Then the parts that bend most are searched for again.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -22,9 +23,11 @@ SLIGHTLY_BENT = 10.0
 Curves above it may wind around limbs, where a search misses more courses.
 """
 
+BENT = 15.0
+"""L ∮ κ_g² ds above which the parts that bend most are searched for again."""
+
 STRONGLY_BENT = 30.0
-"""L ∮ κ_g² ds above which further courses and searches follow and the parts that bend most are
-searched for again; a circle has 4π², about 40."""
+"""L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
 
 KINKED = 200.0
 """L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
@@ -38,14 +41,19 @@ COURSES_OF_A_SEARCH = 3
 The order of their energies with few nodes is unreliable.
 """
 
-FRUITLESS_PARTS = 2
-"""Number of consecutive searches for parts with little gain after which no further one is made."""
+SEARCHES_FOR_PARTS = 8
+"""Greatest number of searches for parts of the best curve."""
 
-SEARCHES_FOR_PARTS, COURSES_OF_A_PART = 8, 2
-"""Greatest number of such searches, and of courses relaxed after each of them."""
+COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
+"""Greatest numbers of courses looked at after each of them, and of those relaxed."""
+
+PROMISING = 0.4
+"""Energy above that of the best curve, relative to its elastic energy, up to which a start may
+lead to a better curve."""
 
 LEAST_GAIN = 0.02
-"""Decrease of the energy, relative to the elastic energy, below which a search is fruitless."""
+"""Decrease of the energy, relative to the elastic energy, below which a search has gained nothing.
+"""
 
 MOST_FAILURES = 4
 """Number of courses in a row that are not simple on the mesh after which a repeated search ends.
@@ -88,11 +96,8 @@ class Attempts:
         Numbers of searches for courses begun so far, of the whole curve and of parts.
     relaxed : list of Relaxed
         The result of each attempt.
-    searches_without_gain : int
-        Number of consecutive searches, up to the last one completed, that have gained little.
     repeat_found_same_curve : bool
-        Whether the last search for the whole curve has found the best curve of before once more,
-        and no other search has found a better one since.
+        Whether the last repeated search has found the best curve of before once more.
     """
 
     surface: CurveSurface
@@ -102,9 +107,7 @@ class Attempts:
     searches: int = 1
     parts: int = 0
     relaxed: list[Relaxed] = field(default_factory=list)
-    searches_without_gain: int = 0
     repeat_found_same_curve: bool = False
-    _relaxed_before: int = 0  # number of results when the last search ended
 
     @property
     def curves(self) -> list[DiscreteCurve]:
@@ -130,27 +133,27 @@ class Attempts:
         """Indices of the curves by ascending energy, without repetitions of the same curve."""
         return distinct_by_energy(self.surface, self.curves, self.energies)
 
-    def end_search(self, of_part: bool = False) -> None:
-        """Record that the courses found by a search, of the whole curve or a part, are relaxed."""
-        before = self._relaxed_before
-        self._relaxed_before = len(self.relaxed)
-        if not before or before == len(self.relaxed):
-            self.searches_without_gain += bool(before)
-            return
-        energies = self.energies
-        least, found = min(energies[:before]), min(energies[before:])
-        earlier = self.curves[energies.index(least)]
-        # With lanes energies may be negative, so decreases are relative to the elastic energy.
-        unpainted = replace(self.surface, feature_map=None)
+    def is_promising(self, start: DiscreteCurve) -> bool:
+        """Whether a start, if relaxed, may become better than the best curve."""
+        best = self.curves[self.best]
         scale = self.curves[0].length
-        (elastic,) = energies_of(unpainted, [earlier], self.smoothness, scale)
-        gained = least - found > LEAST_GAIN * elastic
-        self.searches_without_gain = 0 if gained else self.searches_without_gain + 1
-        if gained or not of_part:
-            latest = self.curves[before + energies[before:].index(found)]
-            self.repeat_found_same_curve = not gained and not is_apart(
-                self.surface, latest, [earlier]
-            )
+        least, energy = energies_of(self.surface, [best, start], self.smoothness, scale)
+        return energy - least <= PROMISING * self._elastic_energy(best)
+
+    def gained_since(self, before: int) -> bool:
+        """Whether the results from an index on are clearly better than those before."""
+        energies = self.energies
+        least, found = min(energies[:before]), min(energies[before:], default=math.inf)
+        earlier = self.curves[energies.index(least)]
+        return least - found > LEAST_GAIN * self._elastic_energy(earlier)
+
+    def end_repeated_search(self, before: int) -> None:
+        """Record that the courses of a repeated search have been relaxed, from an index on."""
+        energies, curves = self.energies, self.curves
+        earlier = curves[energies.index(min(energies[:before]))]
+        latest = curves[before + energies[before:].index(min(energies[before:]))]
+        is_same = not is_apart(self.surface, latest, [earlier])
+        self.repeat_found_same_curve = is_same and not self.gained_since(before)
 
     def should_search_again(self) -> bool:
         """Whether another search is affordable and may find a far better curve.
@@ -170,26 +173,29 @@ class Attempts:
 
     def should_try_another_part(self) -> bool:
         """Whether another search for a part of the best curve is worthwhile and affordable."""
-        gaining = self.searches_without_gain < FRUITLESS_PARTS
-        promising = gaining and self._bending > STRONGLY_BENT
-        return promising and self._is_affordable(WORK_OF_PART)
+        return self._bending > BENT and self._is_affordable(WORK_OF_PART)
 
     def should_tighten(self) -> bool:
         """Whether the best curve has kinks, and relaxing its start again is affordable."""
-        return self.is_kinked and self._is_affordable(self.relaxed[self.best].work)
+        return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
 
     def should_try_path(self) -> bool:
         """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
         mean = self._work_of_relaxations / len(self.relaxed)
-        return self.is_kinked and self._is_affordable(self._work_of_search + mean)
+        return self._is_kinked and self._is_affordable(self._work_of_search + mean)
 
     def limited(self, config: RelaxationConfig) -> RelaxationConfig:
         """Settings with which another relaxation does at most the work that is left."""
         return replace(config, work=min(config.work, MOST_WORK - self._work))
 
+    def _elastic_energy(self, curve: DiscreteCurve) -> float:
+        """The energy without maps, since with lanes it may be negative."""
+        unpainted = replace(self.surface, feature_map=None)
+        scale = self.curves[0].length
+        return float(energies_of(unpainted, [curve], self.smoothness, scale)[0])
+
     @property
-    def is_kinked(self) -> bool:
-        """Whether even the best curve has kinks."""
+    def _is_kinked(self) -> bool:
         return self._bending > KINKED
 
     @property

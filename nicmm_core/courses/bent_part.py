@@ -1,18 +1,19 @@
-"""Selects the part of a relaxed curve that bends most, and replaces it by another course.
+"""Selects parts of a relaxed curve that bend most, and replaces them by other courses.
 
-On bodies with limbs, most of the bending of a poor curve is in one or two short parts. A search for
-the whole curve finds a good course for all parts at once only by chance. So the worst part is
-searched for again, between nodes that stay.
+On bodies with limbs, most of the bending of a poor curve is in one or two short parts, or the curve
+passes a control point in a poor direction. A search for the whole curve finds a good course for all
+parts at once only by chance. So single parts are searched for again, between nodes that stay.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import IntArray
 from ..geometry.surface_points import joined
 from ..relaxation.curve_nodes import CurveSurface
 from ..relaxation.discrete_curve import DiscreteCurve
@@ -21,7 +22,7 @@ from ..relaxation.simple_curve import simple_curve
 from ..request import Request
 
 HALF_LENGTH = 0.12
-"""Half the length of a part, relative to the length of the curve."""
+"""Half the length of a part around a bend, relative to the length of the curve."""
 
 DIRECTION = 0.02
 """Distance, relative to the length of the curve, from an end of a part to a further node.
@@ -30,13 +31,13 @@ The course of the part passes this node as well, which fixes its direction at th
 """
 
 HALF_WINDOW = 0.025
-"""Half the length over which bending is summed to find the middle of a part."""
+"""Half the length over which bending is summed to find a bend."""
 
 LEAST_SHARE = 0.1
-"""Share of the bending of the curve in that window below which no other part is worthwhile."""
+"""Share of the bending of the curve in that window below which there is no further bend."""
 
 APART = 0.02
-"""Least distance between the middles of two parts, relative to the length of the curve."""
+"""Least distance between two bends, relative to the length of the curve."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,6 @@ class BentPart:
 
     Attributes
     ----------
-    middle : (3,) float array
-        Position of the node in the middle.
     passed : (p,) int array
         Indices of the nodes that its course must pass: one before the part, the first node of the
         part, the control points inside, the last node, and one after it. At an end of an open curve
@@ -57,55 +56,97 @@ class BentPart:
         Length of the curve from the first node in `passed` to the last.
     """
 
-    middle: FloatArray
     passed: IntArray
     first: int
     last: int
     length: float
 
 
-def bent_part(curve: DiscreteCurve, tried: Sequence[FloatArray]) -> BentPart | None:
-    """Select the part of a curve in which it bends most.
+def bent_parts(curve: DiscreteCurve) -> Iterator[BentPart]:
+    """Yield the parts of a curve that bend most.
+
+    In turn, they are the part around a bend and the two legs at a control point.
 
     Parameters
     ----------
     curve : DiscreteCurve
-    tried : sequence of (3,) float arrays
-        Positions near which no part is selected.
-
-    Returns
-    -------
-    BentPart or None
-        None if no part bends strongly, or if it has too few nodes.
     """
-    nodes, whole = curve.nodes, curve.length
-    bending, steps = node_bending(nodes), nodes.step_lengths
-    count = len(steps)
-    untried = np.ones(count, dtype=bool)
-    for position in tried:
-        untried &= np.linalg.norm(nodes.positions - position, axis=1) >= APART * whole
-    # Three turns of a closed curve; the middle of a part lies in the second one.
-    turns = 3 if curve.closed else 1
-    arc = np.cumsum(np.tile(steps, turns)) - np.tile(steps, turns)
-    own = np.arange(count) + (count if curve.closed else 0)
-    sums = np.append(0.0, np.cumsum(np.tile(bending, turns)))
+    turned = _Turned(curve)
+    for pair in zip_longest(_around_bends(turned), _legs_at_points(turned)):
+        yield from (part for part in pair if part is not None)
+
+
+class _Turned:
+    """Three turns of a closed curve, or an open curve, with its bending along the arc length.
+
+    Attributes
+    ----------
+    curve : DiscreteCurve
+    count : int
+        Number n of nodes of the curve.
+    own : (n,) int array
+        Indices of the nodes of the middle turn.
+    arc : (m,) float array
+        Arc length of each of the m nodes of all turns.
+    bending : (m + 1,) float array
+        Bending of all nodes before each node, and of all.
+    controls : (k,) int array
+        Indices of the control points, of all turns.
+    """
+
+    def __init__(self, curve: DiscreteCurve) -> None:
+        turns = 3 if curve.closed else 1
+        self.curve, self.count = curve, len(curve.nodes.step_lengths)
+        steps = np.tile(curve.nodes.step_lengths, turns)
+        self.arc = np.cumsum(steps) - steps
+        self.bending = np.append(0.0, np.cumsum(np.tile(node_bending(curve.nodes), turns)))
+        self.own = np.arange(self.count) + (self.count if curve.closed else 0)
+        shifts = self.count * np.arange(turns)[:, None]
+        self.controls = (curve.control_nodes + shifts).ravel()
+
+    def part(self, low: int, high: int) -> BentPart | None:
+        """The part between two nodes; None if it has too few nodes, or the rest of the curve."""
+        aside = DIRECTION * self.curve.length
+        outside = np.searchsorted(self.arc, [self.arc[low] - aside, self.arc[high] + aside])
+        before, after = outside.clip(0, len(self.arc) - 1).tolist()
+        inside = self.controls[(self.controls > low) & (self.controls < high)]
+        passed = np.unique(np.concatenate([[before, low, high, after], inside]))
+        if low >= high or len(passed) > len(np.unique(passed % self.count)):
+            return None
+        first, last = np.searchsorted(passed, [low, high]).tolist()
+        length = float(self.arc[passed[-1]] - self.arc[passed[0]])
+        return BentPart(passed % self.count, first, last, length)
+
+
+def _around_bends(turned: _Turned) -> Iterator[BentPart]:
+    """The parts around the sharpest bends."""
+    curve, arc, own = turned.curve, turned.arc, turned.own
+    whole, positions = curve.length, curve.nodes.positions
     low = np.searchsorted(arc, arc[own] - HALF_WINDOW * whole)
     high = np.searchsorted(arc, arc[own] + HALF_WINDOW * whole, side="right")
-    in_window = np.where(untried, sums[high] - sums[low], 0.0)
-    middle = int(np.argmax(in_window))
-    if in_window[middle] <= LEAST_SHARE * bending.sum():
-        return None
-    outer = HALF_LENGTH + DIRECTION
-    offsets = whole * np.array([-outer, -HALF_LENGTH, HALF_LENGTH, outer])
-    ends = np.searchsorted(arc, arc[own[middle]] + offsets).clip(0, len(arc) - 1)
-    controls = (curve.control_nodes + count * np.arange(turns)[:, None]).ravel()
-    inside = controls[(controls > ends[1]) & (controls < ends[2])]
-    passed = np.unique(np.concatenate([ends, inside]))
-    if ends[1] >= ends[2] or len(passed) > len(np.unique(passed % count)):
-        return None
-    first, last = np.searchsorted(passed, ends[1:3])
-    length = float(arc[passed[-1]] - arc[passed[0]])
-    return BentPart(nodes.positions[middle], passed % count, int(first), int(last), length)
+    in_window = turned.bending[high] - turned.bending[low]
+    least = LEAST_SHARE * (turned.bending[own[-1] + 1] - turned.bending[own[0]])
+    while in_window.max() > least:
+        middle = int(np.argmax(in_window))
+        ends = arc[own[middle]] + whole * np.array([-HALF_LENGTH, HALF_LENGTH])
+        part = turned.part(*np.searchsorted(arc, ends).clip(0, len(arc) - 1).tolist())
+        if part is None:
+            return
+        yield part
+        in_window[np.linalg.norm(positions - positions[middle], axis=1) < APART * whole] = 0.0
+
+
+def _legs_at_points(turned: _Turned) -> Iterator[BentPart]:
+    """The two legs at each control point, by descending bending; not at an end of the curve."""
+    controls = turned.controls
+    at = np.flatnonzero((controls >= turned.own[0]) & (controls <= turned.own[-1]))
+    at = at[(at > 0) & (at < len(controls) - 1)]
+    low, high = controls[at - 1], controls[at + 1]
+    descending = np.argsort(turned.bending[low] - turned.bending[high], kind="stable")
+    for each in descending.tolist():
+        part = turned.part(int(low[each]), int(high[each]))
+        if part is not None:
+            yield part
 
 
 def request_for_part(request: Request, curve: DiscreteCurve, part: BentPart) -> Request:

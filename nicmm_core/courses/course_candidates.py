@@ -26,12 +26,14 @@ from .leg_combinations import (
 from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
 from .leg_routes import Routes, cells_beside, leg_choices, routes_of_legs
 
-CANDIDATES = (10, 8, 8, 8, 8, 8)
-"""Numbers of candidates by the rank of their order of the control points."""
-
 
 def candidates(
-    courses: CourseGraph, surface: CurveSurface, closed: bool, smoothness: float, any_order: bool
+    courses: CourseGraph,
+    surface: CurveSurface,
+    closed: bool,
+    smoothness: float,
+    any_order: bool,
+    numbers: tuple[int, ...],
 ) -> tuple[Nodes, IntArray] | None:
     """Find the cheapest courses in the cheapest orders of the control points.
 
@@ -46,6 +48,8 @@ def candidates(
         Divisor of the tension.
     any_order : bool
         Whether a course may visit the control points in another order because it is cheaper.
+    numbers : tuple of int
+        Numbers of candidates by the rank of their order of the control points.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def candidates(
         if of_order:
             routes.append(of_order)
             possible.append(order)
-        if len(routes) == len(CANDIDATES):
+        if len(routes) == len(numbers):
             break
     if not routes:
         return None
@@ -85,7 +89,7 @@ def candidates(
         )
     crosses = crossing_legs(curves)
     # The first order takes over the candidates of orders that there are not.
-    shares = [sum(CANDIDATES) - sum(CANDIDATES[1 : len(routes)]), *CANDIDATES[1 : len(routes)]]
+    shares = [sum(numbers) - sum(numbers[1 : len(routes)]), *numbers[1 : len(routes)]]
     choice, visit = [], []
     for number, (of_order, order, share) in enumerate(zip(routes, possible, shares, strict=True)):
         own = slice(

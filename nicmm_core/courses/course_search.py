@@ -7,7 +7,7 @@ them, the length of the shortest course (`elastic_energy.comparable_energies`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import nicmm_kernels
 import numpy as np
@@ -35,9 +35,32 @@ Searches with different seeds take them in turn, since a low tension finds long 
 little. The first one is greater than 1 because hops overestimate bending: they turn only at cells.
 """
 
-RECOMBINED, FINALISTS = 16, 10
-"""Number of courses combined from their legs, and number of the best of all courses that are
-relaxed with twice as many nodes, unless they have had enough doublings."""
+
+@dataclass(frozen=True)
+class SearchSize:
+    """Numbers of courses of a search.
+
+    Attributes
+    ----------
+    candidates : tuple of int
+        Candidates by the rank of their order of the control points.
+    recombined : int
+        Courses combined from the legs of relaxed candidates.
+    finalists : int
+        The best of all, which are relaxed with twice as many nodes, unless they have had enough
+        doublings.
+    """
+
+    candidates: tuple[int, ...]
+    recombined: int
+    finalists: int
+
+
+WHOLE = SearchSize((10, 8, 8, 8, 8, 8), 16, 10)
+"""Size of a search for a whole curve."""
+
+PART = SearchSize((16,), 6, 4)
+"""Size of a search for a part of a curve, which has few legs in a given order."""
 
 LENGTH_NOISE = 0.4
 """Standard deviation of the logarithms of the random factors of lengths."""
@@ -89,6 +112,7 @@ def find_courses(
     smoothness: float,
     any_order: bool,
     seed: int = 0,
+    search: SearchSize = WHOLE,
 ) -> Iterator[tuple[Nodes, IntArray]]:
     """Yield relaxed courses through points, by ascending energy, simple ones first.
 
@@ -118,6 +142,7 @@ def find_courses(
     seed : int
         Seed of random factors of the lengths in the graph, which give other courses; 0 for no
         factors.
+    search : SearchSize
     """
     legs = legs_of_order(np.arange(len(points)), closed)
     if len(legs) > MOST_LEGS:
@@ -129,7 +154,7 @@ def find_courses(
     tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
-    found = candidates(courses, surface, closed, smoothness, any_order)
+    found = candidates(courses, surface, closed, smoothness, any_order, search.candidates)
     if found is None:
         return
     nodes, point = found
@@ -138,9 +163,9 @@ def find_courses(
     nodes, visit, _ = remove_crossings(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
-        nodes, visit, doublings = _resolved(surface, nodes, visit, smoothness)
+        nodes, visit, doublings = _resolved(surface, nodes, visit, smoothness, search.finalists)
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    combined = recombined(surface, nodes, visit, simple, smoothness, RECOMBINED)
+    combined = recombined(surface, nodes, visit, simple, smoothness, search.recombined)
     if combined is not None:
         new, new_visit, _ = remove_crossings(surface, *combined, any_order)
         with subrange(0.6, 0.7):
@@ -149,7 +174,7 @@ def find_courses(
         places = joined([nodes.places, new.places])
         nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
-    best = np.concatenate(_best(surface, nodes, simple, smoothness))[:FINALISTS]
+    best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search.finalists]
     nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):
@@ -205,17 +230,17 @@ def _relaxed(
 
 
 def _resolved(
-    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float
+    surface: CurveSurface, nodes: Nodes, visit: IntArray, smoothness: float, n_best: int
 ) -> tuple[Nodes, IntArray, int]:
     """Relaxed courses with as many nodes as their energies need, and how often these were doubled.
 
-    The median over the best courses decides whether nodes are doubled. Then the worst courses are
-    left out.
+    The median over the `n_best` best courses decides whether nodes are doubled. Then the worst
+    courses are left out.
     """
     unpainted = replace(surface, feature_map=None)  # with lanes, energies may be negative
     for doublings in range(MOST_DOUBLINGS):
         doubled, visit_doubled = _resampled(surface, nodes, visit, 2)
-        best = np.argsort(_energies(surface, nodes, smoothness), kind="stable")[:FINALISTS]
+        best = np.argsort(_energies(surface, nodes, smoothness), kind="stable")[:n_best]
         before, after = (_energies(unpainted, each, smoothness) for each in (nodes, doubled))
         growth = after[best] / np.maximum(before[best], tolerances.TINY)
         if np.median(growth) < UNDER_RESOLVED:

@@ -19,7 +19,7 @@ from ..path.via_points import with_via_points
 from ..path.visiting_order import shortest_order
 from ..relaxation.curve_nodes import CurveSurface, curve_surface
 from ..request import Request, mapped_request
-from .course_search import find_courses
+from .course_search import WHOLE, SearchSize, find_courses
 from .hop_graph import SEARCH_CELLS, HopGraph, build_hop_graph, distances_along_edges
 
 MOST_CROSSED = 40.0
@@ -104,7 +104,9 @@ class CourseSurface:
         normals = np.where(sound, normals / np.where(sound, length, 1.0), own.vertex_normals)
         return MappedSurface(mesh, replace(own, vertex_normals=normals))
 
-    def courses(self, request: Request, seed: int = 0) -> Iterator[Course]:
+    def courses(
+        self, request: Request, seed: int = 0, search: SearchSize = WHOLE
+    ) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
 
         Where strands are close together, traces between more nodes may avoid a crossing.
@@ -115,6 +117,7 @@ class CourseSurface:
         seed : int
             Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
             no factors.
+        search : SearchSize
 
         Raises
         ------
@@ -150,6 +153,7 @@ class CourseSurface:
             request.smoothness,
             any_order=request.order == "shortest" and not request.via_points,
             seed=seed,
+            search=search,
         )
         for nodes, visit in found:
             places = self._refined.in_parents(nodes.places)

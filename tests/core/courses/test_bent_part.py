@@ -10,7 +10,7 @@ from nicmm_core.courses.bent_part import (
     APART,
     DIRECTION,
     HALF_LENGTH,
-    bent_part,
+    bent_parts,
     request_for_part,
     with_part,
 )
@@ -61,46 +61,85 @@ def unwrapped(passed):
     return passed + COUNT * np.append(0, np.cumsum(np.diff(passed) < 0))
 
 
+def first_part(curve):
+    """The part around the sharpest bend."""
+    return next(bent_parts(curve))
+
+
+def middle(curve, part):
+    """The node half the length of a part from both of its ends."""
+    arc = np.append(0.0, np.cumsum(np.tile(curve.nodes.step_lengths, 2)))
+    first, last = arc[unwrapped(part.passed)[[part.first, part.last]]]
+    return int(np.abs(arc - 0.5 * (first + last)).argmin()) % COUNT
+
+
+def two_legs(curve):
+    """The parts that are the two legs at a control point."""
+    controls = curve.control_nodes
+    ends = {
+        (int(before), int(after))
+        for before, after in zip(np.roll(controls, 1), np.roll(controls, -1), strict=True)
+    }
+    return [
+        part
+        for part in bent_parts(curve)
+        if (int(part.passed[part.first]), int(part.passed[part.last])) in ends
+    ]
+
+
 @pytest.mark.parametrize("shift", [0, 30, 55])
 def test_the_part_around_the_sharpest_bend(surface, shift):
     curve = wavy_curve(surface, True, shift)
-    part = bent_part(curve, [])
-    bend = (60 - shift) % COUNT
-    assert np.linalg.norm(part.middle - curve.nodes.positions[bend]) < 0.05 * curve.length
+    part = first_part(curve)
+    assert abs(middle(curve, part) - (60 - shift) % COUNT) <= 2
     assert part.length == pytest.approx(2.0 * (HALF_LENGTH + DIRECTION) * curve.length, rel=0.2)
     inside = part.passed[part.first + 1 : part.last]
     assert (55 - shift) % COUNT in inside and (30 - shift) % COUNT not in inside
 
 
-def test_another_part_is_apart_from_those_tried(surface):
+def test_bends_are_apart(surface):
     curve = wavy_curve(surface, True)
-    first = bent_part(curve, [])
-    second = bent_part(curve, [first.middle])
-    away = np.linalg.norm(first.middle - second.middle)
-    assert away >= APART * curve.length
-    everywhere = list(curve.nodes.positions)
-    assert bent_part(curve, everywhere) is None
+    legs = [part.passed.tolist() for part in two_legs(curve)]
+    bends = [part for part in bent_parts(curve) if part.passed.tolist() not in legs]
+    middles = curve.nodes.positions[[middle(curve, part) for part in bends]]
+    assert len(bends) > 1
+    for one, other in itertools.combinations(middles, 2):
+        assert np.linalg.norm(one - other) >= 0.95 * APART * curve.length  # a node nearby
+
+
+def test_the_legs_at_the_most_bent_control_point_come_first(surface):
+    """The bend is at node 60, between the control points 55 and 80."""
+    curve = wavy_curve(surface, True)
+    parts = two_legs(curve)
+    assert len(parts) == len(curve.control_nodes)
+    inside = [part.passed[part.first + 1 : part.last].tolist() for part in parts]
+    assert sorted(inside[:2]) == [[55], [80]]
+    assert list(bent_parts(curve))[1].passed.tolist() == parts[0].passed.tolist()
+
+
+def test_an_end_of_an_open_curve_has_one_leg(surface):
+    curve = wavy_curve(surface, False)
+    assert len(two_legs(curve)) == len(curve.control_nodes) - 2
 
 
 @pytest.mark.parametrize(("closed", "shift"), [(True, 0), (True, 55), (False, 0)])
 def test_a_part_replaced_by_itself_changes_nothing(surface, closed, shift):
     """Also where it contains the first node of the curve, or an end of an open curve."""
-    curve, tried = wavy_curve(surface, closed, shift), []
+    curve, parts = wavy_curve(surface, closed, shift), []
     wrapped = clipped = False
-    while (part := bent_part(curve, tried)) is not None:
-        tried.append(part.middle)
+    for part in bent_parts(curve):
+        parts.append(part)
         wrapped |= bool((np.diff(part.passed) < 0).any())
         clipped |= part.first == 0 or part.last == len(part.passed) - 1
         same = with_part(surface, curve, part, own_course(surface, curve, part))
         np.testing.assert_array_equal(same.control_nodes, curve.control_nodes)
         np.testing.assert_allclose(same.nodes.positions, curve.nodes.positions, atol=1e-6)
-    assert tried and clipped == (not closed)
-    assert wrapped == (shift == 55)
+    assert len(parts) > 3 and clipped == (not closed) and wrapped == closed
 
 
 def test_the_tension_is_that_of_the_whole_curve(surface):
     curve = wavy_curve(surface, True)
-    part = bent_part(curve, [])
+    part = first_part(curve)
     design = nicmm.design_curve(surface.mesh, [12, 80, 41], smoothness=2.0)
     request = request_for_part(design.resumable.request, curve, part)
     whole = 4.0 * np.pi**2 / (2.0 * curve.length**2)
@@ -111,7 +150,7 @@ def test_the_tension_is_that_of_the_whole_curve(surface):
 def test_the_result_never_crosses_itself(surface):
     """A course once round the pole meets the rest of the curve."""
     curve = wavy_curve(surface, True)
-    part = bent_part(curve, [])
+    part = first_part(curve)
     passed = unwrapped(part.passed)
     there = curve.nodes.positions[part.passed]
     turned = np.linspace(0.0, 2.0 * np.pi, COUNT)[1:-1, None]
@@ -133,7 +172,7 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
     design = nicmm.design_curve(surface.mesh, controls, closed=closed)
     request = design.resumable.request
     start = start_search.InitialCurve(curve, np.arange(4), surface, 1.0)
-    part = bent_part(curve, [])
+    part = first_part(curve)
     changed = next(search.with_other_part(request, start, curve, part))
     assert scaled_bending(changed.curve) < 0.5 * scaled_bending(curve)
     np.testing.assert_array_equal(changed.visited, np.arange(4))
@@ -142,27 +181,28 @@ def test_another_course_of_the_sharpest_bend_bends_less(surface, closed):
 
 
 def test_searches_for_parts_are_bounded(monkeypatch):
-    parts = []
-    select = improvement.bent_part
+    """As many as are allowed, whether they gain or not, and none without work left."""
+    tried = []
+    seek = start_search.StartSearch.with_other_part
 
-    def counted(curve, tried):
-        parts.append(len(tried))
-        return select(curve, tried)
+    def counted(self, request, start, curve, part):
+        tried.append(part.passed.tolist())
+        return seek(self, request, start, curve, part)
 
-    monkeypatch.setattr(improvement, "bent_part", counted)
+    monkeypatch.setattr(start_search.StartSearch, "with_other_part", counted)
     monkeypatch.setattr(improvement, "FURTHER_SEEDS", ())
-    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(attempts, "BENT", 0.0)
     monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
     monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert parts == list(range(attempts.FRUITLESS_PARTS))
-    parts.clear()
-    monkeypatch.setattr(attempts, "FRUITLESS_PARTS", 100)
+    assert 3 <= len(tried) <= attempts.SEARCHES_FOR_PARTS
+    assert len(set(map(tuple, tried))) == len(tried)  # without a gain, each part is tried once
+    tried.clear()
+    monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 2)
     nicmm.design_curve(body, chosen)
-    assert len(parts) <= attempts.SEARCHES_FOR_PARTS
-    assert all(b == a + 1 for a, b in itertools.pairwise(parts))
-    parts.clear()
+    assert len(tried) == 2
+    tried.clear()
     monkeypatch.setattr(attempts, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
-    assert not parts
+    assert not tried

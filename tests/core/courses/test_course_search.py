@@ -124,7 +124,7 @@ def test_nodes_are_doubled_until_energies_are_true(windings, doubled):
         return after[0] / before[0]
 
     assert (growth(nodes, visit) > course_search.UNDER_RESOLVED) == doubled
-    found, visit, doublings = course_search._resolved(surface, nodes, visit, 1.0)
+    found, visit, doublings = course_search._resolved(surface, nodes, visit, 1.0, 1)
     assert (doublings > 0) == doubled
     assert found.per_curve == count * 2**doublings
     assert growth(found, visit) < course_search.UNDER_RESOLVED
