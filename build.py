@@ -43,7 +43,10 @@ PLATFORMS = {
 LARGEST_ZIP = 120e6
 """Largest size of a zip without PyTorch, in bytes."""
 
-ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
+ONE_THREAD = {
+    **{f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")},
+    "NICMM_THREADS": "1",
+}
 """Environment of the tests: there is a process per core, and more threads only slow them down."""
 
 KERNEL_PLATFORMS = ("linux-x64", "linux-arm64", "windows-x64", "macos-arm64", "macos-x64")
