@@ -13,7 +13,6 @@ import numpy as np
 
 import nicmm_core as nicmm
 from nicmm_core import improvement
-from nicmm_core.courses import attempts
 from nicmm_core.geometry.array_types import IntArray
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.relaxation.curve_energies import energies_of
@@ -37,11 +36,11 @@ MOST = 4
 
 EFFORTS: Mapping[str, tuple[int, int, int]] = {
     "one search": (0, 0, 1),
-    "repeated searches": (attempts.FURTHER_SEARCHES, 0, 1),
-    "default": (attempts.FURTHER_SEARCHES, attempts.SEARCHES_FOR_PARTS, 1),
+    "repeated searches": (improvement.FURTHER_SEARCHES, 0, 1),
+    "default": (improvement.FURTHER_SEARCHES, improvement.SEARCHES_FOR_PARTS, 1),
     f"{MOST} times the default": (
-        MOST * attempts.FURTHER_SEARCHES,
-        MOST * attempts.SEARCHES_FOR_PARTS,
+        MOST * improvement.FURTHER_SEARCHES,
+        MOST * improvement.SEARCHES_FOR_PARTS,
         MOST,
     ),
 }
@@ -94,7 +93,7 @@ def section(results: Results) -> str:
     return (
         "The table shows how the energy of a curve and the time of its design depend on how long "
         "courses are searched for. Each row is an effort: a single search, repeated searches (up "
-        f"to {attempts.FURTHER_SEARCHES}), these and searches for parts (the default), and "
+        f"to {improvement.FURTHER_SEARCHES}), these and searches for parts (the default), and "
         f"{MOST} times as many searches with {MOST} times the bound on work. The "
         f"statistics are over closed curves on {len(requests)} meshes ({results['meshes']}, and "
         "closed manifold meshes, people and animals as they are; one set of 3–5 random vertices "
@@ -138,6 +137,6 @@ def _effort(repeated: int, parts: int, work: int) -> Iterator[None]:
     with (
         mock.patch.object(improvement, "FURTHER_SEEDS", range(1, 1 + repeated)),
         mock.patch.object(improvement, "SEARCHES_FOR_PARTS", parts),
-        mock.patch.object(attempts, "MOST_WORK", work * attempts.MOST_WORK),
+        mock.patch.object(improvement, "MOST_WORK", work * improvement.MOST_WORK),
     ):
         yield

@@ -1,33 +1,85 @@
 """Improves the first curve of a request by further attempts, while their gain justifies the work.
 
-In turn: other courses of the first search, the courses of repeated searches, the best curve with
-other parts, and for kinks the same start with more tension and the initial path. At last come
-courses for alternatives. `courses.attempts` decides whether each of them is made.
+The farther a curve winds around limbs, the more courses a search misses. So the search is repeated,
+with other lengths and another tension, if the curve bends, and more often if even the best curve
+bends strongly. Then the parts that bend most are searched for again, and kinks are relaxed again
+with more tension and from the initial path. At last come courses for alternatives.
 """
 
 from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from .courses.attempts import (
-    COURSES_OF_A_PART,
-    COURSES_OF_A_SEARCH,
-    FURTHER_SEARCHES,
-    MOST_FAILURES,
-    RELAXED_OF_A_PART,
-    SEARCHES_FOR_PARTS,
-    Attempts,
-)
 from .courses.bent_part import bent_parts
+from .courses.comparison import distinct_by_energy, is_apart
 from .errors import NicmmError
+from .relaxation.curve_energies import energies_of, scaled_bending
+from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.relaxing import GUIDED, TIGHTENED, RelaxationConfig, Relaxed
 from .relaxation.warm_start import WARM
 from .request import Request
-from .start_search import InitialCurve, StartSearch, is_new
+from .start_search import MOST_FAILURES, InitialCurve, StartSearch, is_new
+
+SLIGHTLY_BENT = 10.0
+"""L ∮ κ_g² ds above which the search is repeated, a quarter of the value of a circle.
+
+Curves above it may wind around limbs, where a search misses more courses.
+"""
+
+BENT = 15.0
+"""L ∮ κ_g² ds above which the parts that bend most are searched for again."""
+
+STRONGLY_BENT = 30.0
+"""L ∮ κ_g² ds above which further courses and searches follow; a circle has 4π², about 40."""
+
+KINKED = 200.0
+"""L ∮ κ_g² ds above which a curve usually has kinks, so its start is relaxed in another way too."""
+
+FURTHER_SEARCHES = 3
+"""Greatest number of repeated searches for the whole curve; strongly bent curves get all."""
+
+COURSES_OF_A_SEARCH = 3
+"""Greatest number of courses relaxed after a search whose curves are strongly bent.
+
+The order of their energies with few nodes is unreliable.
+"""
+
+SEARCHES_FOR_PARTS = 8
+"""Greatest number of searches for parts of the best curve."""
+
+COURSES_OF_A_PART, RELAXED_OF_A_PART = 4, 2
+"""Greatest numbers of courses looked at after each of them, and of those relaxed."""
+
+PROMISING = 0.4
+"""Energy above that of the best curve, relative to its elastic energy, up to which a start may
+lead to a better curve."""
+
+LEAST_GAIN = 0.02
+"""Decrease of the energy, relative to the elastic energy, below which a search has gained nothing.
+"""
+
+MOST_WORK = 2_200
+"""Work of all attempts together above which no further one is begun.
+
+In moves of all nodes. It takes about one second, and two to three on rough meshes.
+"""
+
+RESERVED = 600
+"""Part of that work that must be left after a further search, for other attempts at kinks."""
+
+WORK_OF_SEARCH = 40
+"""Approximate work of a search, in the same unit; as much again for each control or via point."""
+
+WORK_OF_PART = 100
+"""Approximate work of a search for a part, in the same unit."""
+
+WORK_OF_TRANSFER = 40
+"""Approximate work of transferring a course from the coarse mesh, in the same unit."""
 
 MAX_COURSES_RELAXED = 10
 """Courses relaxed for alternatives, in addition to two for each alternative.
@@ -54,23 +106,31 @@ class Improvement:
     request : Request
     relax : callable
         Relaxes a start with some settings; raises `CancelledError` if the caller stops it.
-    attempts : Attempts
-        The results, and whether another attempt is worth its work.
-    starts : list of InitialCurve
-        The start of each attempt.
+    transferred_before : int
+        Number of courses transferred from the coarse mesh for earlier requests.
+    starts, relaxed : lists of InitialCurve and of Relaxed
+        The start and the result of each attempt.
+    searches, parts : int
+        Numbers of searches for courses begun so far, of the whole curve and of parts.
+    repeat_found_same_curve : bool
+        Whether the last repeated search has found the best curve of before once more.
     """
 
     search: StartSearch
     request: Request
     relax: Callable[[InitialCurve, RelaxationConfig], Relaxed]
-    attempts: Attempts
+    transferred_before: int
     starts: list[InitialCurve] = field(default_factory=list)
+    relaxed: list[Relaxed] = field(default_factory=list)
+    searches: int = 1
+    parts: int = 0
+    repeat_found_same_curve: bool = False
 
     def attempt(self, start: InitialCurve, config: RelaxationConfig) -> None:
         """Relax a start."""
         relaxed = self.relax(start, config)
         self.starts.append(start)
-        self.attempts.relaxed.append(relaxed)
+        self.relaxed.append(relaxed)
 
     def improve(self, courses: Iterator[InitialCurve], by_course: bool) -> None:
         """Make all attempts that follow the first one.
@@ -83,17 +143,17 @@ class Improvement:
             Whether the first start is a course. If no course was simple, further searches would
             hardly find one and take long, so they are made only for alternatives.
         """
-        request, attempts = self.request, self.attempts
+        request = self.request
         further = [self.search.courses(request, seed, MOST_FAILURES) for seed in FURTHER_SEEDS]
         if by_course:
             self._try_other_courses(courses)
             for repeated in further:
-                if not (attempts.should_search_again() and self._try_courses(repeated)):
+                if not (self._should_search_again() and self._try_courses(repeated)):
                     break
             self._try_other_parts()
-        if attempts.should_tighten():
-            self.attempt(self.starts[attempts.best], attempts.limited(TIGHTENED))
-        if by_course and attempts.should_try_path():
+        if self._should_tighten():
+            self.attempt(self.starts[self.best], self._limited(TIGHTENED))
+        if by_course and self._should_try_path():
             # On steps and creases, the initial path may be better than any course. It is only
             # another candidate, so its errors do not matter.
             start = None
@@ -102,15 +162,15 @@ class Improvement:
             if start is not None:
                 self.attempt(start, self._config)
         if request.alternatives:
-            others = itertools.chain(courses, *further[: max(attempts.searches - 1, 1)])
-            new = (start for start in others if is_new(start, attempts.curves))
+            others = itertools.chain(courses, *further[: max(self.searches - 1, 1)])
+            new = (start for start in others if is_new(start, self.curves))
             for start in itertools.islice(new, MAX_COURSES_RELAXED + 2 * request.alternatives):
                 self.attempt(start, relaxation_config(request))
 
     @property
     def _config(self) -> RelaxationConfig:
         """Settings with at most the work that is left."""
-        return self.attempts.limited(relaxation_config(self.request))
+        return self._limited(relaxation_config(self.request))
 
     def _try_courses(self, courses: Iterator[InitialCurve]) -> bool:
         """Try the best courses of a repeated search; returns whether there were any.
@@ -118,13 +178,13 @@ class Improvement:
         On rough meshes hardly any course is simple, and each failure takes long.
         """
         before = len(self.starts)
-        self.attempts.searches += 1
+        self.searches += 1
         start = next(courses, None)
         if start is None:
             return False
         self.attempt(start, self._config)
         self._try_other_courses(courses)
-        self.attempts.end_repeated_search(before)
+        self._end_repeated_search(before)
         return True
 
     def _try_other_courses(self, courses: Iterator[InitialCurve]) -> None:
@@ -132,7 +192,7 @@ class Improvement:
         first = len(self.starts) - 1
         while (
             len(self.starts) - first < COURSES_OF_A_SEARCH
-            and self.attempts.should_try_another_course(first)
+            and self._should_try_another_course(first)
         ):  # fmt: skip
             known = [
                 start.curve
@@ -146,22 +206,137 @@ class Improvement:
 
     def _try_other_parts(self) -> None:
         """Try the best curve with other courses in the parts that bend most."""
-        attempts, changed = self.attempts, self.attempts.best
-        parts = bent_parts(attempts.curves[changed])
+        changed = self.best
+        parts = bent_parts(self.curves[changed])
         for _ in range(SEARCHES_FOR_PARTS):
             part = next(parts, None)
-            if part is None or not attempts.should_try_another_part():
+            if part is None or not self._should_try_another_part():
                 break
-            before, curve = len(self.starts), attempts.curves[changed]
-            attempts.parts += 1
+            before, curve = len(self.starts), self.curves[changed]
+            self.parts += 1
             courses = self.search.with_other_part(self.request, self.starts[changed], curve, part)
             promising = (
                 start
                 for start in itertools.islice(courses, COURSES_OF_A_PART)
-                if isinstance(start.curve, DiscreteCurve) and attempts.is_promising(start.curve)
+                if isinstance(start.curve, DiscreteCurve) and self._is_promising(start.curve)
             )
             for start in itertools.islice(promising, RELAXED_OF_A_PART):
-                self.attempt(start, attempts.limited(WARM))
-            if attempts.gained_since(before):
-                changed = attempts.best
-                parts = bent_parts(attempts.curves[changed])
+                self.attempt(start, self._limited(WARM))
+            if self._gained_since(before):
+                changed = self.best
+                parts = bent_parts(self.curves[changed])
+
+    @property
+    def curves(self) -> list[DiscreteCurve]:
+        """The relaxed curves."""
+        return [each.discrete_curve for each in self.relaxed]
+
+    @property
+    def energies(self) -> list[float]:
+        """Energies of the curves.
+
+        The length of the first curve is the scale of all of them. So the order of two curves does
+        not depend on later ones, and a further attempt never leads to a worse result.
+        """
+        scale = self.curves[0].length
+        return energies_of(self._surface, self.curves, self.request.smoothness, scale)
+
+    @property
+    def best(self) -> int:
+        """Index of the curve of least energy."""
+        return self.energies.index(min(self.energies))
+
+    def by_energy(self) -> list[int]:
+        """Indices of the curves by ascending energy, without repetitions of the same curve."""
+        return distinct_by_energy(self._surface, self.curves, self.energies)
+
+    @property
+    def _surface(self) -> CurveSurface:
+        return self.starts[0].surface
+
+    def _is_promising(self, start: DiscreteCurve) -> bool:
+        """Whether a start, if relaxed, may become better than the best curve."""
+        best = self.curves[self.best]
+        scale = self.curves[0].length
+        least, energy = energies_of(self._surface, [best, start], self.request.smoothness, scale)
+        return energy - least <= PROMISING * self._elastic_energy(best)
+
+    def _gained_since(self, before: int) -> bool:
+        """Whether the results from an index on are clearly better than those before."""
+        energies = self.energies
+        least, found = min(energies[:before]), min(energies[before:], default=math.inf)
+        earlier = self.curves[energies.index(least)]
+        return least - found > LEAST_GAIN * self._elastic_energy(earlier)
+
+    def _end_repeated_search(self, before: int) -> None:
+        """Record that the courses of a repeated search have been relaxed, from an index on."""
+        energies, curves = self.energies, self.curves
+        earlier = curves[energies.index(min(energies[:before]))]
+        latest = curves[before + energies[before:].index(min(energies[before:]))]
+        is_same = not is_apart(self._surface, latest, [earlier])
+        self.repeat_found_same_curve = is_same and not self._gained_since(before)
+
+    def _should_search_again(self) -> bool:
+        """Whether another search is affordable and may find a far better curve.
+
+        The first repeated search is worthwhile if the best curve bends; those after it, only if it
+        is still strongly bent and two searches have not found the same curve.
+        """
+        least = SLIGHTLY_BENT if self.searches == 1 else STRONGLY_BENT
+        promising = self._bending > least and not self.repeat_found_same_curve
+        return promising and self._is_affordable(self._work / self.searches + RESERVED)
+
+    def _should_try_another_course(self, first: int) -> bool:
+        """Whether the next course of a search is worthwhile, whose results begin at an index."""
+        least = min(scaled_bending(each.discrete_curve) for each in self.relaxed[first:])
+        mean = self._work_of_relaxations / len(self.relaxed)
+        return least > STRONGLY_BENT and self._is_affordable(mean + RESERVED)
+
+    def _should_try_another_part(self) -> bool:
+        """Whether another search for a part of the best curve is worthwhile and affordable."""
+        return self._bending > BENT and self._is_affordable(WORK_OF_PART)
+
+    def _should_tighten(self) -> bool:
+        """Whether the best curve has kinks, and relaxing its start again is affordable."""
+        return self._is_kinked and self._is_affordable(self.relaxed[self.best].work)
+
+    def _should_try_path(self) -> bool:
+        """Whether the best curve has kinks, and an attempt by the initial path is affordable."""
+        mean = self._work_of_relaxations / len(self.relaxed)
+        return self._is_kinked and self._is_affordable(self._work_of_search + mean)
+
+    def _limited(self, config: RelaxationConfig) -> RelaxationConfig:
+        """Settings with which another relaxation does at most the work that is left."""
+        return replace(config, work=min(config.work, MOST_WORK - self._work))
+
+    def _elastic_energy(self, curve: DiscreteCurve) -> float:
+        """The energy without maps, since with lanes it may be negative."""
+        unpainted = replace(self._surface, feature_map=None)
+        scale = self.curves[0].length
+        return float(energies_of(unpainted, [curve], self.request.smoothness, scale)[0])
+
+    @property
+    def _is_kinked(self) -> bool:
+        return self._bending > KINKED
+
+    @property
+    def _bending(self) -> float:
+        return scaled_bending(self.curves[self.best])
+
+    @property
+    def _work(self) -> float:
+        of_searches = self.searches * self._work_of_search + self.parts * WORK_OF_PART
+        transferred = self.search.transferred - self.transferred_before
+        return of_searches + transferred * WORK_OF_TRANSFER + self._work_of_relaxations
+
+    @property
+    def _work_of_relaxations(self) -> float:
+        return sum(each.work for each in self.relaxed)
+
+    @property
+    def _work_of_search(self) -> int:
+        via_points = sum(map(len, self.request.via_points.values()))
+        return WORK_OF_SEARCH * (1 + len(self.request.points) + via_points)
+
+    def _is_affordable(self, further: float) -> bool:
+        return self._work + further <= MOST_WORK

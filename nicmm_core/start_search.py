@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from .coarsening.coarse_start import CoarseStarts
-from .courses.attempts import MOST_FAILURES
 from .courses.bent_part import BentPart, request_for_part, with_part
 from .courses.comparison import is_apart
 from .courses.course_search import PART, WHOLE, SearchSize
@@ -26,6 +25,12 @@ from .relaxation.curve_nodes import CurveSurface
 from .relaxation.discrete_curve import DiscreteCurve
 from .relaxation.simple_curve import simple_curve
 from .request import Request
+
+MOST_FAILURES = 4
+"""Number of courses in a row that are not simple on the mesh after which a repeated search ends.
+
+On rough meshes each of them takes long.
+"""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from functools import partial
 
 import numpy as np
 
-from .courses.attempts import Attempts
 from .design_result import Design
 from .geometry.array_types import FloatArray
 from .geometry.curve import SurfaceCurve
@@ -125,20 +124,13 @@ class SurfaceDesigner:
             first = _relaxed(request, start, relaxation_config(request), max_iterations)
             if max_iterations is not None or first.status is Status.CANCELLED:
                 return self._relaxed_design(request, start, first, started)
-            n_points = len(request.points) + sum(map(len, request.via_points.values()))
-            attempts = Attempts(
-                start.surface,
-                request.smoothness,
-                n_points,
-                lambda: search.transferred - before,
-                relaxed=[first],
-            )
             improvement = Improvement(
                 search,
                 request,
                 partial(_relaxed_unless_cancelled, request),
-                attempts,
+                before,
                 [start],
+                [first],
             )
             cancelled = False
             try:
@@ -146,8 +138,8 @@ class SurfaceDesigner:
             except CancelledError:
                 cancelled = True
         best, *others = [
-            self._relaxed_design(request, improvement.starts[i], attempts.relaxed[i], started)
-            for i in attempts.by_energy()[: 1 + request.alternatives]
+            self._relaxed_design(request, improvement.starts[i], improvement.relaxed[i], started)
+            for i in improvement.by_energy()[: 1 + request.alternatives]
         ]
         status = Status.CANCELLED if cancelled else best.status
         return replace(best, status=status, alternatives=others)

@@ -13,7 +13,7 @@ import pytest
 from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
-from nicmm_core.courses import attempts
+from nicmm_core import improvement
 from nicmm_core.paper.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ FEW_MESHES = 6
 @pytest.fixture(autouse=True)
 def short_computations(monkeypatch):
     """Few attempts, meshes, and steps of fine-tuning and of reference curves; they take longest."""
-    monkeypatch.setattr(attempts, "MOST_WORK", 0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 0)
     monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
     few = list(islice(corpus.defective_meshes(), FEW_MESHES))
     monkeypatch.setattr(corpus, "defective_meshes", lambda: iter(few))

@@ -61,14 +61,14 @@ def extension(archive):
     addon_utils.extensions_refresh()
     module = addon_utils.enable(MODULE, default_set=True)
     assert module is not None, "the extension was not installed or did not register"
-    attempts = import_module(f"{MODULE}.nicmm_core.courses.attempts")
-    most_work, attempts.MOST_WORK = attempts.MOST_WORK, 0  # `all_attempts` undoes this
+    improvement = import_module(f"{MODULE}.nicmm_core.improvement")
+    most_work, improvement.MOST_WORK = improvement.MOST_WORK, 0  # `all_attempts` undoes this
     yield SimpleNamespace(
         name=MODULE,
         module=module,
         core=import_module(f"{MODULE}.nicmm_core"),
         folder=os.path.dirname(module.__file__),
-        attempts=attempts,
+        improvement=improvement,
         most_work=most_work,
     )
     # Blender hangs at exit if classes of a script are still registered.
@@ -86,7 +86,7 @@ def empty_scene(extension):
 @pytest.fixture
 def all_attempts(extension, monkeypatch):
     """Make all attempts at a curve, as for users."""
-    monkeypatch.setattr(extension.attempts, "MOST_WORK", extension.most_work)
+    monkeypatch.setattr(extension.improvement, "MOST_WORK", extension.most_work)
 
 
 _designs: dict = {}

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import nicmm_core as nicmm
-from nicmm_core import shapes
-from nicmm_core.courses import attempts, course_surface
+from nicmm_core import improvement, shapes
+from nicmm_core.courses import course_surface
 
 pytest.register_assert_rewrite("tests.core.checks")
 
@@ -65,12 +65,12 @@ def without_courses(monkeypatch):
 @pytest.fixture
 def one_attempt(monkeypatch):
     """Make only the first attempt at each curve, which must be valid too but may bend more."""
-    monkeypatch.setattr(attempts, "MOST_WORK", 0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 0)
 
 
 @pytest.fixture(scope="module")
 def one_attempt_each():
     """`one_attempt` for all tests of a module, which test anything but the course of a curve."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(attempts, "MOST_WORK", 0)
+        patch.setattr(improvement, "MOST_WORK", 0)
         yield

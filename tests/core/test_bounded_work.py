@@ -8,7 +8,6 @@ from nicmm_kernels import threads
 
 import nicmm_core as nicmm
 from nicmm_core import improvement, shapes, start_search, surface_designer
-from nicmm_core.courses import attempts
 from nicmm_core.path import legs, simple_path, virtual_splits
 from nicmm_core.relaxation import relaxing
 from tests.oracles.checker import judge
@@ -125,23 +124,23 @@ def test_repeated_searches_are_bounded(monkeypatch):
     monkeypatch.setattr(start_search.StartSearch, "courses", counted)
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 0)
     monkeypatch.setattr(improvement, "FURTHER_SEEDS", range(1, 6))
-    monkeypatch.setattr(attempts, "SLIGHTLY_BENT", 0.0)
-    monkeypatch.setattr(attempts, "STRONGLY_BENT", 1e9)
-    monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
+    monkeypatch.setattr(improvement, "SLIGHTLY_BENT", 0.0)
+    monkeypatch.setattr(improvement, "STRONGLY_BENT", 1e9)
+    monkeypatch.setattr(improvement, "MOST_WORK", 1e9)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
     assert searched == [0, 1]
     searched.clear()
-    monkeypatch.setattr(attempts, "STRONGLY_BENT", 0.0)
-    monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
-    monkeypatch.setattr(attempts, "is_apart", lambda *curves: True)
+    monkeypatch.setattr(improvement, "STRONGLY_BENT", 0.0)
+    monkeypatch.setattr(improvement, "LEAST_GAIN", 1.0)
+    monkeypatch.setattr(improvement, "is_apart", lambda *curves: True)
     nicmm.design_curve(body, chosen)
     assert searched == list(range(6))
     searched.clear()
-    monkeypatch.setattr(attempts, "is_apart", lambda *curves: False)  # searches agree
+    monkeypatch.setattr(improvement, "is_apart", lambda *curves: False)  # searches agree
     nicmm.design_curve(body, chosen)
     assert searched == [0, 1]
     searched.clear()
-    monkeypatch.setattr(attempts, "MOST_WORK", 0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
     assert searched == [0]

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core import progress, shapes
-from nicmm_core.courses import attempts
+from nicmm_core import improvement, progress, shapes
 from nicmm_core.geometry import mesh as mesh_module
 from nicmm_core.progress import CancelledError, checkpoint, placed, subrange, watched
 from tests.oracles.checker import judge_curve
@@ -127,7 +126,7 @@ def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
 @pytest.mark.slow
 def test_a_stop_during_another_search_keeps_the_curve(at_every_checkpoint, monkeypatch):
     """If a curve bends strongly, courses are searched again; here this always happens."""
-    monkeypatch.setattr(attempts, "SLIGHTLY_BENT", 0.0)
+    monkeypatch.setattr(improvement, "SLIGHTLY_BENT", 0.0)
     body = shapes.creature(5, resolution=32, faces=1500, subdivisions=1)
     chosen = [20, 250, 600]
     nicmm.design_curve(body, chosen)  # computes what the mesh keeps, which has checkpoints too

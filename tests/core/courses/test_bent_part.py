@@ -5,7 +5,6 @@ import pytest
 
 import nicmm_core as nicmm
 from nicmm_core import improvement, shapes, start_search
-from nicmm_core.courses import attempts
 from nicmm_core.courses.bent_part import (
     APART,
     DIRECTION,
@@ -191,18 +190,18 @@ def test_searches_for_parts_are_bounded(monkeypatch):
 
     monkeypatch.setattr(start_search.StartSearch, "with_other_part", counted)
     monkeypatch.setattr(improvement, "FURTHER_SEEDS", ())
-    monkeypatch.setattr(attempts, "BENT", 0.0)
-    monkeypatch.setattr(attempts, "MOST_WORK", 1e9)
-    monkeypatch.setattr(attempts, "LEAST_GAIN", 1.0)
+    monkeypatch.setattr(improvement, "BENT", 0.0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 1e9)
+    monkeypatch.setattr(improvement, "LEAST_GAIN", 1.0)
     body, chosen = shapes.creature(5, resolution=32, faces=1500, subdivisions=1), [20, 250, 600]
     nicmm.design_curve(body, chosen)
-    assert 3 <= len(tried) <= attempts.SEARCHES_FOR_PARTS
+    assert 3 <= len(tried) <= improvement.SEARCHES_FOR_PARTS
     assert len(set(map(tuple, tried))) == len(tried)  # without a gain, each part is tried once
     tried.clear()
     monkeypatch.setattr(improvement, "SEARCHES_FOR_PARTS", 2)
     nicmm.design_curve(body, chosen)
     assert len(tried) == 2
     tried.clear()
-    monkeypatch.setattr(attempts, "MOST_WORK", 0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 0)
     nicmm.design_curve(body, chosen)
     assert not tried

@@ -1,9 +1,10 @@
 """Tests that further attempts at a curve never make it worse."""
 
+import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.courses import attempts
+from nicmm_core import improvement, start_search
 from nicmm_core.relaxation.curve_energies import energies_of
 from nicmm_core.relaxation.curve_nodes import curve_surface
 from tests.oracles.energies import named_requests
@@ -19,7 +20,7 @@ def test_more_attempts_do_not_raise_the_energy(monkeypatch, name):
     asked = REQUESTS[name]
     designer = nicmm.Designer(asked.mesh)
     every = designer.design(asked.points, **asked.options).resumable
-    monkeypatch.setattr(attempts, "MOST_WORK", 0)
+    monkeypatch.setattr(improvement, "MOST_WORK", 0)
     first = designer.design(asked.points, **asked.options).resumable
     surface = curve_surface(first.mesh)
     one, all_of_them = energies_of(surface, [first.curve, every.curve], 1.0, first.curve.length)
@@ -38,6 +39,12 @@ def test_the_order_of_two_curves_does_not_depend_on_a_third(ball):
             self.discrete_curve = curve
 
     results = [Result(each.curve) for each in curves]
-    before = attempts.Attempts(surface, 1.0, 3, lambda: 0, relaxed=results[:2]).energies
-    after = attempts.Attempts(surface, 1.0, 3, lambda: 0, relaxed=results).energies
-    assert after[:2] == before
+    start = start_search.InitialCurve(curves[0].curve, np.arange(3), surface, 1.0)
+
+    def energies(count):
+        search, request = start_search.StartSearch(ball), curves[0].request
+        return improvement.Improvement(
+            search, request, None, 0, [start] * count, results[:count]
+        ).energies
+
+    assert energies(3)[:2] == energies(2)
