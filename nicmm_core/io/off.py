@@ -28,9 +28,8 @@ def read_off(path: Path) -> Polygons:
     lines = [words for words in rows if words]
     if not lines or not _HEADER.fullmatch(lines[0][0]):
         raise FormatError("it does not begin with OFF (binary and 4D OFF are not supported)")
-    head, rest = lines[0][1:], lines[1:]
-    if not head:
-        head, rest = (rest[0], rest[1:]) if rest else ([], [])
+    lines[0] = lines[0][1:]  # the counts may stand beside the name
+    head, *rest = [words for words in lines if words] or [[]]
     if len(head) < 2:
         raise FormatError("it lacks the numbers of vertices and faces")
     n_vertices, n_faces = integer(head[0]), integer(head[1])
