@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
 from .mesh import Mesh, real_array
-from .surface_points import SurfacePoints, nearest_points, on_longest_edge, weights_at
+from .surface_points import SurfacePoints, nearest_points, weights_at
 from .tolerances import BARYCENTRIC_SUM, GAP, ROUNDED, rounding
 
 
@@ -183,11 +183,7 @@ def weights_in_faces(
     for point in np.flatnonzero(~_contains(mesh.faces[others], support)).tolist():
         position = barycentric[point] @ mesh.vertices[mesh.faces[faces[point]]]
         nearest, _ = nearest_points(mesh, position[None], others[[point]])
-        if np.isfinite(nearest.barycentric).all():  # a face without area has no coordinates
-            weights[point] = nearest.barycentric[0]
-        else:
-            corners = mesh.vertices[mesh.faces[others[point]]]
-            weights[point] = on_longest_edge(corners, position)
+        weights[point] = nearest.barycentric[0]
     return weights
 
 

@@ -85,14 +85,18 @@ class Mesh:
         length = lengths(normals.T)
         return normals / np.where(length > 0.0, length, 1.0)[:, None]
 
-    @property
+    @cached_property
     def opposite_sides(self) -> IntArray:
         """For each side, the same edge as a side of the adjacent face, shape (3 F,).
 
         Side 3 f + j is opposite corner j of face f. At a boundary edge, or at an edge of more than
         two faces, the entry is the side itself.
         """
-        return self._adjacency[0]
+        order, first, count = grouped(side_keys(self.faces))
+        one, other = order[first[count == 2]], order[first[count == 2] + 1]
+        sides = np.arange(self.faces.size)
+        sides[one], sides[other] = other, one
+        return sides
 
     @cached_property
     def face_neighbours(self) -> IntArray:
@@ -103,25 +107,14 @@ class Mesh:
         beyond, face = self.opposite_sides.reshape(-1, 3) // 3, np.arange(len(self.faces))[:, None]
         return np.where(beyond == face, -1, beyond)
 
-    @property
+    @cached_property
     def unoriented_vertices(self) -> IntArray:
         """Vertices of edges that two faces traverse in the same direction, ascending."""
-        return self._adjacency[1]
-
-    @cached_property
-    def _adjacency(self) -> tuple[IntArray, IntArray]:
-        """`opposite_sides` and `unoriented_vertices`; both need the sides sorted by edge."""
-        order, first, count = grouped(side_keys(self.faces))
-        one, other = order[first[count == 2]], order[first[count == 2] + 1]
-        sides = np.arange(self.faces.size)
-        sides[one], sides[other] = other, one
-        rises = (self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]).ravel()
-        alike = one[rises[one] == rises[other]]
-        several = order[np.repeat(count > 2, count)]
-        twice = np.concatenate([alike, _sides_in_one_direction(self.faces, several)])
-        corners = self.faces[twice // 3]
-        ends = [corners[np.arange(len(twice)), twice % 3 - k] for k in (1, 2)]
-        return sides, np.unique(ends)
+        checkpoint()
+        size = len(self.vertices)
+        keys = self.faces[:, [1, 2, 0]] * size + self.faces[:, [2, 0, 1]]
+        directed, count = np.unique(keys, return_counts=True)
+        return np.unique(np.divmod(directed[count > 1], size))
 
     @cached_property
     def edges(self) -> IntArray:
@@ -166,15 +159,13 @@ class Mesh:
         return nicmm_kernels.EdgeGraphArrays(self.for_kernels)
 
     @cached_property
-    def face_trees(self) -> list[tuple[slice, igl.AABB]]:
-        """Bounding-box trees over parts of the faces, each with the range of its faces."""
+    def face_trees(self) -> list[tuple[IntArray, igl.AABB]]:
+        """Bounding-box trees over parts of the faces, each with the indices of its faces."""
         trees = []
-        for first in range(0, len(self.faces), MOST_FACES_PER_TREE):
+        every = np.arange(len(self.faces))
+        for faces in np.split(every, every[MOST_FACES_PER_TREE::MOST_FACES_PER_TREE]):
             checkpoint()
-            faces = slice(first, first + MOST_FACES_PER_TREE)
-            tree = igl.AABB()
-            tree.init(self.vertices, self.faces[faces])
-            trees.append((faces, tree))
+            trees.append((faces, face_tree(self.vertices, self.faces[faces])))
         return trees
 
     @cached_property
@@ -222,6 +213,13 @@ class Mesh:
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.faces] = True
         return used
+
+
+def face_tree(vertices: FloatArray, faces: IntArray) -> igl.AABB:
+    """A bounding-box tree of some faces."""
+    tree = igl.AABB()
+    tree.init(vertices, faces)
+    return tree
 
 
 def real_array(values: ArrayLike) -> FloatArray:
@@ -357,16 +355,8 @@ def edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
 
 def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
     """Distinct edges among the given keys, (E, 2), and how often each occurs, (E,)."""
-    order, first, count = grouped(keys)
-    distinct = keys[order[first]]
-    return np.stack([distinct // size, distinct % size], axis=1), count
-
-
-def _sides_in_one_direction(faces: IntArray, sides: IntArray) -> IntArray:
-    """One side of each set of given sides that traverse an edge in the same direction."""
-    start, end = (faces[sides // 3, sides % 3 - k] for k in (2, 1))
-    order, first, count = grouped(start * (int(faces.max()) + 1) + end)
-    return sides[order[first[count > 1]]]
+    distinct, count = np.unique(keys, return_counts=True)
+    return np.stack(np.divmod(distinct, size), axis=1), count
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
