@@ -12,7 +12,7 @@ import numpy as np
 from .array_types import FloatArray, IntArray
 from .curve import SurfaceCurve
 from .distances import build_distance_surface, distance_to_segments, propagate
-from .mesh import Mesh, edge_keys, unique_edges
+from .mesh import Mesh, unique_edges
 from .sides import two_sides
 
 
@@ -48,9 +48,10 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     on_curve[corners[at_vertex][weights[at_vertex]]] = True
     # At a point on an edge, the curve crosses the edge if it passes from one face to another.
     changes = (weights.sum(axis=1) == 2) & (curve.faces != np.roll(curve.faces, 1))
-    crossed = corners[changes][weights[changes]].reshape(-1, 2)
-    keys, wanted = (edge_keys(*ends.T, size=n_vertices) for ends in (edges, crossed))
-    odd = np.bincount(np.searchsorted(keys, wanted), minlength=len(edges)) % 2 == 1
+    crossed = np.sort(corners[changes][weights[changes]].reshape(-1, 2), axis=1)
+    size = np.array([n_vertices, 1])
+    place = np.searchsorted(edges @ size, crossed @ size)
+    odd = np.bincount(place, minlength=len(edges)) % 2 == 1
     off = ~on_curve[edges].any(axis=1)
     part, side = two_sides(n_vertices, edges[off], odd[off])
     if (side == 0)[~on_curve].any():

@@ -176,11 +176,7 @@ class Mesh:
     @cached_property
     def vertex_faces(self) -> sparse.csr_array:
         """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
-        n_faces = len(self.faces)
-        rows = self.faces.ravel()
-        columns = np.repeat(np.arange(n_faces), 3)
-        ones = np.ones(rows.size, dtype=np.int8)
-        return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
+        return faces_around(self.faces, len(self.vertices))
 
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces that have at least one of the given vertices, ascending."""
@@ -239,6 +235,23 @@ def real_array(values: ArrayLike) -> FloatArray:
         raise ValueError(str(error)) from error
 
 
+def whole_numbers(values: ArrayLike) -> IntArray:
+    """Copy values to an array of integers.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError
+        If the values cannot be converted, or some are not whole numbers.
+    """
+    given = np.array(values)
+    if given.size and not np.issubdtype(given.dtype, np.integer):
+        given = real_array(given)
+        # Floats represent all integers only below 2^53, and no mesh has that many vertices.
+        if not ((np.abs(given) < 2.0**53) & (given == np.round(given))).all():
+            raise ValueError("some are not whole numbers")
+    return given.astype(np.int64)
+
+
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Area of each triangle, shape (F,)."""
     return 0.5 * lengths(area_vectors(vertices, faces).T)
@@ -269,6 +282,13 @@ def feet_on_edges(
     squared = np.maximum(np.einsum("ed,ed->e", way, way), TINY)
     share = np.einsum("ed,ed->e", offset, way) / squared
     return share, lengths((offset - share[:, None] * way).T)
+
+
+def faces_around(faces: IntArray, n_vertices: int) -> sparse.csr_array:
+    """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
+    column = np.repeat(np.arange(len(faces)), 3)
+    entries = (np.ones(faces.size, dtype=np.int8), (faces.ravel(), column))
+    return sparse.csr_array(entries, shape=(n_vertices, len(faces)))
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -384,13 +404,7 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
 
 def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
     try:
-        given = np.array(faces)
-        if given.size and not np.issubdtype(given.dtype, np.integer):
-            given = real_array(given)
-            # Floats represent all integers only below 2^53, and no mesh has that many vertices.
-            if not (np.abs(given) < 2.0**53).all() or (given != np.round(given)).any():
-                raise ValueError("some are not whole numbers")
-        checked = given.astype(np.int64)
+        checked = whole_numbers(faces)
     except (TypeError, ValueError, OverflowError) as error:
         raise MeshError(
             f"faces cannot be read as vertex indices ({error}); pass an integer array of shape "

@@ -366,12 +366,8 @@ def _face_parts(
 
 def _flattened(corners: FloatArray, weights: FloatArray) -> FloatArray:
     """Points of a face in its plane, (n, 2); a face without height counts as equilateral."""
-    one, other = corners[1] - corners[0], corners[2] - corners[0]
-    length = np.linalg.norm(one)
-    x, y = one @ other, float(np.linalg.norm(np.cross(one, other)))
-    longest = max(length, np.linalg.norm(other), np.linalg.norm(other - one))
-    if y > FLAT * longest**2:
-        flat = np.array([[0.0, 0.0], [length, 0.0], [x / length, y / length]])
-    else:
-        flat = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
-    return weights @ flat
+    _, sides = np.linalg.qr((corners[1:] - corners[0]).T)  # from the first corner, in columns
+    longest = np.linalg.norm([*sides.T, sides[:, 1] - sides[:, 0]], axis=1).max()
+    if np.abs(np.linalg.det(sides)) <= FLAT * longest**2:
+        sides = np.array([[1.0, 0.5], [0.0, 0.75**0.5]])
+    return weights[:, 1:] @ sides.T

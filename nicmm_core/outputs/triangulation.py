@@ -143,11 +143,10 @@ class FaceTriangulation:
         for (corner, right), left in list(self._third.items()):
             if corner != start:
                 continue
-            turns = self._turn(start, end, right), self._turn(start, end, left)
-            if turns[0] == 0 and self._is_ahead(start, right, end):
-                raise ConstraintError((start, end, right))
-            if turns[1] == 0 and self._is_ahead(start, left, end):
-                raise ConstraintError((start, end, left))
+            turns = [self._turn(start, end, side) for side in (right, left)]
+            for side, turn in zip((right, left), turns, strict=True):
+                if turn == 0 and self._is_ahead(start, side, end):
+                    raise ConstraintError((start, end, side))
             if turns[0] < 0 < turns[1]:
                 break
         else:

@@ -119,7 +119,7 @@ def fit_bezier(
     right = places[:-1] + handles[:, :1] * after[:-1]
     left = places[1:] - handles[:, 1:] * before[1:]
     if closed:
-        left = np.concatenate([left[-1:], left[:-1]])
+        left = np.roll(left, 1, axis=0)
     else:
         right = np.concatenate([right, 2.0 * places[-1:] - left[-1:]])
         left = np.concatenate([2.0 * places[:1] - right[:1], left])
@@ -397,13 +397,10 @@ def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, Floa
         deviation[at] = np.where(found <= fitter.tolerance, found, np.inf)
         # Of two neighbouring knots only the better one is removed, as this changes the spans at the
         # other one.
-        removed = np.isfinite(deviation)
-        removed[1:] &= deviation[1:] < deviation[:-1]
-        removed[:-1] &= deviation[:-1] <= deviation[1:]
-        untested = np.zeros(len(knots), dtype=bool)
-        untested[:-1] |= removed[1:]
-        untested[1:] |= removed[:-1]
-        untested &= ~np.isin(knots, fitter.fixed)
+        padded = np.pad(deviation, 1, constant_values=np.inf)
+        removed = (deviation < padded[:-2]) & (deviation <= padded[2:])
+        beside = np.pad(removed, 1)
+        untested = (beside[:-2] | beside[2:]) & ~np.isin(knots, fitter.fixed)
         knots, tangents, untested = knots[~removed], tangents[:, ~removed], untested[~removed]
     before, after = tangents
     handles, _ = fitter.fit(knots[:-1], knots[1:], after[:-1], before[1:])
