@@ -39,7 +39,9 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        corners = at_corners(mesh, self.faces, mesh.vertices)
+        corners = mesh.vertices.take(mesh.faces.take(self.faces, axis=0), axis=0)
+        # The axes become corner, component and point.
+        corners = corners.transpose(1, 2, 0).copy()
         return dot(self.barycentric.T[:, None], corners).T
 
     @property
@@ -60,14 +62,6 @@ class SurfacePoints:
             return SurfacePoints(self.faces[index], self.barycentric[index])
         which = np.flatnonzero(index) if index.dtype == bool else index
         return SurfacePoints(self.faces.take(which), self.barycentric.take(which, axis=0))
-
-
-def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
-    """Gather vectors at vertices, (V, 3), at the corners of faces, (3, 3, k).
-
-    The axes of the result are corner, component and face.
-    """
-    return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
 
 
 def locate_control_points(
@@ -390,10 +384,8 @@ def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
 
 def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
     """The same points, expressed in other faces that contain them."""
-    corners = mesh.faces
-    return SurfacePoints(
-        faces, weights_at(corners[points.faces], points.barycentric, corners[faces])
-    )
+    weights = weights_at(mesh.faces[points.faces], points.barycentric, mesh.faces[faces])
+    return SurfacePoints(faces, weights)
 
 
 def in_first_faces(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:

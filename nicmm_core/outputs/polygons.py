@@ -52,8 +52,7 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
         The parts of polygons that were cut; other polygons are not included.
     """
     polygon = source_polygon[cut.source_face]
-    is_cut = np.zeros(len(source_polygon), dtype=bool)
-    is_cut[cut.source_face[np.flatnonzero(np.diff(cut.source_face, append=-1) == 0)]] = True
+    is_cut = np.bincount(cut.source_face) > 1
     pairs, on_chain = cut.adjacent_faces
     one, other = pairs.T
     # The curve may also cut a polygon along a diagonal without cutting a triangle.

@@ -149,7 +149,7 @@ def even_places(
     line = cut_polyline(points, closed, control_index)
     legs = [line.leg(number) for number in range(len(line.bounds) - 1)]
     # A closed polyline has at least three points.
-    fewest = max(1, 4 - len(legs)) if closed and len(legs) < 3 else 1
+    fewest = max(1, 4 - len(legs)) if closed else 1
     divisions = [
         _divide(leg, fewest, tolerance) or _spread(leg, leg.bounds, leg.length / fewest)
         for leg in legs
