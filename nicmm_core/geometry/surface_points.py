@@ -251,9 +251,9 @@ def nearest_points(
     (k,) float array
         Distances, in mesh units.
     """
-    trees = mesh.face_trees
-    if among is not None:
-        trees = [(among, face_tree(mesh.vertices, mesh.faces[among]))]
+    trees = (
+        mesh.face_trees if among is None else [(among, face_tree(mesh.vertices, mesh.faces[among]))]
+    )
     squared = np.full(len(positions), np.inf)
     faces = np.zeros(len(positions), dtype=np.int64)
     places = np.zeros((len(positions), 3))
