@@ -68,8 +68,7 @@ def curve_on_mesh(
     mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray, control_index: IntArray
 ) -> SurfaceCurve:
     """Build a curve from faces and barycentric coordinates."""
-    corners = mesh.vertices[mesh.faces[faces]]
-    points = (barycentric[:, :, None] * corners).sum(axis=1)
+    points = SurfacePoints(faces, barycentric).positions(mesh)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 

@@ -234,10 +234,8 @@ class _Fitter:
         """
         arc = self.line.arc[knots]
         spans = np.diff(arc)
-        if self.line.closed:
-            back, ahead = np.append(spans[-1], spans), np.append(spans, spans[0])
-        else:
-            back, ahead = np.append(spans[:1], spans), np.append(spans, spans[-1:])
+        outer = spans[[-1, 0]] if self.line.closed else spans[[0, -1]]
+        back, ahead = np.append(outer[0], spans), np.append(spans, outer[1])
         both = self._directions(arc, TANGENT_REACH * np.minimum(back, ahead), True)
         sharp = self.sharp[knots][:, None]
         before = np.where(sharp, -self._directions(arc, -TANGENT_REACH_AT_END * back, False), both)
@@ -318,15 +316,11 @@ class _Fitter:
         self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray
     ) -> tuple[_Spans, FloatArray]:
         """Data of spans, and the share of its span's arc length at which each target lies, (n,)."""
-        line, between = self.line, (np.arange(SAMPLES) + 0.5) / SAMPLES
-        arcs = [
-            np.sort(
-                np.append(
-                    line.arc[a : b + 1], (1.0 - between) * line.arc[a] + between * line.arc[b]
-                )
-            )
-            for a, b in zip(start.tolist(), end.tolist(), strict=True)
-        ]
+        line, share = self.line, (np.arange(SAMPLES) + 0.5) / SAMPLES
+        arcs = []
+        for a, b in zip(start.tolist(), end.tolist(), strict=True):
+            between = (1.0 - share) * line.arc[a] + share * line.arc[b]
+            arcs.append(np.sort(np.append(line.arc[a : b + 1], between)))
         count, arc = np.array([len(of_span) for of_span in arcs]), np.concatenate(arcs)
         span = np.repeat(np.arange(len(start)), count)
         length = line.arc[end] - line.arc[start]

@@ -16,6 +16,7 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
 from ..geometry.distances import distance_to_segments
 from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
 from ..geometry.tolerances import TINY
 from .polyline import CutPolyline, cut_polyline
 
@@ -101,7 +102,7 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
         for point in (segment, following)
     )
     barycentric = (1.0 - share)[:, None] * start + share[:, None] * end
-    positions = (barycentric[:, :, None] * mesh.vertices[mesh.faces[faces]]).sum(axis=1)
+    positions = SurfacePoints(faces, barycentric).positions(mesh)
     return SampledCurve(curve.closed, faces, barycentric, positions, control_index)
 
 
