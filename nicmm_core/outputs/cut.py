@@ -224,7 +224,7 @@ class _Places:
     ----------
     support : list of tuples of int
         For each place the vertices of the vertex, edge or face, ascending.
-    on_edges : dict
+    by_support : dict
         Places by their support: the one at a vertex, or those on an edge, in order from its smaller
         vertex.
     in_face : dict
@@ -232,7 +232,7 @@ class _Places:
     """
 
     support: list[tuple[int, ...]]
-    on_edges: dict[tuple[int, ...], list[int]]
+    by_support: dict[tuple[int, ...], list[int]]
     in_face: dict[int, list[int]]
 
 
@@ -279,8 +279,8 @@ def _places(chain: Chain, corners: IntArray) -> _Places:
         if len(support) == 3:
             places.in_face[int(chain.places.faces[place])].append(place)
         else:
-            places.on_edges[places.support[place]].append(place)
-    for along in places.on_edges.values():
+            places.by_support[places.support[place]].append(place)
+    for along in places.by_support.values():
         along.sort(key=share.__getitem__)
         for one, other in itertools.pairwise(along):
             if share[one] == share[other]:
@@ -302,7 +302,7 @@ def _segments_inside(chain: Chain, places: _Places) -> dict[int, list[tuple[int,
             inside[int(chain.segment_faces[place])].append((place, following))
             continue
         edge = [(together[0],), tuple(together), (together[1],)]
-        along = [there for part in edge for there in places.on_edges.get(part, [])]
+        along = [there for part in edge for there in places.by_support.get(part, [])]
         first, last = sorted([along.index(place), along.index(following)])
         if last - first > 1:
             raise _ContactError(along[first : last + 1])
@@ -311,7 +311,7 @@ def _segments_inside(chain: Chain, places: _Places) -> dict[int, list[tuple[int,
 
 def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
     """Faces that have a place on one of their edges."""
-    edges = np.array([at for at in places.on_edges if len(at) == 2], np.int64).reshape(-1, 2)
+    edges = np.array([at for at in places.by_support if len(at) == 2], np.int64).reshape(-1, 2)
     candidates = mesh.faces_at(np.unique(edges))
     cut = sides_among(mesh.faces[candidates], edges).reshape(-1, 3)
     return candidates[cut.any(axis=1)].tolist()
@@ -341,11 +341,11 @@ def _face_parts(
     corners = mesh.faces[face].tolist()
     sides = []
     for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
-        along = places.on_edges.get((min(start, end), max(start, end)), [])
+        along = places.by_support.get((min(start, end), max(start, end)), [])
         sides.append(along if start < end else along[::-1])
     inner = places.in_face.get(face, [])
     new = np.array([*itertools.chain(*sides), *inner], dtype=np.int64)
-    local = {place: k for k, v in enumerate(corners) for place in places.on_edges.get((v,), [])}
+    local = {place: k for k, v in enumerate(corners) for place in places.by_support.get((v,), [])}
     local.update((place, 3 + k) for k, place in enumerate(new.tolist()))
     inserted = in_faces(mesh, chain.places[new], np.full(len(new), face))
     weights = np.concatenate([np.eye(3), inserted.barycentric])
