@@ -112,11 +112,7 @@ class FaceTriangulation:
                 crossed.append((a, b))
                 continue
             self._flip(a, b)
-            ends = {c, d}
-            if (
-                not ends & {start, end}
-                and self._turn(start, end, c) * self._turn(start, end, d) < 0
-            ):
+            if self._turn(start, end, c) * self._turn(start, end, d) < 0:
                 crossed.append((c, d))
         self._fixed |= {(start, end), (end, start)}
 
