@@ -7,13 +7,14 @@ curves.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..errors import CurveError
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, real_array
-from .surface_points import SurfacePoints, nearest_points, on_longest_edge, weights_at
+from .mesh import Mesh, real_array, whole_numbers
+from .surface_points import SurfacePoints, nearest_points, weights_at
 from .tolerances import BARYCENTRIC_SUM, GAP, ROUNDED, rounding
 
 
@@ -67,8 +68,7 @@ def curve_on_mesh(
     mesh: Mesh, closed: bool, faces: IntArray, barycentric: FloatArray, control_index: IntArray
 ) -> SurfaceCurve:
     """Build a curve from faces and barycentric coordinates."""
-    corners = mesh.vertices[mesh.faces[faces]]
-    points = (barycentric[:, :, None] * corners).sum(axis=1)
+    points = SurfacePoints(faces, barycentric).positions(mesh)
     return SurfaceCurve(closed, faces, barycentric, points, control_index)
 
 
@@ -92,9 +92,8 @@ def with_points(
 
 def is_one_curve(curves: list[SurfaceCurve], closed: bool = True) -> bool:
     """Whether there is exactly one curve, closed or open as given, through all control points."""
-    if len(curves) != 1 or curves[0].closed != closed:
-        return False
-    return bool((curves[0].control_index >= 0).all())
+    one = len(curves) == 1 and curves[0].closed == closed
+    return one and bool((curves[0].control_index >= 0).all())
 
 
 def point_on_segment(mesh: Mesh, curve: SurfaceCurve, segment: int, share: float) -> SurfacePoints:
@@ -183,11 +182,7 @@ def weights_in_faces(
     for point in np.flatnonzero(~_contains(mesh.faces[others], support)).tolist():
         position = barycentric[point] @ mesh.vertices[mesh.faces[faces[point]]]
         nearest, _ = nearest_points(mesh, position[None], others[[point]])
-        if np.isfinite(nearest.barycentric).all():  # a face without area has no coordinates
-            weights[point] = nearest.barycentric[0]
-        else:
-            corners = mesh.vertices[mesh.faces[others[point]]]
-            weights[point] = on_longest_edge(corners, position)
+        weights[point] = nearest.barycentric[0]
     return weights
 
 
@@ -195,30 +190,26 @@ def _readable(curve: SurfaceCurve) -> SurfaceCurve:
     """The curve with arrays of the right types; raises CurveError if that is impossible."""
     if not isinstance(curve.closed, bool | np.bool_):
         raise CurveError(f"curve.closed is {curve.closed!r}; pass True or False")
-    values: dict[str, FloatArray] = {}
+    values: dict[str, Any] = {}
     for name in ("faces", "barycentric", "points", "control_index"):
+        convert = whole_numbers if name in ("faces", "control_index") else real_array
         try:
-            values[name] = real_array(getattr(curve, name))
-        except (TypeError, ValueError) as error:
+            values[name] = convert(getattr(curve, name))
+        except (TypeError, ValueError, OverflowError) as error:
             raise CurveError(f"curve.{name} cannot be read as numbers ({error})") from error
-    n = values["faces"].size
-    shapes = {"faces": (n,), "barycentric": (n, 3), "points": (n, 3)}
+    n, index = values["faces"].size, values["control_index"]
+    shapes = {
+        "faces": (n,),
+        "barycentric": (n, 3),
+        "points": (n, 3),
+        "control_index": (index.size,),
+    }
     for name, shape in shapes.items():
         if values[name].shape != shape:
             raise CurveError(f"curve.{name} has shape {values[name].shape}; pass {shape}")
-    index = values["control_index"]
-    for name, whole in (("faces", values["faces"]), ("control_index", index)):
-        if whole.ndim != 1 or not (np.abs(whole) < 2.0**53).all() or (whole % 1.0).any():
-            raise CurveError(f"curve.{name} is not an array of whole numbers, one for each point")
     if (index < -1).any() or (index >= n).any():
         raise CurveError(f"curve.control_index has values outside -1 … {n - 1}")
-    return SurfaceCurve(
-        bool(curve.closed),
-        values["faces"].astype(np.int64),
-        values["barycentric"],
-        values["points"],
-        index.astype(np.int64),
-    )
+    return SurfaceCurve(bool(curve.closed), **values)
 
 
 def without_small_weights(
@@ -259,8 +250,7 @@ def _segment_faces(mesh: Mesh, curve: SurfaceCurve, across_gaps: bool) -> IntArr
     unknown = ~_contains(mesh.faces[found], support[following])
     found[unknown] = faces[following][unknown]
     unknown &= ~_contains(mesh.faces[found], support)
-    if not curve.closed:
-        unknown[-1] = False
+    unknown[-1] &= curve.closed
     for point in np.flatnonzero(unknown).tolist():
         beyond = int(following[point])
         both = np.concatenate([support[point], support[beyond]])

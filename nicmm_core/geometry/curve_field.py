@@ -23,13 +23,11 @@ def curve_field(mesh: Mesh, curve: SurfaceCurve) -> FloatArray:
     Vertices on other components are outside, at the greatest distance found.
     """
     surface = build_distance_surface(mesh.vertices, mesh.faces, mesh.mean_edge_length)
-    n_segments = len(curve.points) if curve.closed else len(curve.points) - 1
-    segment = np.arange(n_segments)
+    steps = curve.steps
+    start, faces = curve.points[: len(steps)], curve.faces[: len(steps)]
     distance = np.full(len(mesh.vertices), np.inf)
-    for corner in range(3):
-        vertex = mesh.faces[curve.faces[segment], corner]
-        start, end = curve.points[segment], curve.points[(segment + 1) % len(curve.points)]
-        to_segment = distance_to_segments(mesh.vertices[vertex], start, end)
+    for vertex in mesh.faces[faces].T:
+        to_segment = distance_to_segments(mesh.vertices[vertex], start, start + steps)
         np.minimum.at(distance, vertex, to_segment)
     propagate(surface, distance, np.inf)
     reached = np.isfinite(distance)
@@ -52,16 +50,15 @@ def _side(mesh: Mesh, curve: SurfaceCurve) -> IntArray | None:
     changes = (weights.sum(axis=1) == 2) & (curve.faces != np.roll(curve.faces, 1))
     crossed = np.sort(corners[changes][weights[changes]].reshape(-1, 2), axis=1)
     size = np.array([n_vertices, 1])
-    parity = np.zeros(len(edges), dtype=np.int64)
-    np.add.at(parity, np.searchsorted(edges @ size, crossed @ size), 1)
-    parity %= 2
+    place = np.searchsorted(edges @ size, crossed @ size)
+    odd = np.bincount(place, minlength=len(edges)) % 2 == 1
     off = ~on_curve[edges].any(axis=1)
-    part, side = two_sides(n_vertices, edges[off], parity[off] == 1)
+    part, side = two_sides(n_vertices, edges[off], odd[off])
     if (side == 0)[~on_curve].any():
         return None
     # Parts connected to the rest only through vertices on the curve count as outside.
-    here = np.zeros(n_vertices, dtype=bool)
-    here[mesh.faces[mesh.face_component == mesh.face_component[curve.faces[0]]]] = True
+    component = mesh.face_component
+    here = np.isin(np.arange(n_vertices), mesh.faces[component == component[curve.faces[0]]])
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n_vertices)
     largest = np.bincount(part, np.where(here & ~on_curve, area, 0.0)).argmax()
     here &= part == largest

@@ -15,6 +15,7 @@ from scipy import sparse
 from ..progress import checkpoint
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
+from .mesh import faces_around
 
 SETTLED = 1e-6
 """Decreases of a distance by less than this, in edge lengths, are not propagated."""
@@ -53,9 +54,7 @@ def build_distance_surface(
     vertices: FloatArray, faces: IntArray, edge_length: float
 ) -> DistanceSurface:
     """Build a `DistanceSurface`, with an index of the faces around each vertex."""
-    entries = (np.ones(faces.size), (faces.ravel(), np.repeat(np.arange(len(faces)), 3)))
-    around = sparse.csr_array(sparse.coo_array(entries, shape=(len(vertices), len(faces))))
-    return DistanceSurface(vertices, faces, around, edge_length)
+    return DistanceSurface(vertices, faces, faces_around(faces, len(vertices)), edge_length)
 
 
 def distance_to_segments(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:

@@ -56,17 +56,12 @@ def distinct_rows(rows: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
     """
     first = number = np.zeros(len(rows), dtype=np.int64)
     for column in rows.T:
-        _, of_column = _distinct(column)
-        first, number = _distinct(number * (len(rows) + 1) + of_column)
+        _, of_column = np.unique(column, return_inverse=True)
+        checkpoint()
+        keys = number * (len(rows) + 1) + of_column
+        _, first, number = np.unique(keys, return_index=True, return_inverse=True)
+        checkpoint()
     return first, number
-
-
-def _distinct(keys: IntArray | FloatArray) -> tuple[IntArray, IntArray]:
-    """Index of the first occurrence of each distinct key, by ascending key; rank of every key."""
-    order, start, count = grouped(keys)
-    number = np.empty(len(keys), dtype=np.int64)
-    number[order] = np.repeat(np.arange(len(start)), count)
-    return order[start], number
 
 
 def components(size: int, one: IntArray, other: IntArray) -> tuple[int, IntArray]:
@@ -99,10 +94,8 @@ def first_of_components(size: int, one: IntArray, other: IntArray) -> IntArray:
 
     The parameters are those of `components`.
     """
-    number, label = components(size, one, other)
-    first = np.full(number, size)
-    np.minimum.at(first, label, np.arange(size))
-    return first[label]
+    _, label = components(size, one, other)
+    return np.unique(label, return_index=True)[1][label]
 
 
 def occurrences(keys: IntArray, wanted: IntArray) -> tuple[IntArray, IntArray]:

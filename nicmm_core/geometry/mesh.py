@@ -85,14 +85,18 @@ class Mesh:
         length = lengths(normals.T)
         return normals / np.where(length > 0.0, length, 1.0)[:, None]
 
-    @property
+    @cached_property
     def opposite_sides(self) -> IntArray:
         """For each side, the same edge as a side of the adjacent face, shape (3 F,).
 
         Side 3 f + j is opposite corner j of face f. At a boundary edge, or at an edge of more than
         two faces, the entry is the side itself.
         """
-        return self._adjacency[0]
+        order, first, count = grouped(side_keys(self.faces))
+        one, other = order[first[count == 2]], order[first[count == 2] + 1]
+        sides = np.arange(self.faces.size)
+        sides[one], sides[other] = other, one
+        return sides
 
     @cached_property
     def face_neighbours(self) -> IntArray:
@@ -103,25 +107,14 @@ class Mesh:
         beyond, face = self.opposite_sides.reshape(-1, 3) // 3, np.arange(len(self.faces))[:, None]
         return np.where(beyond == face, -1, beyond)
 
-    @property
+    @cached_property
     def unoriented_vertices(self) -> IntArray:
         """Vertices of edges that two faces traverse in the same direction, ascending."""
-        return self._adjacency[1]
-
-    @cached_property
-    def _adjacency(self) -> tuple[IntArray, IntArray]:
-        """`opposite_sides` and `unoriented_vertices`; both need the sides sorted by edge."""
-        order, first, count = grouped(side_keys(self.faces))
-        one, other = order[first[count == 2]], order[first[count == 2] + 1]
-        sides = np.arange(self.faces.size)
-        sides[one], sides[other] = other, one
-        rises = (self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]).ravel()
-        alike = one[rises[one] == rises[other]]
-        several = order[np.repeat(count > 2, count)]
-        twice = np.concatenate([alike, _sides_in_one_direction(self.faces, several)])
-        corners = self.faces[twice // 3]
-        ends = [corners[np.arange(len(twice)), twice % 3 - k] for k in (1, 2)]
-        return sides, np.unique(ends)
+        checkpoint()
+        size = len(self.vertices)
+        keys = self.faces[:, [1, 2, 0]] * size + self.faces[:, [2, 0, 1]]
+        directed, count = np.unique(keys, return_counts=True)
+        return np.unique(np.divmod(directed[count > 1], size))
 
     @cached_property
     def edges(self) -> IntArray:
@@ -166,15 +159,13 @@ class Mesh:
         return nicmm_kernels.EdgeGraphArrays(self.for_kernels)
 
     @cached_property
-    def face_trees(self) -> list[tuple[slice, igl.AABB]]:
-        """Bounding-box trees over parts of the faces, each with the range of its faces."""
+    def face_trees(self) -> list[tuple[IntArray, igl.AABB]]:
+        """Bounding-box trees over parts of the faces, each with the indices of its faces."""
         trees = []
-        for first in range(0, len(self.faces), MOST_FACES_PER_TREE):
+        every = np.arange(len(self.faces))
+        for faces in np.split(every, every[MOST_FACES_PER_TREE::MOST_FACES_PER_TREE]):
             checkpoint()
-            faces = slice(first, first + MOST_FACES_PER_TREE)
-            tree = igl.AABB()
-            tree.init(self.vertices, self.faces[faces])
-            trees.append((faces, tree))
+            trees.append((faces, face_tree(self.vertices, self.faces[faces])))
         return trees
 
     @cached_property
@@ -185,11 +176,7 @@ class Mesh:
     @cached_property
     def vertex_faces(self) -> sparse.csr_array:
         """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
-        n_faces = len(self.faces)
-        rows = self.faces.ravel()
-        columns = np.repeat(np.arange(n_faces), 3)
-        ones = np.ones(rows.size, dtype=np.int8)
-        return sparse.csr_array((ones, (rows, columns)), shape=(len(self.vertices), n_faces))
+        return faces_around(self.faces, len(self.vertices))
 
     def faces_at(self, vertices: IntArray) -> IntArray:
         """Faces that have at least one of the given vertices, ascending."""
@@ -224,6 +211,13 @@ class Mesh:
         return used
 
 
+def face_tree(vertices: FloatArray, faces: IntArray) -> igl.AABB:
+    """A bounding-box tree of some faces."""
+    tree = igl.AABB()
+    tree.init(vertices, faces)
+    return tree
+
+
 def real_array(values: ArrayLike) -> FloatArray:
     """Copy values to an array of floats.
 
@@ -239,6 +233,23 @@ def real_array(values: ArrayLike) -> FloatArray:
         return given.astype(np.float64)
     except OverflowError as error:  # integers with hundreds of digits
         raise ValueError(str(error)) from error
+
+
+def whole_numbers(values: ArrayLike) -> IntArray:
+    """Copy values to an array of integers.
+
+    Raises
+    ------
+    TypeError, ValueError, OverflowError
+        If the values cannot be converted, or some are not whole numbers.
+    """
+    given = np.array(values)
+    if given.size and not np.issubdtype(given.dtype, np.integer):
+        given = real_array(given)
+        # Floats represent all integers only below 2^53, and no mesh has that many vertices.
+        if not ((np.abs(given) < 2.0**53) & (given == np.round(given))).all():
+            raise ValueError("some are not whole numbers")
+    return given.astype(np.int64)
 
 
 def triangle_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -271,6 +282,13 @@ def feet_on_edges(
     squared = np.maximum(np.einsum("ed,ed->e", way, way), TINY)
     share = np.einsum("ed,ed->e", offset, way) / squared
     return share, lengths((offset - share[:, None] * way).T)
+
+
+def faces_around(faces: IntArray, n_vertices: int) -> sparse.csr_array:
+    """Incidence of vertices (rows) and faces (columns), shape (V, F), as a CSR pattern."""
+    column = np.repeat(np.arange(len(faces)), 3)
+    entries = (np.ones(faces.size, dtype=np.int8), (faces.ravel(), column))
+    return sparse.csr_array(entries, shape=(n_vertices, len(faces)))
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -357,16 +375,8 @@ def edge_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
 
 def _edges(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
     """Distinct edges among the given keys, (E, 2), and how often each occurs, (E,)."""
-    order, first, count = grouped(keys)
-    distinct = keys[order[first]]
-    return np.stack([distinct // size, distinct % size], axis=1), count
-
-
-def _sides_in_one_direction(faces: IntArray, sides: IntArray) -> IntArray:
-    """One side of each set of given sides that traverse an edge in the same direction."""
-    start, end = (faces[sides // 3, sides % 3 - k] for k in (2, 1))
-    order, first, count = grouped(start * (int(faces.max()) + 1) + end)
-    return sides[order[first[count > 1]]]
+    distinct, count = np.unique(keys, return_counts=True)
+    return np.stack(np.divmod(distinct, size), axis=1), count
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
@@ -394,13 +404,7 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
 
 def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
     try:
-        given = np.array(faces)
-        if given.size and not np.issubdtype(given.dtype, np.integer):
-            given = real_array(given)
-            # Floats represent all integers only below 2^53, and no mesh has that many vertices.
-            if not (np.abs(given) < 2.0**53).all() or (given != np.round(given)).any():
-                raise ValueError("some are not whole numbers")
-        checked = given.astype(np.int64)
+        checked = whole_numbers(faces)
     except (TypeError, ValueError, OverflowError) as error:
         raise MeshError(
             f"faces cannot be read as vertex indices ({error}); pass an integer array of shape "

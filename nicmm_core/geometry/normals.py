@@ -41,16 +41,13 @@ def normals_and_folds(mesh: Mesh) -> tuple[FloatArray, BoolArray | None]:
     if not len(mixed) and not against.any():
         return normals, None
     folded = np.setdiff1d(mesh.faces[against.any(axis=1)], mixed)
-    owner, face_normals, areas = _faces_around(mesh, folded)
-    area_vector = np.zeros((len(folded), 3))
-    np.add.at(area_vector, owner, areas[:, None] * face_normals)
+    area_vector = mesh.vertex_faces[folded] @ (mesh.face_areas[:, None] * mesh.face_normals)
     there = area_vector.any(axis=1)
     normals[folded[there]] = unit(area_vector[there].T).T
     if len(mixed):
         normals[mixed] = _normals_on_double_cover(mesh)[mixed]
-    is_mixed = np.zeros(len(mesh.vertices), dtype=bool)
-    is_mixed[mixed] = True
-    faces = (_facing(mesh, normals).sum(axis=1) < 0.0) & ~is_mixed[mesh.faces].any(axis=1)
+    has_mixed = np.isin(mesh.faces, mixed).any(axis=1)
+    faces = (_facing(mesh, normals).sum(axis=1) < 0.0) & ~has_mixed
     return normals, faces if faces.any() else None
 
 
@@ -86,10 +83,3 @@ def _normals_on_double_cover(mesh: Mesh) -> FloatArray:
     first = np.arange(n_corners)[::-1]  # the first assignment of each vertex comes last
     normals[mesh.faces.ravel()[first]] = of_groups[group.ravel()[first]]
     return normals
-
-
-def _faces_around(mesh: Mesh, vertices: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """For all faces around given vertices: index into ``vertices``, face normal and face area."""
-    incidence = mesh.vertex_faces[vertices]
-    owner = np.repeat(np.arange(len(vertices)), np.diff(incidence.indptr))
-    return owner, mesh.face_normals[incidence.indices], mesh.face_areas[incidence.indices]

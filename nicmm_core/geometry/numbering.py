@@ -264,8 +264,8 @@ def principal_frame(
     share = face_areas / area
     centre = share @ offset
     offset -= centre
-    squares, axes = np.linalg.eigh(offset.T @ (share[:, None] * offset))
-    axes = _settled(squares, axes)
+    squares, eigenvectors = np.linalg.eigh(offset.T @ (share[:, None] * offset))
+    axes = _settled(squares, eigenvectors)
     deviation = float(np.sqrt(squares.sum()))
     along = offset @ axes / max(deviation, TINY)
     skewness = share @ (along * along * along)

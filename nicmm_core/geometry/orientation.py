@@ -17,12 +17,9 @@ def turned_faces(mesh: Mesh) -> BoolArray:
     """
     if mesh.is_oriented:
         return np.zeros(len(mesh.faces), dtype=bool)
-    one = np.arange(mesh.faces.size)
-    other = mesh.opposite_sides
-    paired = np.flatnonzero(other > one)
-    one, other = one[paired], other[paired]
-    start_of_one = mesh.faces[one // 3, one % 3 - 2]
-    alike = start_of_one == mesh.faces[other // 3, other % 3 - 2]
+    one = np.flatnonzero(mesh.opposite_sides > np.arange(mesh.faces.size))
+    other = mesh.opposite_sides[one]
+    alike = mesh.faces[one // 3, one % 3 - 2] == mesh.faces[other // 3, other % 3 - 2]
     part, side = two_sides(len(mesh.faces), np.stack([one // 3, other // 3], axis=1), alike)
     more = np.bincount(part, weights=side, minlength=2 * len(mesh.faces))[part]
     return side * np.where(more < 0.0, -1, 1) < 0

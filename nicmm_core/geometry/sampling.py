@@ -6,7 +6,6 @@ They become the seeds of the coarse mesh and the cells of the hop graph.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .array_types import FloatArray, IntArray
@@ -66,14 +65,11 @@ def spread_vertices(
     scaled = np.concatenate(
         [mesh.vertices[candidates] / distance, normal_weight * normals[candidates]], axis=1
     )
-    near = cKDTree(scaled).query_pairs(1.0, output_type="ndarray")
-    size = len(candidates)
-    graph = sparse.coo_array((np.ones(len(near), np.int8), (near[:, 0], near[:, 1])), (size, size))
-    graph = sparse.csr_array(graph + graph.T)
-    free = np.ones(size, dtype=bool)
+    near = cKDTree(scaled).query_ball_point(scaled, 1.0)
+    free = np.ones(len(candidates), dtype=bool)
     chosen = []
-    for place in range(size):
+    for place, around in enumerate(near):
         if free[place]:
             chosen.append(place)
-            free[graph.indices[graph.indptr[place] : graph.indptr[place + 1]]] = False
+            free[around] = False
     return np.sort(candidates[chosen])

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import igl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..errors import ControlPointError, PointName, UnreachableError
 from ..options import FEWEST_CLOSED, FEWEST_OPEN
 from . import tolerances
 from .array_types import BoolArray, FloatArray, IntArray
-from .mesh import Mesh, real_array
+from .mesh import Mesh, face_tree, real_array
 from .vectors import dot
 
 
@@ -40,7 +39,9 @@ class SurfacePoints:
 
     def positions(self, mesh: Mesh) -> FloatArray:
         """Positions of the points in space, shape (k, 3)."""
-        corners = at_corners(mesh, self.faces, mesh.vertices)
+        corners = mesh.vertices.take(mesh.faces.take(self.faces, axis=0), axis=0)
+        # The axes become corner, component and point.
+        corners = corners.transpose(1, 2, 0).copy()
         return dot(self.barycentric.T[:, None], corners).T
 
     @property
@@ -61,14 +62,6 @@ class SurfacePoints:
             return SurfacePoints(self.faces[index], self.barycentric[index])
         which = np.flatnonzero(index) if index.dtype == bool else index
         return SurfacePoints(self.faces.take(which), self.barycentric.take(which, axis=0))
-
-
-def at_corners(mesh: Mesh, faces: IntArray, values: FloatArray) -> FloatArray:
-    """Gather vectors at vertices, (V, 3), at the corners of faces, (3, 3, k).
-
-    The axes of the result are corner, component and face.
-    """
-    return values.take(mesh.faces.take(faces, axis=0), axis=0).transpose(1, 2, 0).copy()
 
 
 def locate_control_points(
@@ -147,16 +140,12 @@ def locate_points(mesh: Mesh, given: ArrayLike | SurfacePoints, name: str) -> Su
         return SurfacePoints(np.zeros(0, np.int64), np.zeros((0, 3)))
     if values.ndim == 1 and np.issubdtype(values.dtype, np.integer):
         return snapped(_points_at_vertices(mesh, values.astype(np.int64), name))
-    if values.ndim == 2 and values.shape[1] == 3 and _is_real(values):
+    if values.ndim == 2 and values.shape[1] == 3 and values.dtype.kind in "iuf":
         return snapped(_points_in_space(mesh, values.astype(np.float64), name))
     raise ControlPointError(f"{name} has shape {values.shape} and type {values.dtype}; {_FORMS}")
 
 
 _FORMS = "pass vertex indices (k,), points on the surface (k, 3) or SurfacePoints"
-
-
-def _is_real(values: NDArray[Any]) -> bool:
-    return np.issubdtype(values.dtype, np.integer) or np.issubdtype(values.dtype, np.floating)
 
 
 def _checked_surface_points(mesh: Mesh, given: SurfacePoints, name: str) -> SurfacePoints:
@@ -228,24 +217,17 @@ def _points_in_space(mesh: Mesh, positions: FloatArray, name: str) -> SurfacePoi
             f"{tolerances.ON_SURFACE:g} of the mesh's diagonal; project it onto the mesh first",
             first,
         )
-    flat = ~np.isfinite(points.barycentric).all(axis=1)
-    for place in np.flatnonzero(flat):
-        corners = mesh.vertices[mesh.faces[points.faces[place]]]
-        points.barycentric[place] = on_longest_edge(corners, positions[place])
     return points
 
 
-def on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
+def _on_longest_edge(corners: FloatArray, position: FloatArray) -> FloatArray:
     """Barycentric coordinates of the nearest point on the longest edge of a degenerate triangle."""
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    start = int(lengths.argmax())
-    end = (start + 1) % 3
-    along = 0.0
-    if lengths[start] > 0.0:
-        side = (corners[end] - corners[start]) / lengths[start]
-        along = float(np.clip((position - corners[start]) @ side / lengths[start], 0.0, 1.0))
+    sides = np.roll(corners, -1, axis=0) - corners
+    start = int(np.linalg.norm(sides, axis=1).argmax())
+    squared = max(sides[start] @ sides[start], tolerances.TINY)
+    along = np.clip((position - corners[start]) @ sides[start] / squared, 0.0, 1.0)
     barycentric = np.zeros(3)
-    barycentric[start], barycentric[end] = 1.0 - along, along
+    barycentric[start], barycentric[(start + 1) % 3] = 1.0 - along, along
     return barycentric
 
 
@@ -265,36 +247,30 @@ def nearest_points(
     Returns
     -------
     SurfacePoints
-        Nearest points. In a face without area, their coordinates are NaN.
+        Nearest points. In a face without area, they are on its longest edge.
     (k,) float array
         Distances, in mesh units.
     """
-    faces = mesh.faces if among is None else mesh.faces[among]
-    if among is None:
-        squared, nearest, places = _nearest_of_all(mesh, positions)
-    else:
-        squared, nearest, places = igl.point_mesh_squared_distance(positions, mesh.vertices, faces)
-    chosen = np.atleast_1d(nearest).astype(np.int64)
-    corners = np.ascontiguousarray(mesh.vertices[faces[chosen]].transpose(1, 0, 2))
-    barycentric = igl.barycentric_coordinates(np.atleast_2d(places), *corners)
-    barycentric = np.clip(barycentric, 0.0, None)
-    barycentric /= barycentric.sum(axis=1, keepdims=True)
-    found = chosen if among is None else among[chosen]
-    return SurfacePoints(found, barycentric), np.sqrt(np.atleast_1d(squared))
-
-
-def _nearest_of_all(mesh: Mesh, positions: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Squared distance, face and position of the points nearest to k positions."""
+    trees = (
+        mesh.face_trees if among is None else [(among, face_tree(mesh.vertices, mesh.faces[among]))]
+    )
     squared = np.full(len(positions), np.inf)
-    nearest = np.zeros(len(positions), dtype=np.int64)
+    faces = np.zeros(len(positions), dtype=np.int64)
     places = np.zeros((len(positions), 3))
-    for part, tree in mesh.face_trees:
-        here = tree.squared_distance(mesh.vertices, mesh.faces[part], positions)
-        nearer = np.atleast_1d(here[0]) < squared
-        squared[nearer] = np.atleast_1d(here[0])[nearer]
-        nearest[nearer] = part.start + np.atleast_1d(here[1])[nearer]
-        places[nearer] = np.atleast_2d(here[2])[nearer]
-    return squared, nearest, places
+    for part, tree in trees:
+        found = tree.squared_distance(mesh.vertices, mesh.faces[part], positions)
+        nearer = np.atleast_1d(found[0]) < squared
+        squared[nearer] = np.atleast_1d(found[0])[nearer]
+        faces[nearer] = part[np.atleast_1d(found[1])[nearer]]
+        places[nearer] = np.atleast_2d(found[2])[nearer]
+    corners = mesh.vertices[mesh.faces[faces]]
+    barycentric = igl.barycentric_coordinates(places, *np.ascontiguousarray(corners.swapaxes(0, 1)))
+    for flat in np.flatnonzero(~np.isfinite(barycentric).all(axis=1)):
+        barycentric[flat] = _on_longest_edge(corners[flat], positions[flat])
+    barycentric = np.clip(barycentric, 0.0, None)
+    return SurfacePoints(faces, barycentric / barycentric.sum(axis=1, keepdims=True)), np.sqrt(
+        squared
+    )
 
 
 def first_hits(
@@ -321,7 +297,7 @@ def first_hits(
     for part, tree in mesh.face_trees:
         of_part = tree.intersect_ray_first(mesh.vertices, mesh.faces[part], *rays)
         sooner = (of_part[0] >= 0) & (of_part[1] < along)
-        faces[sooner] = part.start + of_part[0][sooner]
+        faces[sooner] = part[of_part[0][sooner]]
         along[sooner], places[sooner] = of_part[1][sooner], of_part[2][sooner]
     barycentric = np.stack([1.0 - places.sum(axis=1), *places.T], axis=1).clip(0.0)
     barycentric /= barycentric.sum(axis=1, keepdims=True)
@@ -376,13 +352,10 @@ def coincide(mesh: Mesh, points: SurfacePoints) -> bool:
 
 def _nearest_others(mesh: Mesh, points: SurfacePoints) -> tuple[BoolArray, IntArray]:
     """Whether each point, (k,), coincides with another one, and the index of the nearest other."""
-    count = len(points)
-    if count < 2:
-        return np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
     # The nearest point is the point itself, so two are requested.
     positions = points.positions(mesh)
     distance, found = cKDTree(positions).query(positions, k=2)
-    nearest = np.where(found[:, 0] == np.arange(count), found[:, 1], found[:, 0])
+    nearest = np.where(found[:, 0] == np.arange(len(points)), found[:, 1], found[:, 0])
     return distance[:, 1] <= tolerances.COINCIDENT * mesh.diagonal, nearest.astype(np.int64)
 
 
@@ -411,10 +384,8 @@ def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
 
 def in_faces(mesh: Mesh, points: SurfacePoints, faces: IntArray) -> SurfacePoints:
     """The same points, expressed in other faces that contain them."""
-    corners = mesh.faces
-    return SurfacePoints(
-        faces, weights_at(corners[points.faces], points.barycentric, corners[faces])
-    )
+    weights = weights_at(mesh.faces[points.faces], points.barycentric, mesh.faces[faces])
+    return SurfacePoints(faces, weights)
 
 
 def in_first_faces(mesh: Mesh, points: SurfacePoints) -> SurfacePoints:

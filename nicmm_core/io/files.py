@@ -149,8 +149,8 @@ def _csv_text(curve: SurfaceCurve) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["face", "b0", "b1", "b2", "x", "y", "z"])
-    for face, barycentric, point in zip(
+    points = zip(
         curve.faces.tolist(), curve.barycentric.tolist(), curve.points.tolist(), strict=True
-    ):
-        writer.writerow([face, *barycentric, *point])
+    )
+    writer.writerows([face, *barycentric, *point] for face, barycentric, point in points)
     return text.getvalue()

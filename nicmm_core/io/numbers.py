@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.array_types import FloatArray
 from .polygons import FormatError
 
 LARGEST = 2**31
@@ -36,11 +36,6 @@ def integer(token: bytes) -> int:
     if not -LARGEST < value < LARGEST:
         raise FormatError(f"{quoted(token)} is too large for a count or an index")
     return value
-
-
-def integers(tokens: Sequence[bytes]) -> IntArray:
-    """Convert tokens to integers, see `integer`."""
-    return np.array([integer(token) for token in tokens], dtype=np.int64)
 
 
 def quoted(token: bytes) -> str:

@@ -21,7 +21,6 @@ def read_obj(path: Path) -> Polygons:
     positions: list[bytes] = []
     corners: list[int] = []
     sizes: list[int] = []
-    count = 0
     data = path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     for number, line in enumerate(data.splitlines(), start=1):
         if line[:1] not in b"vf \t":
@@ -35,28 +34,19 @@ def read_obj(path: Path) -> Polygons:
                     f"line {number} has a vertex with only {len(words) - 1} coordinates"
                 )
             positions += words[1:4]
-            count += 1
         elif words[0] == b"f":
             for word in words[1:]:
                 index = integer(word.partition(b"/")[0])
-                if index == 0:
-                    raise FormatError(
-                        f"line {number} refers to vertex {quoted(word)}; indices start at 1"
-                    )
                 # Negative indices count back from the last vertex so far.
-                corners.append(index - 1 if index > 0 else _counted_back(count, index, number))
+                corners.append(index - 1 if index > 0 else len(positions) // 3 + index)
+                if index == 0 or corners[-1] < 0:
+                    raise FormatError(
+                        f"line {number} refers to vertex {quoted(word)} after "
+                        f"{len(positions) // 3} vertices; indices start at 1 or count back from -1"
+                    )
             sizes.append(len(words) - 1)
     return Polygons(
         floats(positions).reshape(-1, 3),
         np.array(corners, dtype=np.int64),
         np.array(sizes, dtype=np.int64),
     )
-
-
-def _counted_back(count: int, index: int, number: int) -> int:
-    """The vertex to which a negative index in line ``number`` refers, after ``count`` vertices."""
-    if count + index < 0:
-        raise FormatError(
-            f"line {number} refers back {-index} vertices, but only {count} precede it"
-        )
-    return count + index

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .numbers import floats, integer, integers, quoted
+from .numbers import floats, integer, quoted
 from .polygons import FormatError, Polygons
 
 _HEADER = re.compile(rb"(ST)?C?N?OFF")
@@ -28,9 +28,8 @@ def read_off(path: Path) -> Polygons:
     lines = [words for words in rows if words]
     if not lines or not _HEADER.fullmatch(lines[0][0]):
         raise FormatError("it does not begin with OFF (binary and 4D OFF are not supported)")
-    head, rest = lines[0][1:], lines[1:]
-    if not head:
-        head, rest = (rest[0], rest[1:]) if rest else ([], [])
+    lines[0] = lines[0][1:]  # the counts may stand beside the name
+    head, *rest = [words for words in lines if words] or [[]]
     if len(head) < 2:
         raise FormatError("it lacks the numbers of vertices and faces")
     n_vertices, n_faces = integer(head[0]), integer(head[1])
@@ -44,8 +43,8 @@ def read_off(path: Path) -> Polygons:
         if len(words) < 3:
             raise FormatError(f"vertex {place} has {len(words)} coordinates")
         positions += words[:3]
-    corners: list[bytes] = []
-    sizes = np.zeros(n_faces, dtype=np.int64)
+    corners: list[int] = []
+    sizes: list[int] = []
     for place, words in enumerate(rest[n_vertices : n_vertices + n_faces]):
         size = integer(words[0])
         if not 0 <= size < len(words):
@@ -53,6 +52,10 @@ def read_off(path: Path) -> Polygons:
                 f"face {place} declares {quoted(words[0])} corners, but its line has "
                 f"{len(words) - 1}"
             )
-        corners += words[1 : size + 1]
-        sizes[place] = size
-    return Polygons(floats(positions).reshape(-1, 3), integers(corners), sizes)
+        corners += map(integer, words[1 : size + 1])
+        sizes.append(size)
+    return Polygons(
+        floats(positions).reshape(-1, 3),
+        np.array(corners, dtype=np.int64),
+        np.array(sizes, dtype=np.int64),
+    )

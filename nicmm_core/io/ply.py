@@ -44,8 +44,8 @@ def read_ply(path: Path) -> Polygons:
     return Polygons(vertices, *(_unrolled(corners, sizes) if strips else (corners, sizes)))
 
 
-def _elements(path: Path) -> dict[str, PlyElement]:
-    """The elements of a file by name."""
+def _elements(path: Path) -> PlyData:
+    """The elements of a file, by their names."""
     data = path.read_bytes()
     end = max(data.find(b"end_header"), 0)
     for count in _COUNT.findall(data, 0, end):
@@ -54,16 +54,12 @@ def _elements(path: Path) -> dict[str, PlyElement]:
             raise FormatError("its header declares more rows than the file has room for")
     if not data[:end].isascii():  # as in a comment, but the parser takes nothing else
         header = data[:end].decode("ascii", "replace").replace("\ufffd", "?").encode("ascii")
-        return _by_name(PlyData.read(io.BytesIO(header + data[end:])))
+        return PlyData.read(io.BytesIO(header + data[end:]))
     for corners in (3, 4):  # faces of one size are read at once
         lengths = dict.fromkeys(_CORNERS, corners)
         with contextlib.suppress(PlyParseError):
-            return _by_name(PlyData.read(path, known_list_len={"face": lengths}))
-    return _by_name(PlyData.read(path))
-
-
-def _by_name(data: PlyData) -> dict[str, PlyElement]:
-    return {element.name: element for element in data}
+            return PlyData.read(path, known_list_len={"face": lengths})
+    return PlyData.read(path)
 
 
 def _corners(faces: PlyElement) -> tuple[IntArray, IntArray]:
@@ -71,10 +67,8 @@ def _corners(faces: PlyElement) -> tuple[IntArray, IntArray]:
     lists = faces[next((name for name in _CORNERS if name in faces), _CORNERS[0])]
     sizes = np.array([len(corners) for corners in lists], dtype=np.int64)
     values = np.concatenate([np.zeros(0), *lists])
-    # Written so that NaN fails too. Larger numbers are not indices, and might overflow.
-    if not (np.abs(values) < 2.0**53).all():
-        raise FormatError("its faces have corners that are not indices")
-    if (values != np.round(values)).any():
+    # Written so that NaN fails too. Larger numbers might overflow.
+    if not ((np.abs(values) < 2.0**53) & (values == np.round(values))).all():
         raise FormatError("its faces have corners that are not whole numbers")
     return values.astype(np.int64), sizes
 

@@ -7,16 +7,15 @@ neighbouring points close to each other are merged. Where that would make the cu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import without_small_weights
+from ..geometry.curve import SurfaceCurve, without_small_weights
+from ..geometry.distances import distance_to_segments
 from ..geometry.mesh import Mesh
-from ..geometry.surface_points import weights_at
-from ..geometry.tolerances import TINY
+from ..geometry.surface_points import SurfacePoints, weights_at
 
 
 @dataclass(frozen=True)
@@ -26,56 +25,76 @@ class Chain:
     Attributes
     ----------
     closed : bool
-    faces : (m,) int array
-        A face of the mesh that contains each place.
-    barycentric : (m, 3) float array
-        Coordinates in that face, exactly zero at corners that do not support the place.
-    first_point : (m,) int array
-        Index of the first point of the curve that is merged into each place.
+    places : SurfacePoints
+        The m places. Coordinates are exactly zero at corners that do not support the place.
     point : (m,) int array
         Index of the point of the curve from which each place has its coordinates.
     segment_faces : (m,) int array
         A face that contains each place and the next one; without meaning at the end of an open
         curve.
+    place_of : (n,) int array
+        Index of the place into which each point of the curve is merged. A point that is omitted
+        belongs to the place before it.
     """
 
     closed: bool
-    faces: IntArray
-    barycentric: FloatArray
-    first_point: IntArray
+    places: SurfacePoints
     point: IntArray
     segment_faces: IntArray
+    place_of: IntArray
 
     def __len__(self) -> int:
-        return len(self.faces)
+        return len(self.places)
 
 
 def build_chain(
     mesh: Mesh,
-    closed: bool,
-    faces: IntArray,
-    barycentric: FloatArray,
+    curve: SurfaceCurve,
     segment_faces: IntArray,
+    used: IntArray,
     margin: FloatArray,
     must_keep: BoolArray,
 ) -> Chain:
-    """Snap the points of a curve to nearby vertices and edges, and merge neighbouring points.
+    """Snap points of a curve to nearby vertices and edges, and merge neighbouring points.
 
     Parameters
     ----------
     mesh : Mesh
-    closed : bool
-    faces, barycentric, segment_faces : arrays
-        The n points of the curve and the faces of its segments, as from `checked_curve`.
+    curve : SurfaceCurve
+        A curve of n points, as from `checked_curve`.
+    segment_faces : (n,) int array
+        The faces of its segments, as from `checked_curve`.
+    used : (u,) int array
+        The points from which the chain is built, ascending; other points are omitted.
     margin : (n,) float array
         Barycentric coordinates up to this become zero, and neighbours whose coordinates differ by
         less are merged.
     must_keep : (n,) bool array
         Points, such as control points, whose coordinates a merged place takes.
     """
-    barycentric = without_small_weights(barycentric, margin)
-    corners = mesh.faces[faces]
-    n = len(faces)
+    margin, corners = margin[used], mesh.faces[curve.faces[used]]
+    barycentric = without_small_weights(curve.barycentric[used], margin)
+    begins = _runs(corners, barycentric, margin, curve.closed)
+    # The points before the first run belong to the last one.
+    run_of = (np.searchsorted(begins, np.arange(len(used)), side="right") - 1) % len(begins)
+    along = np.roll(np.arange(len(used)), -begins[0])
+    kept = along[must_keep[used[along]]][::-1]
+    source = begins.copy()
+    source[run_of[kept]] = kept  # of several in one run, the first is assigned last
+    last = np.roll(begins, -1) - 1
+    used_before = np.searchsorted(used, np.arange(len(curve.faces)), side="right") - 1
+    return Chain(
+        curve.closed,
+        SurfacePoints(curve.faces[used[source]], barycentric[source]),
+        used[source],
+        segment_faces[used[last]],
+        run_of[used_before],
+    )
+
+
+def _runs(corners: IntArray, barycentric: FloatArray, margin: FloatArray, closed: bool) -> IntArray:
+    """Indices at which runs of points that are merged begin, ascending."""
+    n = len(corners)
     following = (np.arange(n) + 1) % n
     support = np.sort(np.where(barycentric > 0.0, corners, -1), axis=1)
     same = (support == support[following]).all(axis=1)
@@ -83,122 +102,57 @@ def build_chain(
     near = np.abs(theirs - barycentric).max(axis=1) < np.minimum(margin, margin[following])
     at_vertex = (barycentric > 0.0).sum(axis=1) == 1
     joins = same & (near | at_vertex)  # with the next point
-    if not closed:
-        joins[-1] = False
-    begins = np.array([0]) if joins.all() else np.flatnonzero(~np.roll(joins, 1))
-    # A long run of close points is split where a point is no longer close to the first one.
-    begins = _broken_runs(begins, joins, faces, barycentric, corners, margin)
-    ends = np.roll(begins, -1)
-    count = (ends - begins - 1) % n + 1
-    point = np.array(
-        [
-            next((p for p in _run(b, c, n) if must_keep[p]), b)
-            for b, c in zip(begins.tolist(), count.tolist(), strict=True)
-        ],
-        dtype=np.int64,
-    )
-    last = (ends - 1) % n
-    return Chain(closed, faces[point], barycentric[point], begins, point, segment_faces[last])
+    joins[-1] &= closed
+    begins: list[int] = []
+    first = int((~np.roll(joins, 1)).argmax())
+    for point in [*range(first, n), *range(first)]:
+        if begins and joins[point - 1]:
+            # A long run of close points is split where one is no longer close to the first one.
+            start = begins[-1]
+            here = weights_at(corners[[point]], barycentric[[point]], corners[[start]])[0]
+            if at_vertex[point] or np.abs(here - barycentric[start]).max() < margin[point]:
+                continue
+        begins.append(point)
+    return np.sort(np.array(begins, dtype=np.int64))
 
 
-def _broken_runs(
-    begins: IntArray,
-    joins: BoolArray,
-    faces: IntArray,
-    barycentric: FloatArray,
-    corners: IntArray,
-    margin: FloatArray,
-) -> IntArray:
-    """Split runs of joined points where a point is farther than the margin from the first one."""
-    n = len(joins)
-    found = []
-    bounds = [*begins.tolist(), int(begins[0]) + n]
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
-        first = begin
-        found.append(first)
-        for p in range(begin + 1, end):
-            here = p % n
-            theirs = weights_at(corners[[here]], barycentric[[here]], corners[[first % n]])[0]
-            at_vertex = np.count_nonzero(theirs) == 1
-            if not at_vertex and np.abs(theirs - barycentric[first % n]).max() >= margin[here]:
-                first = p
-                found.append(here)
-    return np.sort(np.array(found, dtype=np.int64) % n)
-
-
-def _run(begin: int, count: int, n: int) -> list[int]:
-    return [(begin + k) % n for k in range(count)]
-
-
-def superfluous_points(
+def necessary_points(
     positions: FloatArray,
     barycentric: FloatArray,
-    faces: IntArray,
     closed: bool,
     must_keep: BoolArray,
     deviation: float,
-) -> BoolArray:
-    """Points inside faces that can be omitted without moving the curve by more than a deviation.
+) -> IntArray:
+    """Indices of points of a curve without which it would move by more than a deviation, ascending.
+
+    Only points inside faces are omitted.
 
     Parameters
     ----------
     positions : (n, 3) float array
     barycentric : (n, 3) float array
-    faces : (n,) int array
     closed : bool
     must_keep : (n,) bool array
         Points to keep.
     deviation : float
         Largest distance by which the curve may move, in mesh units.
-
-    Returns
-    -------
-    (n,) bool array
-        True for points that can be omitted.
     """
-    n = len(faces)
-    free = (barycentric > 0.0).all(axis=1) & ~must_keep
+    n = len(positions)
+    kept = ~(barycentric > 0.0).all(axis=1) | must_keep
     if not closed:
-        free[[0, -1]] = False
-    superfluous = np.zeros(n, dtype=bool)
-    if deviation <= 0.0 or free.all():
-        return superfluous
+        kept[[0, -1]] = True
+    if deviation <= 0.0 or not kept.any():
+        return np.arange(n)
     # Between two points that are kept, the curve does not leave the face.
-    stays = np.flatnonzero(~free).tolist()
-    waiting = list(zip(stays, [*stays[1:], stays[0] + n], strict=True))
+    ends = np.flatnonzero(kept).tolist()
+    waiting = list(zip(ends, [*ends[1:], ends[0] + n], strict=True))
     while waiting:
         begin, end = waiting.pop()
         between = np.arange(begin + 1, end) % n
-        if not len(between) or (not closed and end >= n):
-            continue
-        start, along = positions[begin % n], positions[end % n] - positions[begin % n]
-        offset = positions[between] - start
-        share = np.clip(offset @ along / max(along @ along, TINY), 0.0, 1.0)
-        distance = np.linalg.norm(offset - share[:, None] * along, axis=1)
-        if distance.max() <= deviation:
-            superfluous[between] = True
-            continue
-        middle = begin + 1 + int(distance.argmax())
-        waiting += [(begin, middle), (middle, end)]
-    return superfluous
-
-
-def points_of(chain: Chain, places: Sequence[int], kept: IntArray, n_points: int) -> IntArray:
-    """Indices of the points of a curve that are merged into some places or their neighbours.
-
-    Parameters
-    ----------
-    chain : Chain
-        Chain built from some of the points of the curve.
-    places : sequence of int
-        Indices of the places in the chain.
-    kept : (k,) int array
-        Indices of the points of the curve from which the chain was built.
-    n_points : int
-        Number of points of the curve.
-    """
-    near = {(place + step) % len(chain) for place in places for step in (-1, 0, 1)}
-    begins = kept[chain.first_point]
-    count = (np.roll(begins, -1) - begins - 1) % n_points + 1
-    runs = [_run(int(begins[p]), int(count[p]), n_points) for p in sorted(near)]
-    return np.array([point for run in runs for point in run], dtype=np.int64)
+        start, stop = positions[[begin % n]], positions[[end % n]]
+        distance = distance_to_segments(positions[between], start, stop)
+        if distance.max(initial=0.0) > deviation:
+            middle = begin + 1 + int(distance.argmax())
+            kept[middle % n] = True
+            waiting += [(begin, middle), (middle, end)]
+    return np.flatnonzero(kept)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,11 @@ import numpy as np
 from ..arguments import number_between
 from ..errors import CurveError
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
-from ..geometry.curve import SurfaceCurve, checked_curve
+from ..geometry.curve import SurfaceCurve, checked_curve, points_of
 from ..geometry.mesh import Mesh, adjacent_sides, sides_among
-from ..geometry.surface_points import SurfacePoints, weights_at
+from ..geometry.surface_points import in_faces, weights_at
 from ..geometry.tolerances import ROUNDED
-from .chain import Chain, build_chain, points_of, superfluous_points
+from .chain import Chain, build_chain, necessary_points
 from .triangulation import ConstraintError, FaceTriangulation
 
 SNAP_CUT = 1e-3
@@ -185,36 +185,25 @@ def cut_mesh(
     snap = number_between("snap", snap, 0.0, LARGEST_SNAP)
     deviation = number_between("deviation", deviation, 0.0, np.inf, "a length")
     curve, segment_faces = checked_curve(mesh, curve)
-    faces, barycentric = curve.faces, curve.barycentric
-    must_keep = np.zeros(len(faces), dtype=bool)
+    must_keep = np.zeros(len(curve.faces), dtype=bool)
     must_keep[curve.control_index[curve.control_index >= 0]] = True
-    exact = np.zeros(len(faces), dtype=bool)
-    positions = SurfacePoints(faces, barycentric).positions(mesh)
+    exact = np.zeros(len(curve.faces), dtype=bool)
+    positions = points_of(curve).positions(mesh)
     while True:
         margin = np.where(exact, ROUNDED, max(snap, ROUNDED))
-        kept = np.flatnonzero(
-            ~superfluous_points(
-                positions, barycentric, faces, curve.closed, must_keep | exact, deviation
-            )
+        used = necessary_points(
+            positions, curve.barycentric, curve.closed, must_keep | exact, deviation
         )
-        chain = build_chain(
-            mesh,
-            curve.closed,
-            faces[kept],
-            barycentric[kept],
-            segment_faces[kept],
-            margin[kept],
-            must_keep[kept],
-        )
+        chain = build_chain(mesh, curve, segment_faces, used, margin, must_keep)
         try:
-            cut = _cut(mesh, chain)
-            return replace(cut, chain_point=kept[cut.chain_point])
+            return _cut(mesh, chain)
         except _ContactError as contact:
-            there = points_of(chain, contact.places, kept, len(faces))
+            near = [(np.array(contact.places) + step) % len(chain) for step in (-1, 0, 1)]
+        there = np.flatnonzero(np.isin(chain.place_of, near))
         if exact[there].all():
             raise CurveError(
-                f"curve crosses or touches itself near its points {sorted(set(there.tolist()))}; "
-                "only a simple curve can be cut"
+                f"curve crosses or touches itself near its points {there.tolist()}; only a simple "
+                "curve can be cut"
             )
         exact[there] = True
 
@@ -229,10 +218,21 @@ class _ContactError(Exception):
 
 @dataclass(frozen=True)
 class _Places:
-    """Indices of the places of a chain, by the vertex, edge or face that contains them."""
+    """Places of a chain, sorted by the vertex, edge or face that contains them.
 
-    at_vertex: dict[int, int]  # the place at each vertex
-    on_edge: dict[tuple[int, int], list[int]]  # in order from the smaller vertex
+    Attributes
+    ----------
+    support : list of tuples of int
+        For each place the vertices of the vertex, edge or face, ascending.
+    by_support : dict
+        Places by their support: the one at a vertex, or those on an edge, in order from its smaller
+        vertex.
+    in_face : dict
+        Places inside each face.
+    """
+
+    support: list[tuple[int, ...]]
+    by_support: dict[tuple[int, ...], list[int]]
     in_face: dict[int, list[int]]
 
 
@@ -240,104 +240,78 @@ def _cut(mesh: Mesh, chain: Chain) -> CutMesh:
     """Cut a mesh along a chain, or raise _ContactError."""
     if len(chain) < (3 if chain.closed else 2):
         raise _ContactError(list(range(len(chain))))
-    corners = mesh.faces[chain.faces]
-    count = (chain.barycentric > 0.0).sum(axis=1)
-    places = _places(chain, corners, count)
-    is_new = count > 1
-    number = np.cumsum(is_new) - 1 + len(mesh.vertices)
-    vertex = np.where(is_new, number, -1)
-    for at, place in places.at_vertex.items():
-        vertex[place] = at
-    segments = _segments_inside(chain, corners, places)
+    corners, weights = mesh.faces[chain.places.faces], chain.places.barycentric
+    places = _places(chain, corners)
+    is_new = (weights > 0.0).sum(axis=1) > 1
+    largest = corners[np.arange(len(chain)), weights.argmax(axis=1)]
+    vertex = np.where(is_new, np.cumsum(is_new) - 1 + len(mesh.vertices), largest)
+    segments = _segments_inside(chain, places)
 
-    affected = set(segments) | set(places.in_face) | set(_faces_beside(mesh, places))
-    parts: list[tuple[int, int, int]] = []
-    source: list[int] = []
-    for face in sorted(affected):
-        triangles = _face_parts(mesh, face, chain, places, vertex, segments.get(face, []))
-        parts += triangles
-        source += [face] * len(triangles)
-
-    stays = np.ones(len(mesh.faces), dtype=bool)
-    stays[sorted(affected)] = False
-    new_face, new_barycentric = chain.faces[is_new], chain.barycentric[is_new]
-    corner_positions = mesh.vertices[mesh.faces[new_face]]
-    positions = (new_barycentric[:, :, None] * corner_positions).sum(axis=1)
+    cut_faces = sorted(set(segments) | set(places.in_face) | set(_faces_beside(mesh, places)))
+    parts = [
+        _face_parts(mesh, face, chain, places, vertex, segments.get(face, [])) for face in cut_faces
+    ]
+    source = [face for face, triangles in zip(cut_faces, parts, strict=True) for _ in triangles]
+    stays = np.setdiff1d(np.arange(len(mesh.faces)), cut_faces)
+    new = chain.places[is_new]
     return CutMesh(
-        vertices=np.concatenate([mesh.vertices, positions]),
-        faces=np.concatenate([mesh.faces[stays], np.array(parts, np.int64).reshape(-1, 3)]),
-        source_face=np.concatenate([np.flatnonzero(stays), np.array(source, dtype=np.int64)]),
-        new_face=new_face,
-        new_barycentric=new_barycentric,
+        vertices=np.concatenate([mesh.vertices, new.positions(mesh)]),
+        faces=np.concatenate([mesh.faces[stays], *parts]),
+        source_face=np.concatenate([stays, np.array(source, dtype=np.int64)]),
+        new_face=new.faces,
+        new_barycentric=new.barycentric,
         chain=vertex,
         closed=chain.closed,
         chain_point=chain.point,
     )
 
 
-def _places(chain: Chain, corners: IntArray, count: IntArray) -> _Places:
+def _places(chain: Chain, corners: IntArray) -> _Places:
     """Sort places by their location; raise _ContactError if two of them coincide."""
-    at_vertex: dict[int, int] = {}
-    on_edge: dict[tuple[int, int], list[int]] = defaultdict(list)
-    in_face: dict[int, list[int]] = defaultdict(list)
-    share = np.zeros(len(chain))
-    for place, (row, weights) in enumerate(zip(corners, chain.barycentric, strict=True)):
-        if count[place] == 3:
-            in_face[int(chain.faces[place])].append(place)
-            continue
-        (here,) = np.nonzero(weights > 0.0)
-        if count[place] == 1:
-            vertex = int(row[here[0]])
-            if vertex in at_vertex:
-                raise _ContactError([at_vertex[vertex], place])
-            at_vertex[vertex] = place
-            continue
-        first, second = sorted(here, key=lambda corner: row[corner])
-        # Computed from both weights, so that rounding cannot make the share 0 or 1.
-        share[place] = weights[second] / (weights[first] + weights[second])
-        on_edge[int(row[first]), int(row[second])].append(place)
-    for along in on_edge.values():
-        along.sort(key=lambda place: share[place])
-        for one, other in zip(along[:-1], along[1:], strict=True):
+    places = _Places([], defaultdict(list), defaultdict(list))
+    share = []
+    rows = zip(corners.tolist(), chain.places.barycentric.tolist(), strict=True)
+    for place, (row, weights) in enumerate(rows):
+        support = sorted((v, w) for v, w in zip(row, weights, strict=True) if w > 0.0)
+        places.support.append(tuple(v for v, _ in support))
+        # Computed from both weights, so that rounding cannot make a share on an edge 0 or 1.
+        share.append(support[-1][1] / sum(w for _, w in support))
+        if len(support) == 3:
+            places.in_face[int(chain.places.faces[place])].append(place)
+        else:
+            places.by_support[places.support[place]].append(place)
+    for along in places.by_support.values():
+        along.sort(key=share.__getitem__)
+        for one, other in itertools.pairwise(along):
             if share[one] == share[other]:
                 raise _ContactError([one, other])
-    return _Places(at_vertex, dict(on_edge), dict(in_face))
+    return places
 
 
-def _segments_inside(
-    chain: Chain, corners: IntArray, places: _Places
-) -> dict[int, list[tuple[int, int]]]:
+def _segments_inside(chain: Chain, places: _Places) -> dict[int, list[tuple[int, int]]]:
     """Segments through the interior of faces, as pairs of places, by face.
 
     A segment along an edge needs no cut. If it passes over another place, _ContactError is raised.
     """
     inside: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    support = [
-        frozenset(row[weights > 0.0].tolist())
-        for row, weights in zip(corners, chain.barycentric, strict=True)
-    ]
     n = len(chain)
     for place in range(n if chain.closed else n - 1):
         following = (place + 1) % n
-        together = support[place] | support[following]
+        together = sorted({*places.support[place], *places.support[following]})
         if len(together) > 2:
             inside[int(chain.segment_faces[place])].append((place, following))
             continue
-        low, high = sorted(together)
-        order: list[int] = places.on_edge.get((low, high), [])
-        where = [
-            order.index(p) if len(support[p]) == 2 else (-1 if support[p] == {low} else len(order))
-            for p in (place, following)
-        ]
-        if abs(where[0] - where[1]) != 1:
-            between = order[max(min(where) + 1, 0) : max(where)]
-            raise _ContactError([place, following, *between])
-    return dict(inside)
+        edge = [(together[0],), tuple(together), (together[1],)]
+        along = [there for part in edge for there in places.by_support.get(part, [])]
+        first, last = sorted([along.index(place), along.index(following)])
+        if last - first > 1:
+            raise _ContactError(along[first : last + 1])
+    return inside
 
 
 def _faces_beside(mesh: Mesh, places: _Places) -> list[int]:
     """Faces that have a place on one of their edges."""
-    edges = np.array(list(places.on_edge), dtype=np.int64).reshape(-1, 2)
+    edges = np.array([at for at in places.by_support if len(at) == 2], np.int64).reshape(-1, 2)
     candidates = mesh.faces_at(np.unique(edges))
     cut = sides_among(mesh.faces[candidates], edges).reshape(-1, 3)
     return candidates[cut.any(axis=1)].tolist()
@@ -350,8 +324,8 @@ def _face_parts(
     places: _Places,
     vertex: IntArray,
     segments: list[tuple[int, int]],
-) -> list[tuple[int, int, int]]:
-    """Triangles that replace one face, as triples of vertices of the cut mesh.
+) -> IntArray:
+    """Triangles that replace one face, in vertices of the cut mesh, (t, 3).
 
     Parameters
     ----------
@@ -367,15 +341,14 @@ def _face_parts(
     corners = mesh.faces[face].tolist()
     sides = []
     for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
-        along = places.on_edge.get((min(start, end), max(start, end)), [])
+        along = places.by_support.get((min(start, end), max(start, end)), [])
         sides.append(along if start < end else along[::-1])
     inner = places.in_face.get(face, [])
     new = np.array([*itertools.chain(*sides), *inner], dtype=np.int64)
-    local = {places.at_vertex[v]: k for k, v in enumerate(corners) if v in places.at_vertex}
+    local = {place: k for k, v in enumerate(corners) for place in places.by_support.get((v,), [])}
     local.update((place, 3 + k) for k, place in enumerate(new.tolist()))
-    theirs = mesh.faces[np.full(len(new), face)]
-    inserted = weights_at(mesh.faces[chain.faces[new]], chain.barycentric[new], theirs)
-    weights = np.concatenate([np.eye(3), inserted])
+    inserted = in_faces(mesh, chain.places[new], np.full(len(new), face))
+    weights = np.concatenate([np.eye(3), inserted.barycentric])
     triangulation = FaceTriangulation(weights, _flattened(mesh.vertices[corners], weights))
     try:
         for corner, along in enumerate(sides):
@@ -388,18 +361,13 @@ def _face_parts(
         meeting = [place for place, at in local.items() if at in error.points]
         raise _ContactError(meeting) from error
     triangulation.improve()
-    ids = [*corners, *vertex[new].tolist()]
-    return [(ids[a], ids[b], ids[c]) for a, b, c in triangulation.triangles]
+    return np.append(corners, vertex[new])[triangulation.triangles]
 
 
 def _flattened(corners: FloatArray, weights: FloatArray) -> FloatArray:
     """Points of a face in its plane, (n, 2); a face without height counts as equilateral."""
-    one, other = corners[1] - corners[0], corners[2] - corners[0]
-    length = np.linalg.norm(one)
-    x, y = one @ other, float(np.linalg.norm(np.cross(one, other)))
-    longest = max(length, np.linalg.norm(other), np.linalg.norm(other - one))
-    if y > FLAT * longest**2:
-        flat = np.array([[0.0, 0.0], [length, 0.0], [x / length, y / length]])
-    else:
-        flat = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
-    return weights @ flat
+    _, sides = np.linalg.qr((corners[1:] - corners[0]).T)  # from the first corner, in columns
+    longest = np.linalg.norm([*sides.T, sides[:, 1] - sides[:, 0]], axis=1).max()
+    if np.abs(np.linalg.det(sides)) <= FLAT * longest**2:
+        sides = np.array([[1.0, 0.5], [0.0, 0.75**0.5]])
+    return weights[:, 1:] @ sides.T

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
-from ..geometry.grouping import components
-from ..geometry.mesh import adjacent_sides, joined_corners, side_corners, sides_among
+from ..geometry.mesh import Mesh, adjacent_sides, joined_corners, side_corners, sides_among
 from .cut import CutMesh
 
 
@@ -68,12 +67,6 @@ def part_mesh(cut: CutMesh) -> PartedMesh:
     number = owner.copy()
     number[by_vertex[again]] = n_vertices + np.arange(again.sum())
     source_vertex = np.concatenate([np.arange(n_vertices), owner[by_vertex[again]]])
-    parted = number[group]
-    return PartedMesh(cut.vertices[source_vertex], parted, source_vertex, _parts(parted))
-
-
-def _parts(faces: IntArray) -> IntArray:
-    """Index of the component of each face, (F,); faces with a common vertex are connected."""
-    one, other = faces[:, :2].ravel(), faces[:, 1:].ravel()
-    _, label = components(int(faces.max()) + 1, one, other)
-    return np.unique(label[faces[:, 0]], return_inverse=True)[1]
+    vertices, faces = cut.vertices[source_vertex], number[group]
+    _, part = np.unique(Mesh(vertices, faces).face_component, return_inverse=True)
+    return PartedMesh(vertices, faces, source_vertex, part)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.array_types import FloatArray, IntArray
+from ..geometry.grouping import components
 from .cut import CutMesh
 
 
@@ -51,25 +52,17 @@ def cut_polygons(cut: CutMesh, source_polygon: IntArray, joined: bool = True) ->
         The parts of polygons that were cut; other polygons are not included.
     """
     polygon = source_polygon[cut.source_face]
-    is_cut = np.zeros(len(source_polygon), dtype=bool)
-    is_cut[cut.source_face[np.flatnonzero(np.diff(cut.source_face, append=-1) == 0)]] = True
+    is_cut = np.bincount(cut.source_face) > 1
     pairs, on_chain = cut.adjacent_faces
     one, other = pairs.T
     # The curve may also cut a polygon along a diagonal without cutting a triangle.
     along = polygon[one][on_chain & (polygon[one] == polygon[other])]
     touched = np.isin(polygon, np.concatenate([source_polygon[is_cut], along]))
-    joins = (
-        ~on_chain & touched[one] & touched[other] & (polygon[one] == polygon[other])
-        if joined
-        else np.zeros(len(one), dtype=bool)
-    )
-    group = np.arange(len(cut.faces))
-    members = {face: [face] for face in np.flatnonzero(touched).tolist()}
-    for a, b in zip(one[joins].tolist(), other[joins].tolist(), strict=True):
-        a, b = int(group[a]), int(group[b])
-        if a != b:
-            group[members[b]] = a
-            members[a] += members.pop(b)
+    joins = joined & ~on_chain & (polygon[one] == polygon[other])
+    _, group = components(len(cut.faces), one[joins], other[joins])
+    members = defaultdict(list)
+    for face in np.flatnonzero(touched).tolist():
+        members[int(group[face])].append(face)
 
     corners: list[list[int]] = []
     triangles: list[list[int]] = []
@@ -92,25 +85,23 @@ def _outline(cut: CutMesh, faces: list[int]) -> list[tuple[int, int]] | None:
     """
     if not _is_flat(cut.vertices, cut.faces[faces]):
         return None
-    after: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    sides = {(a, b) for f in faces for a, b in _sides_of(cut, f)}
-    for face in faces:
-        for a, b in _sides_of(cut, face):
-            if (b, a) not in sides or (a, b) in cut.directed_chain_edges:
-                after[a].append((b, face))
-    if len(after) != len(np.unique(cut.faces[faces])) or any(len(n) > 1 for n in after.values()):
+    sides = [(a, b, face) for face in faces for a, b in _sides_of(cut, face)]
+    found = {(a, b) for a, b, _ in sides}
+    rim = [
+        (a, b, face)
+        for a, b, face in sides
+        if (b, a) not in found or (a, b) in cut.directed_chain_edges
+    ]
+    after = {a: (b, face) for a, b, face in rim}
+    if not len(rim) == len(after) == len(np.unique(cut.faces[faces])):
         return None
-    start = min(after)
-    outline, here = [], start
-    while True:
-        following, face = after[here][0]
+    start = here = min(after)
+    outline = []
+    while here in after:
+        following, face = after.pop(here)
         outline.append((here, face))
         here = following
-        if here == start:
-            break
-        if len(outline) > len(after) or here not in after:
-            return None
-    return outline if len(outline) == len(after) else None
+    return outline if here == start and not after else None
 
 
 def _sides_of(cut: CutMesh, face: int) -> list[tuple[int, int]]:

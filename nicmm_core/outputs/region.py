@@ -56,8 +56,7 @@ class Region:
         cut : CutMesh
             The cut mesh from which this region was computed.
         """
-        side = _sides(cut)
-        return _region(mesh, cut, (side != 0) & ~self.cut_faces)
+        return _region(mesh, cut, (_sides(cut) != 0) & ~self.cut_faces)
 
     def vertices(self, mesh: Mesh) -> BoolArray:
         """Whether each input vertex is inside or on the curve, (V,).
@@ -124,8 +123,7 @@ def _region(mesh: Mesh, cut: CutMesh, inside: BoolArray) -> Region:
 
 def _sides(cut: CutMesh) -> IntArray:
     """1 or -1 for faces that are connected to the curve, 0 for other faces, (F',)."""
-    n_faces = len(cut.faces)
-    part, side = two_sides(n_faces, *cut.adjacent_faces)
+    part, side = two_sides(len(cut.faces), *cut.adjacent_faces)
     beside = sides_among(cut.faces, cut.chain_edges).reshape(-1, 3).any(axis=1)
     with_curve = np.isin(part, part[beside])
     if (side == 0)[with_curve].any():
@@ -144,15 +142,12 @@ def _side_at(mesh: Mesh, cut: CutMesh, side: IntArray, side_of: ArrayLike | Surf
     point = locate_points(mesh, side_of, "side_of")
     if len(point) != 1:
         raise ControlPointError(f"side_of has {len(point)} points; pass one")
-    source, target = int(point.faces[0]), point.barycentric[0]
-    among = np.flatnonzero(cut.source_face == source)
-    weights = cut.corner_weights(mesh)[among]
+    parts = np.flatnonzero(cut.source_face == point.faces[0])
+    weights = cut.corner_weights(mesh)[parts]
     # Coordinates in each part of the face. The point lies in the part with the greatest minimum.
-    right = np.tile(target[:, None], (len(among), 1, 1))
-    inside = np.linalg.solve(weights.transpose(0, 2, 1), right)
+    inside = np.linalg.solve(weights.transpose(0, 2, 1), point.barycentric[:, :, None])
     least = inside.min(axis=1).ravel()
-    holding = among[least >= least.max() - 1e-9]
-    sides = np.unique(side[holding])
+    sides = np.unique(side[parts[least >= least.max() - 1e-9]])
     if len(sides) > 1:
         raise ControlPointError("side_of lies on the curve; choose a point beside it")
     if sides[0] == 0:

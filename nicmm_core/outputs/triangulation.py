@@ -112,11 +112,7 @@ class FaceTriangulation:
                 crossed.append((a, b))
                 continue
             self._flip(a, b)
-            ends = {c, d}
-            if (
-                not ends & {start, end}
-                and self._turn(start, end, c) * self._turn(start, end, d) < 0
-            ):
+            if self._turn(start, end, c) * self._turn(start, end, d) < 0:
                 crossed.append((c, d))
         self._fixed |= {(start, end), (end, start)}
 
@@ -143,11 +139,10 @@ class FaceTriangulation:
         for (corner, right), left in list(self._third.items()):
             if corner != start:
                 continue
-            turns = self._turn(start, end, right), self._turn(start, end, left)
-            if turns[0] == 0 and self._is_ahead(start, right, end):
-                raise ConstraintError((start, end, right))
-            if turns[1] == 0 and self._is_ahead(start, left, end):
-                raise ConstraintError((start, end, left))
+            turns = [self._turn(start, end, side) for side in (right, left)]
+            for side, turn in zip((right, left), turns, strict=True):
+                if turn == 0 and self._is_ahead(start, side, end):
+                    raise ConstraintError((start, end, side))
             if turns[0] < 0 < turns[1]:
                 break
         else:

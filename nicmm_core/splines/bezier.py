@@ -119,7 +119,7 @@ def fit_bezier(
     right = places[:-1] + handles[:, :1] * after[:-1]
     left = places[1:] - handles[:, 1:] * before[1:]
     if closed:
-        left = np.concatenate([left[-1:], left[:-1]])
+        left = np.roll(left, 1, axis=0)
     else:
         right = np.concatenate([right, 2.0 * places[-1:] - left[-1:]])
         left = np.concatenate([2.0 * places[:1] - right[:1], left])
@@ -135,36 +135,59 @@ of each cubic from its span of the polyline, (s,), which is infinite where the c
 
 
 @dataclass(frozen=True)
-class _Problem:
-    """A least-squares problem: the handles of s cubics, fitted to n points, each on one span."""
+class _Spans:
+    """Spans of a polyline, to each of which a cubic with given ends and tangents is fitted.
 
-    ends: tuple[FloatArray, FloatArray]
-    """(s, 3) each, start and end of each cubic."""
+    Attributes
+    ----------
+    start, end : (s, 3) float array
+        Ends of each span.
+    first, last : (s, 3) float array
+        Forward unit tangents at these ends.
+    length : (s,) float array
+        Arc length of each span.
+    first_row : (s,) int array
+        Index of the first target of each span.
+    span : (n,) int array
+        The span of each target, ascending.
+    target : (n, 3) float array
+        Points to which the cubics are fitted: all vertices, and others evenly between the ends.
+    weight : (n,) float array
+        Weight of each target, since vertices may be close together: arc length.
+    """
+
+    start: FloatArray
+    end: FloatArray
     first: FloatArray
     last: FloatArray
-    """(s, 3) unit tangents at the ends, forward."""
     length: FloatArray
-    """(s,) arc lengths of the spans."""
-    span: IntArray
-    """(n,) the span of each point, ascending."""
     first_row: IntArray
-    """(s,) the first point of each span."""
-    weight: FloatArray
-    """(n,) weights of the points."""
+    span: IntArray
     target: FloatArray
-    """(n, 3) positions of the points."""
+    weight: FloatArray
+
+    def cubics(self, handles: FloatArray) -> FloatArray:
+        """Control points of the cubics with handles of given lengths, (s, 2), shape (s, 4, 3)."""
+        out, back = handles[:, :1] * self.first, handles[:, 1:] * self.last
+        return np.stack([self.start, self.start + out, self.end - back, self.end], axis=1)
 
     def least_squares(self, parameter: FloatArray) -> FloatArray:
         """Lengths of both handles of each cubic, (s, 2), within their limits."""
         span, first, last = self.span, self.first, self.last
         basis = _bernstein(parameter)
-        base = self.target - basis[:, :2].sum(axis=1)[:, None] * self.ends[0][span]
-        base -= basis[:, 2:].sum(axis=1)[:, None] * self.ends[1][span]
+        base = self.target - basis[:, :2].sum(axis=1)[:, None] * self.start[span]
+        base -= basis[:, 2:].sum(axis=1)[:, None] * self.end[span]
         out, back = basis[:, 1], -basis[:, 2]
-        out_out, back_back = self._sums(out * out), self._sums(back * back)
-        out_back = self._sums(out * back) * (first * last).sum(axis=1)
-        out_target = self._sums(out * (base * first[span]).sum(axis=1))
-        back_target = self._sums(back * (base * last[span]).sum(axis=1))
+        terms = [
+            out * out,
+            back * back,
+            out * back,
+            out * (base * first[span]).sum(axis=1),
+            back * (base * last[span]).sum(axis=1),
+        ]
+        sums = [np.add.reduceat(self.weight * term, self.first_row) for term in terms]
+        out_out, back_back, out_back, out_target, back_target = sums
+        out_back *= (first * last).sum(axis=1)
 
         low, high = LEAST_HANDLE * self.length, GREATEST_HANDLE * self.length
         determinant = np.maximum(out_out * back_back - out_back**2, TINY)
@@ -176,10 +199,6 @@ class _Problem:
             out = np.clip(out, low, high)
         return np.stack([out, back], axis=1)
 
-    def _sums(self, terms: FloatArray) -> FloatArray:
-        """Weighted sums of terms, (n,), over each span, (s,)."""
-        return np.add.reduceat(self.weight * terms, self.first_row)
-
 
 class _Fitter:
     """A polyline with the data that fits require, and the fits of cubics to its spans."""
@@ -188,12 +207,9 @@ class _Fitter:
         self.line = line
         self.tolerance = tolerance
         self.turn = line.turns(line.arc, CORNER_REACH * tolerance)
-        self.corner = self._corners()
-        ends = np.array([0, len(line.arc) - 1])
-        self.sharp = self.corner.copy()
-        if not line.closed:
-            self.sharp[ends] = True
-        self.fixed = np.union1d(line.bounds, np.flatnonzero(self.corner))
+        self.sharp = self._corners()
+        self.fixed = np.union1d(line.bounds, np.flatnonzero(self.sharp))
+        self.sharp[[0, -1]] |= not line.closed
         if line.closed and len(self.fixed) == 2:  # one cubic would end where it starts
             halfway = np.searchsorted(line.arc, 0.5 * line.arc[-1])
             self.fixed = np.union1d(self.fixed, np.clip([halfway], 1, len(line.arc) - 2))
@@ -201,9 +217,8 @@ class _Fitter:
     def _corners(self) -> BoolArray:
         """Which vertices are corners, (n,): one vertex at each place of a sharp turn."""
         reach, arc = CORNER_REACH * self.tolerance, self.line.arc
-        corner = self.turn > CORNER
         found = np.zeros(len(arc), dtype=bool)
-        at = np.flatnonzero(corner)
+        at = np.flatnonzero(self.turn > CORNER)
         # The same turn is measured at vertices close together; it counts where it is greatest.
         for group in np.split(at, np.flatnonzero(np.diff(arc[at]) > reach) + 1):
             if len(group):
@@ -219,30 +234,25 @@ class _Fitter:
         """
         arc = self.line.arc[knots]
         spans = np.diff(arc)
-        if self.line.closed:
-            back, ahead = np.append(spans[-1], spans), np.append(spans, spans[0])
-        else:
-            back, ahead = np.append(spans[:1], spans), np.append(spans, spans[-1:])
-        both = self._two_sided(arc, TANGENT_REACH * np.minimum(back, ahead))
+        outer = spans[[-1, 0]] if self.line.closed else spans[[0, -1]]
+        back, ahead = np.append(outer[0], spans), np.append(spans, outer[1])
+        both = self._directions(arc, TANGENT_REACH * np.minimum(back, ahead), True)
         sharp = self.sharp[knots][:, None]
-        before = np.where(sharp, -self._one_sided(arc, -TANGENT_REACH_AT_END * back), both)
-        after = np.where(sharp, self._one_sided(arc, TANGENT_REACH_AT_END * ahead), both)
+        before = np.where(sharp, -self._directions(arc, -TANGENT_REACH_AT_END * back, False), both)
+        after = np.where(sharp, self._directions(arc, TANGENT_REACH_AT_END * ahead, False), both)
         return np.stack([_unit(before, after), _unit(after, before)])
 
-    def _two_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
-        """Tangent directions at arc lengths, from cubics fitted to the polyline on both sides."""
-        share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
-        weights = np.linalg.pinv(np.stack([share, share**3], axis=1))[0]
-        at, steps = arc[:, None], share * reach[:, None]
-        chords = self.line.positions(at + steps) - self.line.positions(at - steps)
-        return np.einsum("s,ksd->kd", weights, chords)
+    def _directions(self, arc: FloatArray, reach: FloatArray, both_sides: bool) -> FloatArray:
+        """Tangent directions at arc lengths, from cubics fitted to the polyline there.
 
-    def _one_sided(self, arc: FloatArray, reach: FloatArray) -> FloatArray:
-        """Tangent directions at arc lengths, from cubics fitted on the side of `reach`."""
+        The cubics are fitted on both sides, or only on the side of `reach`, which may be negative.
+        """
         share = np.arange(1, TANGENT_SAMPLES + 1) / TANGENT_SAMPLES
-        weights = np.linalg.pinv(np.stack([share, share**2, share**3], axis=1))[0]
-        chords = self.line.positions(arc[:, None] + share * reach[:, None])
-        return np.einsum("s,ksd->kd", weights, chords - self.line.positions(arc)[:, None])
+        powers = (1, 3) if both_sides else (1, 2, 3)
+        weights = np.linalg.pinv(np.stack([share**power for power in powers], axis=1))[0]
+        at, steps = arc[:, None], share * reach[:, None]
+        chord_start = self.line.positions(at - steps if both_sides else at)
+        return np.einsum("s,ksd->kd", weights, self.line.positions(at + steps) - chord_start)
 
     def fit(self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray) -> Fits:
         """Fit cubics over spans of the polyline.
@@ -288,40 +298,44 @@ class _Fitter:
         handles: FloatArray | None,
     ) -> Fits:
         """Fit cubics with handles of given lengths, (s, 2), or by least squares if None."""
-        span, arc, first_row = self._data(start, end)
-        target = self.line.positions(arc)
-        length = self.line.arc[end] - self.line.arc[start]
-        ends = self.line.points[start], self.line.points[end]
-        parameter = (arc - self.line.arc[start][span]) / length[span]
-        # Points are weighted by arc length, since vertices may be close together.
-        problem = _Problem(ends, first, last, length, span, first_row, np.gradient(arc), target)
-        for number in range(ROUNDS):
-            lengths = problem.least_squares(parameter) if handles is None else handles
-            out, back = lengths[:, :1] * first, lengths[:, 1:] * last
-            cubic = np.stack([ends[0], ends[0] + out, ends[1] - back, ends[1]], axis=1)
-            if handles is not None and number == 0:
-                parameter = _parameters_at(cubic, span, parameter)
-            parameter = _nearer(cubic, span, parameter, target)
-        parameter[first_row] = 0.0
-        parameter[np.append(first_row[1:], len(arc)) - 1] = 1.0
-        deviation = _deviations(cubic, span, parameter, target, first_row)
+        spans, parameter = self._spans(start, end, first, last)
+        if handles is not None:
+            parameter = _parameters_at(spans.cubics(handles), spans.span, parameter)
+        for _ in range(ROUNDS):
+            lengths = spans.least_squares(parameter) if handles is None else handles
+            cubic = spans.cubics(lengths)
+            parameter = _nearer(cubic, spans.span, parameter, spans.target)
+        parameter[spans.first_row] = 0.0
+        parameter[spans.first_row[1:] - 1] = parameter[-1] = 1.0
+        deviation = _deviations(cubic, spans, parameter)
         # A cubic over one segment cannot be split; if necessary, its handles are short.
         deviation[_turns_back(cubic, first, last) & (end - start > 1)] = np.inf
         return lengths, deviation
 
-    def _data(self, start: IntArray, end: IntArray) -> tuple[IntArray, FloatArray, IntArray]:
-        """Points on spans: span and arc length of each point, and the first point of each span."""
-        counts = end - start + 1
-        span = np.repeat(np.arange(len(start)), counts)
-        vertex = start[span] + np.arange(len(span)) - (np.cumsum(counts) - counts)[span]
-        share = (np.arange(SAMPLES) + 0.5) / SAMPLES
-        bounds = self.line.arc[start][:, None], self.line.arc[end][:, None]
-        between = (1.0 - share) * bounds[0] + share * bounds[1]
-        span = np.concatenate([span, np.repeat(np.arange(len(start)), SAMPLES)])
-        arc = np.concatenate([self.line.arc[vertex], between.ravel()])
-        order = np.lexsort((arc, span))
-        counts = counts + SAMPLES
-        return span[order], arc[order], np.cumsum(counts) - counts
+    def _spans(
+        self, start: IntArray, end: IntArray, first: FloatArray, last: FloatArray
+    ) -> tuple[_Spans, FloatArray]:
+        """Data of spans, and the share of its span's arc length at which each target lies, (n,)."""
+        line, share = self.line, (np.arange(SAMPLES) + 0.5) / SAMPLES
+        arcs = []
+        for a, b in zip(start.tolist(), end.tolist(), strict=True):
+            between = (1.0 - share) * line.arc[a] + share * line.arc[b]
+            arcs.append(np.sort(np.append(line.arc[a : b + 1], between)))
+        count, arc = np.array([len(of_span) for of_span in arcs]), np.concatenate(arcs)
+        span = np.repeat(np.arange(len(start)), count)
+        length = line.arc[end] - line.arc[start]
+        spans = _Spans(
+            line.points[start],
+            line.points[end],
+            first,
+            last,
+            length,
+            np.cumsum(count) - count,
+            span,
+            line.positions(arc),
+            np.gradient(arc),
+        )
+        return spans, (arc - line.arc[start][span]) / length[span]
 
     def splits(self, start: IntArray, end: IntArray, deviation: FloatArray) -> IntArray:
         """Vertices at which to split spans, (s,), whose cubics are too far from the polyline."""
@@ -334,10 +348,11 @@ class _Fitter:
         kink = turn > 0.5 * self.line.turns(arc[sharpest], reach)
         kink &= turn * reach > 0.5 * tolerance
         parts = np.ceil(np.minimum(deviation / tolerance, MOST_PARTS**ORDER) ** (1.0 / ORDER))
+        parts = np.clip(parts, 2, MOST_PARTS)
         found = [sharpest[kink]]
         for number in range(1, MOST_PARTS):
-            here = ~kink & (number < np.clip(parts, 2, MOST_PARTS))
-            at = arc[start[here]] + number / np.clip(parts[here], 2, MOST_PARTS) * length[here]
+            here = ~kink & (number < parts)
+            at = arc[start[here]] + number / parts[here] * length[here]
             after = np.searchsorted(arc, at)
             nearest = after - (at - arc[after - 1] < arc[after] - at)
             found.append(np.clip(nearest, start[here] + 1, end[here] - 1))
@@ -376,13 +391,10 @@ def _merge(fitter: _Fitter, knots: IntArray) -> tuple[IntArray, FloatArray, Floa
         deviation[at] = np.where(found <= fitter.tolerance, found, np.inf)
         # Of two neighbouring knots only the better one is removed, as this changes the spans at the
         # other one.
-        removed = np.isfinite(deviation)
-        removed[1:] &= deviation[1:] < deviation[:-1]
-        removed[:-1] &= deviation[:-1] <= deviation[1:]
-        untested = np.zeros(len(knots), dtype=bool)
-        untested[:-1] |= removed[1:]
-        untested[1:] |= removed[:-1]
-        untested &= ~np.isin(knots, fitter.fixed)
+        padded = np.pad(deviation, 1, constant_values=np.inf)
+        removed = (deviation < padded[:-2]) & (deviation <= padded[2:])
+        beside = np.pad(removed, 1)
+        untested = (beside[:-2] | beside[2:]) & ~np.isin(knots, fitter.fixed)
         knots, tangents, untested = knots[~removed], tangents[:, ~removed], untested[~removed]
     before, after = tangents
     handles, _ = fitter.fit(knots[:-1], knots[1:], after[:-1], before[1:])
@@ -448,25 +460,20 @@ def _nearer(
     return np.where(there < np.linalg.norm(offset, axis=1), moved, parameter)
 
 
-def _deviations(
-    cubic: FloatArray,
-    span: IntArray,
-    parameter: FloatArray,
-    target: FloatArray,
-    first_row: IntArray,
-) -> FloatArray:
+def _deviations(cubic: FloatArray, spans: _Spans, parameter: FloatArray) -> FloatArray:
     """Greatest distance between each cubic and its part of the polyline, (s,).
 
     All vertices are among the targets, so the polyline is straight from one target to the next. The
     parameters of the targets begin with 0 and end with 1, so the parts between them cover the whole
     cubic.
     """
+    span, target = spans.span, spans.target
     distance = np.linalg.norm(target - _at(cubic, span, parameter), axis=1)
     middle = _at(cubic, span[:-1], 0.5 * (parameter[:-1] + parameter[1:]))
     off = distance_to_segments(middle, target[:-1], target[1:])
-    off[first_row[1:] - 1] = 0.0  # from one span to the next
+    off[spans.first_row[1:] - 1] = 0.0  # from one span to the next
     distance[:-1] = np.maximum(distance[:-1], off)
-    return np.maximum.reduceat(distance, first_row)
+    return np.maximum.reduceat(distance, spans.first_row)
 
 
 def _turns_back(cubic: FloatArray, first: FloatArray, last: FloatArray) -> BoolArray:

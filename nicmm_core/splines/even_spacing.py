@@ -16,6 +16,8 @@ from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.curve import SurfaceCurve, checked_curve, weights_in_faces
 from ..geometry.distances import distance_to_segments
 from ..geometry.mesh import Mesh
+from ..geometry.surface_points import SurfacePoints
+from ..geometry.tolerances import TINY
 from .polyline import CutPolyline, cut_polyline
 
 SHORTEST = 0.5
@@ -44,8 +46,6 @@ ANCHOR_ROUNDS = 4
 
 CLOSE_COUNT = 1.05
 """Ratio of two numbers of segments up to which the search does not distinguish them."""
-
-NO_ANCHORS: IntArray = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -94,17 +94,15 @@ def even_curve(mesh: Mesh, curve: SurfaceCurve, tolerance: float) -> SampledCurv
     curve, segment_faces = checked_curve(mesh, curve, across_gaps=True)
     places = even_places(curve.points, curve.closed, curve.control_index, tolerance)
     segment, share, control_index = places
-    following = (segment + 1) % len(curve.faces)
     between = share > 0.0
+    following = np.where(between, (segment + 1) % len(curve.faces), segment)
     faces = np.where(between, segment_faces[segment], curve.faces[segment])
-    end_of = np.where(between, following, segment)
     start, end = (
         weights_in_faces(mesh, curve.faces[point], curve.barycentric[point], faces)
-        for point in (segment, end_of)
+        for point in (segment, following)
     )
-    weights = (1.0 - share)[:, None] * start + share[:, None] * end
-    barycentric = np.where(between[:, None], weights, curve.barycentric[segment])
-    positions = (barycentric[:, :, None] * mesh.vertices[mesh.faces[faces]]).sum(axis=1)
+    barycentric = (1.0 - share)[:, None] * start + share[:, None] * end
+    positions = SurfacePoints(faces, barycentric).positions(mesh)
     return SampledCurve(curve.closed, faces, barycentric, positions, control_index)
 
 
@@ -150,46 +148,42 @@ def even_places(
     """
     control_index = np.asarray(control_index, dtype=np.int64)
     line = cut_polyline(points, closed, control_index)
-    legs = [_Leg(line, *ends) for ends in zip(line.bounds[:-1], line.bounds[1:], strict=True)]
+    legs = [line.leg(number) for number in range(len(line.bounds) - 1)]
     # A closed polyline has at least three points.
-    fewest = max(1, 4 - len(legs)) if closed and len(legs) < 3 else 1
+    fewest = max(1, 4 - len(legs)) if closed else 1
     divisions = [
-        _divide(leg, fewest, tolerance) or _spread(leg, NO_ANCHORS, leg.length / fewest)
+        _divide(leg, fewest, tolerance) or _spread(leg, leg.bounds, leg.length / fewest)
         for leg in legs
     ]
     _limit_ratios(legs, divisions, closed, tolerance)
 
-    segment, share = np.concatenate([places.on_line(line) for places in divisions], axis=1)
-    at_bounds = np.cumsum([0, *(places.count for places in divisions)])
+    places = [division.places for division in divisions]
+    segment, share = (np.concatenate(of_legs) for of_legs in zip(*places, strict=True))
+    at_bounds = np.cumsum([0, *(division.count for division in divisions)])
     if not closed:
-        segment, share = np.append(segment, line.bounds[-1]), np.append(share, 0.0)
+        segment, share = np.append(segment, line.vertex[-1]), np.append(share, 0.0)
     place_of = np.full(len(points) + 1, -1)  # the last one for the index -1
     place_of[line.vertex[line.bounds]] = at_bounds
     place_of[line.vertex[0]] = 0
-    return line.vertex[segment.astype(np.int64)], share, place_of[control_index]
-
-
-class _Leg:
-    """The part of a polyline from one control point to the next, with m points."""
-
-    def __init__(self, line: CutPolyline, first: int, last: int) -> None:
-        self.first = first
-        self.points = line.points[first : last + 1]
-        self.arc = line.arc[first : last + 1] - line.arc[first]
-        self.length = float(self.arc[-1])
-        self.most = max(MOST * (last - first), MOST_OF_A_SHORT_LEG)
-        self.alone = CutPolyline(self.points, self.arc, False, np.arange(0), np.arange(0))
+    return segment, share, place_of[control_index]
 
 
 @dataclass(frozen=True)
 class _Division:
-    """A leg divided at `count` + 1 arc lengths, both ends included."""
+    """A leg divided into `count` segments.
 
-    leg: _Leg
+    Attributes
+    ----------
+    leg : CutPolyline
+    ends : (p + 1,) int array
+        Vertices of the leg that bound its evenly divided pieces: its ends and the anchors.
+    at : (count + 1,) float array
+        Arc lengths, ascending, of the points that divide it, including its ends.
+    """
+
+    leg: CutPolyline
+    ends: IntArray
     at: FloatArray
-    """(count + 1,) arc lengths, ascending."""
-    vertex: IntArray
-    """(count + 1,) the vertex of the leg at each end or anchor, -1 elsewhere."""
 
     @property
     def count(self) -> int:
@@ -199,23 +193,21 @@ class _Division:
     def spacing(self) -> float:
         return self.leg.length / self.count
 
-    def on_line(self, line: CutPolyline) -> FloatArray:
-        """Segments of the line and shares along them, (2, count), without the end of the leg."""
-        arc, at, vertex = self.leg.arc, self.at[:-1], self.vertex[:-1]
-        segment = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(arc) - 2)
-        width = arc[segment + 1] - arc[segment]
-        share = np.divide(at - arc[segment], width, out=np.zeros(len(at)), where=width > 0.0)
-        # Rounding may give a share of 1; that place is the next vertex.
-        over = share >= 1.0
-        segment, share = np.where(over, segment + 1, segment), np.where(over, 0.0, share)
-        anchored = vertex >= 0
-        segment, share = np.where(anchored, vertex, segment), np.where(anchored, 0.0, share)
-        return np.stack([segment + self.leg.first, share])
+    @property
+    def places(self) -> tuple[IntArray, FloatArray]:
+        """Segments of the original polyline and shares along them, (count,), without the end."""
+        arc, at = self.leg.arc, self.at[:-1]
+        after = np.searchsorted(arc, at)
+        before = np.maximum(after - 1, 0)
+        share = (at - arc[before]) / np.maximum(arc[after] - arc[before], TINY)
+        at_vertex = share >= 1.0  # exactly, or by rounding
+        segment = self.leg.vertex[np.where(at_vertex, after, before)]
+        return segment, np.where(at_vertex, 0.0, share)
 
     @cached_property
     def deviations(self) -> tuple[FloatArray, IntArray]:
         """Greatest distance of the leg from each chord, and the vertex there, (count,) each."""
-        arc, places = self.leg.arc, self.leg.alone.positions(self.at)
+        arc, places = self.leg.arc, self.leg.positions(self.at)
         span = np.clip(np.searchsorted(self.at, arc, side="right") - 1, 0, self.count - 1)
         distance = distance_to_segments(self.leg.points, places[span], places[span + 1])
         first = np.flatnonzero(np.diff(span, prepend=-1))
@@ -230,15 +222,20 @@ class _Division:
         return float(self.deviations[0].max())
 
     def chords(self) -> FloatArray:
-        return np.linalg.norm(np.diff(self.leg.alone.positions(self.at), axis=0), axis=1)
+        return np.linalg.norm(np.diff(self.leg.positions(self.at), axis=0), axis=1)
 
 
-def _divide(leg: _Leg, fewest: int, tolerance: float) -> _Division | None:
+def _most_segments(leg: CutPolyline) -> int:
+    """Greatest number of segments of a leg."""
+    return max(MOST * (len(leg.arc) - 1), MOST_OF_A_SHORT_LEG)
+
+
+def _divide(leg: CutPolyline, fewest: int, tolerance: float) -> _Division | None:
     """The division of a leg with the fewest segments that keeps the tolerance.
 
     If no division keeps it, the closest one; None if each of them has a segment that is too short.
     """
-    count, failed = fewest, fewest - 1
+    count, failed, most = fewest, fewest - 1, _most_segments(leg)
     nearest: _Division | None = None
     while True:
         division = _anchored(leg, count, tolerance)
@@ -246,9 +243,9 @@ def _divide(leg: _Leg, fewest: int, tolerance: float) -> _Division | None:
             nearest = division
         if nearest is not None and nearest.deviation <= tolerance:
             break
-        if count >= leg.most:
+        if count >= most:
             return nearest
-        failed, count = count, min(2 * count, leg.most)
+        failed, count = count, min(2 * count, most)
     while count - failed > 1 and count > CLOSE_COUNT * failed:
         middle = (count + failed) // 2
         division = _anchored(leg, middle, tolerance)
@@ -259,88 +256,77 @@ def _divide(leg: _Leg, fewest: int, tolerance: float) -> _Division | None:
     return nearest
 
 
-def _anchored(leg: _Leg, count: int, tolerance: float) -> _Division | None:
+def _anchored(leg: CutPolyline, count: int, tolerance: float) -> _Division | None:
     """Divide a leg into about `count` segments, with anchors at corners.
 
     None if a segment would be too short.
     """
-    anchors = NO_ANCHORS
     spacing = leg.length / count
-    division = _spread(leg, anchors, spacing)
+    division = _spread(leg, leg.bounds, spacing)
     for _ in range(ANCHOR_ROUNDS):
         deviation, worst = division.deviations
         bad = deviation > tolerance
         corners = worst[bad][_are_corners(leg, worst[bad], spacing, tolerance)]
         strength = np.zeros(len(leg.arc))
         strength[worst] = deviation
-        added = _far_apart(leg, np.unique(corners), anchors, strength, ANCHOR_GAP * spacing)
+        added = _far_apart(division, np.unique(corners), strength, ANCHOR_GAP * spacing)
         if len(added) == 0:
             break
-        anchors = np.sort(np.concatenate([anchors, added]))
-        division = _spread(leg, anchors, spacing)
-    return _without_short_segments(leg, division, anchors, spacing)
+        division = _spread(leg, np.union1d(division.ends, added), spacing)
+    return _without_short_segments(division, spacing)
 
 
-def _spread(leg: _Leg, anchors: IntArray, spacing: float) -> _Division:
-    """Evenly divide the pieces of a leg between its anchors."""
-    ends = np.concatenate([[0], anchors, [len(leg.arc) - 1]])
+def _spread(leg: CutPolyline, ends: IntArray, spacing: float) -> _Division:
+    """Evenly divide the pieces of a leg between given vertices."""
     pieces = np.diff(leg.arc[ends])
-    counts = np.ones(len(pieces), dtype=np.int64)
-    if spacing > 0.0:
-        counts = np.maximum(np.rint(pieces / spacing), 1.0).astype(np.int64)
+    counts = np.maximum(np.rint(pieces / max(spacing, TINY)), 1.0).astype(np.int64)
     piece = np.repeat(np.arange(len(pieces)), counts)
     number = np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece]
     at = leg.arc[ends[piece]] + number / counts[piece] * pieces[piece]
-    vertex = np.where(number == 0, ends[piece], -1)
-    return _Division(leg, np.append(at, leg.length), np.append(vertex, ends[-1]))
+    return _Division(leg, ends, np.append(at, leg.length))
 
 
-def _are_corners(leg: _Leg, vertex: IntArray, spacing: float, tolerance: float) -> BoolArray:
+def _are_corners(leg: CutPolyline, vertex: IntArray, spacing: float, tolerance: float) -> BoolArray:
     """Whether the polyline turns sharply at vertices, on the scale of one spacing."""
-    near = leg.alone.turns(leg.arc[vertex], NEAR * spacing)
-    far = leg.alone.turns(leg.arc[vertex], FAR * spacing)
+    near = leg.turns(leg.arc[vertex], NEAR * spacing)
+    far = leg.turns(leg.arc[vertex], FAR * spacing)
     # A corner in the middle of a chord deviates by a quarter of the spacing times its turn.
     return (near > 0.5 * far) & (near * spacing / 4.0 > 0.5 * tolerance)
 
 
 def _far_apart(
-    leg: _Leg, corners: IntArray, anchors: IntArray, strength: FloatArray, gap: float
+    division: _Division, corners: IntArray, strength: FloatArray, gap: float
 ) -> IntArray:
     """The corners that are at least a gap away from anchors, the ends and stronger corners."""
-    taken = leg.arc[np.concatenate([[0], anchors, [len(leg.arc) - 1]])]
-    after = np.clip(np.searchsorted(taken, leg.arc[corners]), 1, len(taken) - 1)
-    at = leg.arc[corners]
+    arc = division.leg.arc
+    taken, at = arc[division.ends], arc[corners]
+    after = np.clip(np.searchsorted(taken, at), 1, len(taken) - 1)
     corners = corners[(at - taken[after - 1] >= gap) & (taken[after] - at >= gap)]
-    at, height = leg.arc[corners], strength[corners]
-    close = np.diff(at) < gap
+    close, height = np.diff(arc[corners]) < gap, strength[corners]
     beaten = np.zeros(len(corners), dtype=bool)
     beaten[1:] |= close & (height[:-1] >= height[1:])
     beaten[:-1] |= close & (height[:-1] < height[1:])
     return corners[~beaten]
 
 
-def _without_short_segments(
-    leg: _Leg, division: _Division, anchors: IntArray, spacing: float
-) -> _Division | None:
+def _without_short_segments(division: _Division, spacing: float) -> _Division | None:
     """Remove anchors until no segment is too short; None if one is even without anchors."""
-    for number in range(ANCHOR_ROUNDS + 1):
-        chords = division.chords()
+    leg = division.leg
+    while True:
+        chords, ends = division.chords(), division.ends
         short = chords < SHORTEST * chords.mean()
         if not short.any():
             return division
-        if len(anchors) == 0:
-            break
-        # Remove the nearest anchor on either side of each short segment; in the end, all anchors.
-        ends = np.concatenate([[0], anchors, [len(leg.arc) - 1]])
+        if len(ends) == 2:
+            return None
+        # Remove the nearest anchor on either side of each short segment.
         piece = np.searchsorted(leg.arc[ends], division.at[:-1][short], side="right") - 1
-        sides = np.concatenate([ends[piece], ends[np.minimum(piece + 1, len(ends) - 1)]])
-        anchors = anchors[~np.isin(anchors, sides)] if number < ANCHOR_ROUNDS - 1 else NO_ANCHORS
-        division = _spread(leg, anchors, spacing)
-    return None
+        kept = np.setdiff1d(ends, ends[[piece, piece + 1]])
+        division = _spread(leg, np.union1d(kept, leg.bounds), spacing)
 
 
 def _limit_ratios(
-    legs: list[_Leg], divisions: list[_Division], closed: bool, tolerance: float
+    legs: list[CutPolyline], divisions: list[_Division], closed: bool, tolerance: float
 ) -> None:
     """Divide legs more finely if their spacing is too great compared with that of a neighbour."""
     number = len(legs)
@@ -355,10 +341,10 @@ def _limit_ratios(
             leg, old, limit = legs[coarse], divisions[coarse], NEIGHBOURS * divisions[fine].spacing
             if divisions[fine].count == 1 or old.spacing <= limit:
                 continue
-            fewest = min(int(np.ceil(leg.length / limit)), leg.most)
+            fewest = min(int(np.ceil(leg.length / limit)), _most_segments(leg))
             new = _divide(leg, fewest, tolerance) if fewest > old.count else None
-            # The tolerance takes precedence over the ratio.
-            if new is None or new.deviation > max(old.deviation, tolerance):
+            if new is None or new.count <= old.count:
                 continue
-            if new.count > old.count:
+            # The tolerance takes precedence over the ratio.
+            if new.deviation <= max(old.deviation, tolerance):
                 divisions[coarse], changed = new, True

@@ -36,6 +36,19 @@ class CutPolyline:
     vertex: IntArray
     bounds: IntArray
 
+    @property
+    def length(self) -> float:
+        """Length of the polyline."""
+        return float(self.arc[-1])
+
+    def leg(self, number: int) -> CutPolyline:
+        """One leg as an open polyline of its own."""
+        start, end = self.bounds[number : number + 2]
+        part = slice(start, end + 1)
+        arc = self.arc[part] - self.arc[start]
+        bounds = np.array([0, end - start])
+        return CutPolyline(self.points[part], arc, False, self.vertex[part], bounds)
+
     def positions(self, at: FloatArray) -> FloatArray:
         """Positions at arc lengths of any shape (...), shape (..., 3).
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nicmm_core as nicmm
-from nicmm_core.geometry.surface_points import first_hits, locate_control_points
+from nicmm_core.geometry.surface_points import first_hits, locate_control_points, nearest_points
 from tests.core.checks import joined, random_surface_points
 
 SurfacePoints = nicmm.SurfacePoints
@@ -44,6 +44,19 @@ def test_integers_in_three_columns_are_positions():
     mesh = nicmm.Mesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
     found = locate_control_points(mesh, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], closed=True)
     np.testing.assert_allclose(found.positions(mesh)[1], [1, 0, 0], atol=1e-12)
+
+
+def test_nearest_points_in_a_face_without_area_are_on_its_longest_edge():
+    vertices = [[0, 0, 0], [3, 0, 0], [1, 0, 0], [0, 5, 5], [1, 5, 5]]
+    mesh = nicmm.Mesh(vertices, [[2, 0, 1], [0, 3, 4]])
+    positions = np.array([[2.5, 0.2, 0.0], [-1.0, 0.0, 0.0], [1.0, -0.1, 0.0]])
+    for among in (None, np.array([0])):
+        found, distance = nearest_points(mesh, positions, among)
+        np.testing.assert_allclose(found.barycentric.sum(axis=1), 1.0, rtol=0, atol=1e-15)
+        assert (found.barycentric >= 0.0).all()
+        expected = [[2.5, 0, 0], [0, 0, 0], [1, 0, 0]]
+        np.testing.assert_allclose(found.positions(mesh), expected, atol=1e-12)
+        np.testing.assert_allclose(distance, [0.2, 1.0, 0.1], atol=1e-12)
 
 
 def test_coordinates_near_zero_snap_to_edges_and_vertices(ball):
