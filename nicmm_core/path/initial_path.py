@@ -102,7 +102,7 @@ def find_initial_path(
         except UnreachableError as error:
             failure = error
             continue
-        controls = path.waypoints[waypoints.is_control]
+        controls = np.array(path.waypoints)[waypoints.is_control]
         return InitialPath(path.split, path.vertices, controls, visit, closed)
     what, named = str(failure), []
     if isinstance(failure, CrossingError):
