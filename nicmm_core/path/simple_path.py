@@ -78,15 +78,13 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
     generator = np.random.default_rng(0)
     best: Legs | None = None
     failure: UnreachableError | None = None
-    splits = 0
+    sequence, splits = np.arange(len(points) - (not closed)), 0
     for attempt in range(MOST_TRIES_WHILE_CROSSING):
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
         separate(split, waypoints)
         search = LegSearch(mesh, split, component, phi_fea, clearance)
         legs = Legs(split, search, waypoints.tolist(), closed)
-        if attempt == 0:
-            sequence = np.arange(legs.count)
         try:
             if legs.find_all(sequence, np.inf if best is None else best.length):
                 best = legs
