@@ -295,9 +295,6 @@ def _with_other_points(
             f"start has {len(at_controls)} control points, {len(there)} are requested, "
             f"and none of them is where it was{WITHOUT_START}"
         )
-    in_another_order = CurveError(
-        f"start visits the control_points in another order{WITHOUT_START}"
-    )
     index = at_controls[distance.argmin(axis=1)]
     visited = np.arange(len(there))
     if in_order and curve.closed:
@@ -307,8 +304,6 @@ def _with_other_points(
         begin, count = index[first], len(polyline)
         polyline, index = polyline[(np.arange(count) + begin) % count], (index - begin) % count
     index = np.where(same, index, -1)
-    if in_order and (np.diff(index[visited[same[visited]]]) <= 0).any():
-        raise in_another_order
     before = 0
     for turn, number in enumerate(visited.tolist()):
         if not same[number]:
@@ -316,8 +311,6 @@ def _with_other_points(
             if in_order:
                 later = index[visited[turn:]]
                 low, high = before, int(np.append(later[later >= 0], high)[0])
-            if low == high:
-                raise in_another_order
             inserted, place = _with_point(mesh, polyline, there[number], low, high)
             index[index >= place] += len(inserted) - len(polyline)
             polyline, index[number] = inserted, place
@@ -326,7 +319,7 @@ def _with_other_points(
         visited = np.argsort(index)
     index = index[visited]
     if (np.diff(index) <= 0).any():
-        raise in_another_order
+        raise CurveError(f"start visits the control_points in another order{WITHOUT_START}")
     if not curve.closed:
         polyline, index = polyline[index[0] : index[-1] + 1], index - index[0]
     whole = curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, index)
@@ -338,9 +331,11 @@ def _with_point(
 ) -> tuple[SurfacePoints, int]:
     """Insert the point nearest to a position, (3,), on the segments low … high - 1 of a polyline.
 
-    Returns the polyline and the index of the point. If the polyline has a point there, it stays as
-    it is.
+    Returns the polyline and the index of the point. If the polyline has a point there, or there are
+    no such segments, it stays as it is.
     """
+    if low >= high:
+        return polyline, low
     line, segments = polyline.positions(mesh), np.arange(low, high)
     ends = np.stack([segments, (segments + 1) % len(line)], axis=1)
     _, nearest, foot = igl.point_mesh_squared_distance(position[None], line, ends)
