@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import igl
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 from .errors import CurveError, PointName
 from .geometry import tolerances
@@ -20,7 +22,7 @@ from .geometry.mesh import Mesh
 from .geometry.surface_points import SurfacePoints, in_faces, joined
 from .geometry.tracing import strictly_inside, trace_between
 from .relaxation.curve_nodes import CurveSurface
-from .relaxation.discrete_curve import DiscreteCurve, arc_lengths, is_simple, place_nodes
+from .relaxation.discrete_curve import DiscreteCurve, is_simple, place_nodes
 from .relaxation.relaxing import relax
 from .relaxation.warm_start import LONGEST_MOVE, WARM, with_moved_controls
 from .request import Request, same_request
@@ -96,28 +98,24 @@ def unsettled_vertices(start: Resumable, request: Request, visited: IntArray) ->
     ):
         return None
     # Neither alternatives nor via points matter to a design with a start.
-    unpainted = [
-        replace(
-            each,
-            points=before.points,
-            order=before.order,
-            obstacles=None,
-            alignment=None,
-            alternatives=0,
-            via_points={},
-        )
-        for each in (before, request)
-    ]
-    if start.unsettled is None or not same_request(*unpainted):
+    unpainted = replace(
+        request,
+        points=before.points,
+        order=before.order,
+        obstacles=before.obstacles,
+        alignment=before.alignment,
+        alternatives=before.alternatives,
+        via_points=before.via_points,
+    )
+    if start.unsettled is None or not same_request(before, unpainted):
         return None
-    changed = np.zeros(len(start.mesh.vertices), dtype=bool)
+    changed = np.zeros(len(mesh.vertices), dtype=bool)
     changed[start.unsettled] = True
-    nothing = np.zeros(len(changed))
     for one, other in (
         (before.obstacles, request.obstacles),
         (before.alignment, request.alignment),
     ):
-        changed |= (nothing if one is None else one) != (nothing if other is None else other)
+        changed |= np.not_equal(0.0 if one is None else one, 0.0 if other is None else other)
     return np.flatnonzero(changed)
 
 
@@ -221,12 +219,10 @@ def _routes(
     traces = trace_between(mesh, inside, points, normals, LONGEST_TRACE * distance, surface.folded)
     if not traces.reached.all():
         return None
-    routes = []
-    for number in range(len(here)):
-        own = np.array([number])
-        between = traces.crossings[np.flatnonzero(traces.pair == number)]
-        routes.append(joined([here[own], between, points[own]]))
-    return routes
+    return [
+        joined([here[i : i + 1], traces.crossings[traces.pair == i], points[i : i + 1]])
+        for i in range(len(here))
+    ]
 
 
 def _check_moves(
@@ -252,17 +248,14 @@ def _nearest_numbering(
 
     Of the possible numberings, the one with the smallest maximum move is taken.
     """
-    count = len(request.points)
-    numberings = [np.arange(count)]
-    if visited is not None and (request.order == "shortest" or _ascending(visited, curve.closed)):
-        numberings.append(visited)
     there = request.points.positions(mesh)
     here = curve.nodes.positions[curve.control_nodes]
     if visited is None and request.order == "shortest":
-        distances = np.linalg.norm(here[:, None] - there, axis=2)
-        numberings = [linear_sum_assignment(distances)[1]]
-    farthest = [np.linalg.norm(there[each] - here, axis=1).max() for each in numberings]
-    return numberings[int(np.argmin(farthest))]
+        return linear_sum_assignment(cdist(here, there))[1]
+    numberings = [np.arange(len(there))]
+    if visited is not None and (request.order == "shortest" or _ascending(visited, curve.closed)):
+        numberings.append(visited)
+    return min(numberings, key=lambda each: np.linalg.norm(there[each] - here, axis=1).max())
 
 
 def _ascending(numbers: IntArray, closed: bool) -> bool:
@@ -292,98 +285,67 @@ def _with_other_points(
     (k,) int array
         For each control node, the index of its control point in the request.
     """
-    mesh = surface.mesh
-    line = _Line(mesh, curve)
+    mesh, polyline, in_order = surface.mesh, curve.polyline, request.order == "given"
     there = request.points.positions(mesh)
-    arcs = np.full(len(there), np.nan)
-    at_controls = line.arc[curve.node_index[curve.control_nodes]]
-    distance = np.linalg.norm(there[:, None] - curve.nodes.positions[curve.control_nodes], axis=2)
-    nearest = distance.argmin(axis=1)
+    at_controls = curve.node_index[curve.control_nodes]
+    distance = np.linalg.norm(there[:, None] - polyline[at_controls].positions(mesh), axis=2)
     same = distance.min(axis=1) <= tolerances.SAME_POSITION * mesh.diagonal
     if not same.any():
         raise CurveError(
-            f"start has {len(curve.control_nodes)} control points, {len(there)} are requested, "
+            f"start has {len(at_controls)} control points, {len(there)} are requested, "
             f"and none of them is where it was{WITHOUT_START}"
         )
-    arcs[same] = at_controls[nearest[same]]
-    if request.order == "shortest":
-        for number in np.flatnonzero(~same).tolist():
-            arcs[number] = line.nearest(there[number], 0.0, line.length)
-        visited = np.argsort(arcs, kind="stable")
-    else:
-        visited = np.arange(len(there))
-        if curve.closed:
-            # Begin the polyline at the first unchanged point.
-            first = int(same.argmax())
-            line = line.begun_at(arcs[first])
-            visited = np.roll(visited, -first)
-            arcs = np.where(same, (arcs - arcs[first]) % line.length, np.nan)
-        before = 0.0
-        for place, number in enumerate(visited.tolist()):
-            if np.isnan(arcs[number]):
-                after = arcs[visited[place:]]
-                end = np.append(after[~np.isnan(after)], line.length)[0]
-                arcs[number] = line.nearest(there[number], before, end) if end > before else before
-            before = arcs[number]
-    if (np.diff(arcs[visited]) <= 0.0).any():
+    index = at_controls[distance.argmin(axis=1)]
+    visited = np.arange(len(there))
+    if in_order and curve.closed:
+        # Begin the polyline at the first unchanged point.
+        first = int(same.argmax())
+        visited = np.roll(visited, -first)
+        begin, count = index[first], len(polyline)
+        polyline, index = polyline[(np.arange(count) + begin) % count], (index - begin) % count
+    index = np.where(same, index, -1)
+    before = 0
+    for turn, number in enumerate(visited.tolist()):
+        if not same[number]:
+            low, high = 0, len(polyline) - (not curve.closed)
+            if in_order:
+                later = index[visited[turn:]]
+                low, high = before, int(np.append(later[later >= 0], high)[0])
+            inserted, place = _with_point(mesh, polyline, there[number], low, high)
+            index[index >= place] += len(inserted) - len(polyline)
+            polyline, index[number] = inserted, place
+        before = int(index[number])
+    if not in_order:
+        visited = np.argsort(index)
+    index = index[visited]
+    if (np.diff(index) <= 0).any():
         raise CurveError(f"start visits the control_points in another order{WITHOUT_START}")
-    return place_nodes(surface, line.with_points(arcs[visited]), WARM.levels[-1]), visited
+    if not curve.closed:
+        polyline, index = polyline[index[0] : index[-1] + 1], index - index[0]
+    whole = curve_on_mesh(mesh, curve.closed, polyline.faces, polyline.barycentric, index)
+    return place_nodes(surface, whole, WARM.levels[-1]), visited
 
 
-class _Line:
-    """A polyline on a mesh, parametrised by arc length from its first point."""
+def _with_point(
+    mesh: Mesh, polyline: SurfacePoints, position: FloatArray, low: int, high: int
+) -> tuple[SurfacePoints, int]:
+    """Insert the point nearest to a position, (3,), on the segments low … high - 1 of a polyline.
 
-    def __init__(self, mesh: Mesh, curve: DiscreteCurve, shift: int = 0) -> None:
-        n = len(curve.polyline)
-        self.mesh, self.curve = mesh, curve
-        self.polyline = curve.polyline[(np.arange(n) + shift) % n]
-        self.positions = self.polyline.positions(mesh)
-        self.arc = arc_lengths(self.positions, curve.closed)
-        self.length = float(self.arc[-1])
-
-    def begun_at(self, arc: float) -> _Line:
-        """The same closed polyline, beginning at its point nearest to an arc length."""
-        return _Line(self.mesh, self.curve, int(np.abs(self.arc - arc).argmin()))
-
-    def nearest(self, position: FloatArray, low: float, high: float) -> float:
-        """Arc length of the point nearest to a position, (3,), between two arc lengths."""
-        start = self.positions
-        step = np.roll(start, -1, axis=0) - start
-        start, step = start[: len(self.arc) - 1], step[: len(self.arc) - 1]
-        lengths = np.maximum(np.diff(self.arc), tolerances.TINY)
-        squared = (step * step).sum(axis=1)
-        share = ((position - start) * step).sum(axis=1) / np.where(squared > 0.0, squared, 1.0)
-        with np.errstate(over="ignore"):  # on segments of almost no length
-            begin, end = (low - self.arc[:-1]) / lengths, (high - self.arc[:-1]) / lengths
-        share = np.clip(share, np.clip(begin, 0.0, 1.0), np.clip(end, 0.0, 1.0))
-        distance = np.linalg.norm(start + share[:, None] * step - position, axis=1)
-        distance[(begin > 1.0) | (end < 0.0)] = np.inf
-        segment = int(distance.argmin())
-        return float(self.arc[segment] + share[segment] * lengths[segment])
-
-    def with_points(self, arcs: FloatArray) -> SurfaceCurve:
-        """The curve with control points at ascending arc lengths; an open one is trimmed there."""
-        n = len(self.polyline)
-        apart = np.abs(self.arc[:n, None] - arcs)
-        at_point = apart <= tolerances.SAME_POSITION * self.mesh.diagonal
-        # Rounding must not put a point of the polyline at the end of the segment before it.
-        arcs = np.where(at_point.any(axis=0), self.arc[apart.argmin(axis=0)], arcs)
-        segment = np.clip(np.searchsorted(self.arc, arcs, side="right") - 1, 0, len(self.arc) - 2)
-        lengths = np.maximum(np.diff(self.arc)[segment], tolerances.TINY)
-        share = np.clip((arcs - self.arc[segment]) / lengths, 0.0, 1.0)[:, None]
-        faces = self.polyline.faces[segment]
-        end = in_faces(self.mesh, self.polyline[(segment + 1) % n], faces).barycentric
-        barycentric = (1.0 - share) * self.polyline.barycentric[segment] + share * end
-        kept = ~at_point.any(axis=1)
-        if not self.curve.closed:
-            kept &= (self.arc[:n] > arcs[0]) & (self.arc[:n] < arcs[-1])
-        at = np.concatenate([arcs, self.arc[:n][kept]])
-        order = np.argsort(at, kind="stable")
-        index = np.argsort(order, kind="stable")[: len(arcs)]
-        return curve_on_mesh(
-            self.mesh,
-            self.curve.closed,
-            np.concatenate([faces, self.polyline.faces[kept]])[order],
-            np.concatenate([barycentric, self.polyline.barycentric[kept]])[order],
-            index,
-        )
+    Returns the polyline and the index of the point. If the polyline has a point there, or there are
+    no such segments, it stays as it is.
+    """
+    if low >= high:
+        return polyline, low
+    line, segments = polyline.positions(mesh), np.arange(low, high)
+    ends = np.stack([segments, (segments + 1) % len(line)], axis=1)
+    _, nearest, foot = igl.point_mesh_squared_distance(position[None], line, ends)
+    start, end = ends[np.ravel(nearest)[0]].tolist()
+    to_start, to_end = np.linalg.norm(line[[start, end]] - foot, axis=1).tolist()
+    if min(to_start, to_end) <= tolerances.SAME_POSITION * mesh.diagonal:
+        # The first point of a closed polyline is not reached from its end.
+        return polyline, min(start + (to_end < to_start), len(line) - 1)
+    faces = polyline.faces[[start, start]]
+    one, other = in_faces(mesh, polyline[np.array([start, end])], faces).barycentric
+    share = to_start / (to_start + to_end)
+    point = SurfacePoints(faces[:1], ((1.0 - share) * one + share * other)[None])
+    return joined([polyline[: start + 1], point, polyline[start + 1 :]]), start + 1

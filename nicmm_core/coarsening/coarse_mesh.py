@@ -49,16 +49,15 @@ class CoarseMesh:
     cell: IntArray
 
     @cached_property
-    def _by_cell(self) -> tuple[IntArray, IntArray]:
-        """Fine vertices sorted by cell, and the index at which each cell starts."""
-        order = np.argsort(self.cell, kind="stable")
-        return order, np.searchsorted(self.cell[order], np.arange(len(self.seed) + 1))
+    def _vertices_of_cells(self) -> sparse.csr_array:
+        """Incidence of coarse vertices (rows) and the fine vertices in their cells (columns)."""
+        inside = np.flatnonzero(self.cell >= 0)
+        entries = (np.ones(len(inside), dtype=np.int8), (self.cell[inside], inside))
+        return sparse.csr_array(entries, shape=(len(self.seed), len(self.cell)))
 
     def faces_of_cells(self, fine: Mesh, vertices: IntArray) -> IntArray:
         """Fine faces at the fine vertices in the cells of coarse vertices, ascending."""
-        order, begin = self._by_cell
-        parts = [order[begin[vertex] : begin[vertex + 1]] for vertex in vertices.tolist()]
-        return fine.faces_at(np.concatenate(parts))
+        return fine.faces_at(self._vertices_of_cells[vertices].indices)
 
     def cells_around(self, vertices: IntArray) -> IntArray:
         """The cells of coarse vertices and their neighbours, as ascending coarse vertices."""
@@ -86,24 +85,31 @@ class CoarseMesh:
         """
         corner = fine.faces[points.faces, points.barycentric.argmax(axis=1)]
 
-        def around(cell: IntArray) -> IntArray:
-            faces = self.mesh.faces_at(self.cells_around(cell))
-            if not len(faces):
-                raise UnreachableError("a cell of the coarse mesh has no face")
-            return faces
-
-        return nearest_in_cells(self.mesh, points.positions(fine), self.cell[corner], around)
+        return nearest_in_cells(
+            self.mesh,
+            points.positions(fine),
+            self.cell[corner],
+            lambda cell: self.mesh.faces_at(self.cells_around(cell)),
+        )
 
 
 def nearest_in_cells(
     mesh: Mesh, positions: FloatArray, cell: IntArray, faces_of: Callable[[IntArray], IntArray]
 ) -> SurfacePoints:
-    """Project positions, (n, 3), each to the faces of its cell, (n,), which a function gives."""
+    """Project positions, (n, 3), each to the faces of its cell, (n,), which a function gives.
+
+    Raises
+    ------
+    UnreachableError
+        If a cell has no face.
+    """
     faces, barycentric = np.zeros(len(cell), np.int64), np.zeros((len(cell), 3))
     for one in np.unique(cell):
         checkpoint()
-        here = np.flatnonzero(cell == one)
-        found, _ = nearest_points(mesh, positions[here], faces_of(one[None]))
+        here, among = np.flatnonzero(cell == one), faces_of(one[None])
+        if not len(among):
+            raise UnreachableError("a cell of the coarse mesh has no face")
+        found, _ = nearest_points(mesh, positions[here], among)
         faces[here], barycentric[here] = found.faces, found.barycentric
     return SurfacePoints(faces, barycentric)
 
@@ -125,14 +131,18 @@ def build_coarse_mesh(mesh: Mesh, vertex_normals: FloatArray, count: int) -> Coa
     MeshError
         If no three cells meet in a face.
     """
-    faces, thirds = mesh.faces, np.repeat(mesh.face_areas / 3.0, 3)
-    areas = np.asarray(np.bincount(faces.ravel(), thirds, len(mesh.vertices)), dtype=np.float64)
+    faces, shares = mesh.faces, np.repeat(mesh.face_areas / 3.0, 3)
+    areas = np.bincount(faces.ravel(), shares, len(mesh.vertices)).astype(np.float64)
     checkpoint()
     distance = PACKING * np.sqrt(areas.sum() / count)
     # Hashes of positions replace random numbers, so the result does not depend on the numbering.
     chance = uniform_hash(frame_coordinates(mesh.vertices, faces, mesh.face_areas))
     seed = spread_vertices(mesh, vertex_normals, areas, chance, CANDIDATES * count, distance)
-    graph = _edge_graph(mesh, chance)
+    # Lengths are changed slightly, so that no two paths on a grid are equally long.
+    lengths = edge_lengths(mesh.vertices, mesh.edges)
+    lengths *= 1.0 + TIE_BREAK * chance[mesh.edges].sum(axis=1)
+    size = len(mesh.vertices)
+    graph = sparse.csr_array((lengths, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(size, size))
     checkpoint()
     _, _, nearest = csgraph.dijkstra(
         graph, directed=False, indices=seed, min_only=True, return_predecessors=True
@@ -156,15 +166,3 @@ def _with_areas(mesh: Mesh) -> Mesh:
         return mesh
     origin = vertices[faces[0, 0]]
     return Mesh(origin + perturbed(vertices - origin, faces, short, flat), faces)
-
-
-def _edge_graph(mesh: Mesh, chance: FloatArray) -> sparse.csr_array:
-    """Sparse matrix of edge lengths, shape (V, V); each edge is stored once.
-
-    Lengths are changed slightly, so that no two paths on a grid are equally long.
-    """
-    edges = mesh.edges
-    length = edge_lengths(mesh.vertices, edges)
-    length *= 1.0 + TIE_BREAK * chance[edges].sum(axis=1)
-    size = len(mesh.vertices)
-    return sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))

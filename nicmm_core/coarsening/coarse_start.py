@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -31,23 +31,6 @@ SMALL, LARGE = 3_000, 6_000
 """Numbers of vertices up to which a mesh needs no coarse mesh, and above which it needs one."""
 
 
-@dataclass(frozen=True)
-class _CoarseSurface:
-    """A coarse mesh, and canonical copies of its components to search for courses."""
-
-    coarse: CoarseMesh
-    surface: CurveSurface
-    copies: dict[int, tuple[Renumbered, CourseSurface]] = field(default_factory=dict)
-
-    def copy_under(self, points: SurfacePoints) -> tuple[Renumbered, CourseSurface]:
-        """The copy of the component on which points lie."""
-        component = int(self.coarse.mesh.face_component[points.faces[0]])
-        if component not in self.copies:
-            copy = renumbered(self.coarse.mesh, component)
-            self.copies[component] = copy, CourseSurface(MappedSurface(copy.mesh))
-        return self.copies[component]
-
-
 class CoarseStarts:
     """Finds starts on the coarse mesh of a connected mesh.
 
@@ -59,6 +42,7 @@ class CoarseStarts:
 
     def __init__(self, surface: CurveSurface) -> None:
         self._mesh, self._fine = surface.mesh, surface
+        self._copies: dict[int, tuple[Renumbered, CourseSurface]] = {}
 
     def courses(
         self, request: Request, seed: int = 0, search: SearchSize = WHOLE
@@ -66,20 +50,19 @@ class CoarseStarts:
         """Yield the courses on the coarse mesh, the best first, as curves on the fine mesh.
 
         With each comes the order in which it visits the control points. A course that is not simple
-        on the fine mesh is None. There may be no courses where points are close together. `seed` is
-        that of `CourseSurface.courses`.
+        on the fine mesh is None. There may be no courses where points are close together. `seed`
+        and `search` are those of `CourseSurface.courses`.
         """
         with contextlib.suppress(NicmmError):
-            here = self._coarse
-            on_coarse = _on_coarse(self._mesh, here.coarse, request)
-            copy, surface = here.copy_under(on_coarse.points)
+            on_coarse = _on_coarse(self._mesh, self._coarse, request)
+            copy, surface = self._copy_under(on_coarse.points)
             on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
             for course in surface.courses(on_copy, seed, search):
                 checkpoint()
                 places = copy.points_back(course.places)
-                nodes = noded(here.surface, places, course.control_nodes, request.closed)
+                nodes = noded(self._coarse_surface, places, course.control_nodes, request.closed)
                 controls = request.points[course.visited]
-                curve = nodes_on_fine_mesh(self._fine, here.coarse, nodes, controls)
+                curve = nodes_on_fine_mesh(self._fine, self._coarse, nodes, controls)
                 yield None if curve is None else (curve, course.visited)
 
     @cached_property
@@ -91,12 +74,23 @@ class CoarseStarts:
         return count > LARGE or needles
 
     @cached_property
-    def _coarse(self) -> _CoarseSurface:
+    def _coarse(self) -> CoarseMesh:
         """The coarse mesh, built on first use."""
         # At least two fine vertices for each cell.
         count = min(COARSE_CELLS, np.count_nonzero(self._mesh.referenced) // 2)
-        coarse = build_coarse_mesh(self._mesh, self._fine.vertex_normals, count)
-        return _CoarseSurface(coarse, curve_surface(coarse.mesh))
+        return build_coarse_mesh(self._mesh, self._fine.vertex_normals, count)
+
+    @cached_property
+    def _coarse_surface(self) -> CurveSurface:
+        return curve_surface(self._coarse.mesh)
+
+    def _copy_under(self, points: SurfacePoints) -> tuple[Renumbered, CourseSurface]:
+        """The canonical copy of the coarse component on which points lie, to search for courses."""
+        component = int(self._coarse.mesh.face_component[points.faces[0]])
+        if component not in self._copies:
+            copy = renumbered(self._coarse.mesh, component)
+            self._copies[component] = copy, CourseSurface(MappedSurface(copy.mesh))
+        return self._copies[component]
 
 
 def _on_coarse(fine: Mesh, coarse: CoarseMesh, request: Request) -> Request:

@@ -241,11 +241,10 @@ def _two_rings(mesh: Mesh) -> tuple[IntArray, IntArray]:
 
     A one-ring does not overdetermine a quadric; more than two rings would smooth out features.
     """
-    start, end = unique_edges(mesh.faces)[0].T
-    size = len(mesh.vertices)
-    entries = (np.ones(len(start), dtype=np.float32), (start, end))
-    beside = sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
-    beside = sparse.csr_array(beside + beside.T)
+    edges, size = unique_edges(mesh.faces)[0], len(mesh.vertices)
+    ends = np.concatenate([edges, edges[:, ::-1]]).T
+    ones = np.ones(len(ends[0]), dtype=np.float32)
+    beside = sparse.csr_array((ones, (ends[0], ends[1])), shape=(size, size))
     # Two-rings through vertices of high valence would be too large.
     onward = beside[np.flatnonzero(np.diff(beside.indptr) <= 64)]
     reached = beside + sparse.csr_array(onward.T @ onward)
@@ -293,19 +292,21 @@ def _quantiles_by_area(mesh: Mesh, values: FloatArray, shares: list[float]) -> l
 
 
 def _checked_pairs(edges: ArrayLike, n_vertices: int) -> IntArray:
+    """Convert edges to pairs of vertex indices, (n, 2), or raise ArgumentError."""
     try:
-        given = np.array(edges)
-        if given.size == 0:
-            given = np.zeros((0, 2), dtype=np.int64)
-        if not np.issubdtype(given.dtype, np.integer):
-            raise ValueError(f"their type is {given.dtype}")
-        pairs = given.astype(np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
+        pairs = np.array(edges)
+    except (TypeError, ValueError) as error:
         raise ArgumentError(
             f"edges cannot be read as vertex indices ({error}); pass an integer array of shape "
             "(n, 2)"
         ) from error
-    if pairs.ndim != 2 or pairs.shape[1] != 2:
-        raise ArgumentError(f"edges has shape {pairs.shape}; pass vertex indices of shape (n, 2)")
+    if pairs.size == 0:
+        return np.zeros((0, 2), dtype=np.int64)
+    if pairs.shape[1:] != (2,) or not np.issubdtype(pairs.dtype, np.integer):
+        raise ArgumentError(
+            f"edges has shape {pairs.shape} and type {pairs.dtype}; pass vertex indices of shape "
+            "(n, 2)"
+        )
+    pairs = pairs.astype(np.int64)
     check_indices("edges", pairs, n_vertices)
     return pairs

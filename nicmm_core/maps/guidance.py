@@ -21,7 +21,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..geometry import tolerances
-from ..geometry.array_types import BoolArray, FloatArray, IntArray
+from ..geometry.array_types import FloatArray, IntArray
 from ..geometry.distances import build_distance_surface, propagate
 from ..geometry.mesh import Mesh, edge_lengths
 from ..progress import checkpoint
@@ -212,11 +212,9 @@ def _steepest(mesh: Mesh, level: IntArray, inside: FloatArray) -> IntArray:
     Only neighbours of the same level are considered.
     """
     start, end = np.concatenate([mesh.edges, mesh.edges[:, ::-1]]).T
-    alike: BoolArray = (level[start] > 0) & (level[end] == level[start])
-    start, end = start[alike], end[alike]
     apart = np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1)
     slope = (inside[end] - inside[start]) / np.maximum(apart, tolerances.TINY)
-    rising = slope > RIDGE
+    rising = (level[start] > 0) & (level[end] == level[start]) & (slope > RIDGE)
     start, end, slope = start[rising], end[rising], slope[rising]
     order = np.argsort(slope, kind="stable")
     result = np.arange(len(level))

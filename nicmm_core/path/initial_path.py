@@ -8,11 +8,13 @@ the leg runs through midpoints of edges, which are then split virtually.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import islice
 
 import igl
 import numpy as np
+from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..errors import UnreachableError
@@ -23,7 +25,7 @@ from ..geometry.surface_points import SurfacePoints, control_point_names
 from .legs import CrossingError
 from .simple_path import find_path
 from .via_points import ViaPoints, Waypoints, with_via_points
-from .virtual_splits import SplitMesh, WorkingMesh
+from .virtual_splits import SplitMesh
 from .visiting_order import order_along_boundaries, shortest_order
 
 
@@ -89,28 +91,30 @@ def find_initial_path(
     ControlPointError
         If a via point cannot be used.
     """
-    tours = _Tours(mesh, points, closed)
-    failure = None
-    for visit in tours.of(order):
+    orders = _orders(mesh, points, closed)
+    failed: list[list[int]] = []
+    for visit in islice(orders, 1) if order == "given" else islice(orders, 1, None):
         waypoints = Waypoints(
             points[visit], np.ones(len(points), dtype=bool), control_point_names(visit)
         )
         if via_points:
             waypoints = with_via_points(mesh, points, via_points, order, closed)
         try:
-            path = find_path(mesh, waypoints.points, phi_fea, closed)
+            legs = find_path(mesh, waypoints.points, phi_fea, closed)
         except UnreachableError as error:
             failure = error
+            failed.append(visit.tolist())
             continue
-        controls = path.waypoints[waypoints.is_control]
-        return InitialPath(path.split, path.vertices, controls, visit, closed)
+        controls = np.array(legs.waypoints)[waypoints.is_control]
+        return InitialPath(legs.split, legs.vertices, controls, visit, closed)
     what, named = str(failure), []
     if isinstance(failure, CrossingError):
         names, leg = waypoints.names, failure.leg
         named = [names[leg], names[(leg + 1) % len(names)]]
         what = f"{named[0]} cannot be joined to {named[1]} without crossing the rest of the curve"
-    advice = _advice(mesh, points, tours, visit, phi_fea, not waypoints.is_control.all())
-    raise UnreachableError(f"{what}; {advice}", *named) from failure
+    raise UnreachableError(
+        f"{what}; {_advice(mesh, points, phi_fea, closed, bool(via_points), failed)}", *named
+    ) from failure
 
 
 def path_curve(mesh: Mesh, path: InitialPath) -> SurfaceCurve:
@@ -136,45 +140,20 @@ def path_curve(mesh: Mesh, path: InitialPath) -> SurfaceCurve:
     return curve_on_mesh(mesh, path.closed, faces, np.array(barycentric), controls)
 
 
-class _Tours:
-    """Possible orders of the control points along the curve, each computed on first use."""
-
-    def __init__(self, mesh: Mesh, points: SurfacePoints, closed: bool) -> None:
-        self._mesh, self._points, self.closed = mesh, points, closed
-        self.given = np.arange(len(points))
-
-    def of(self, order: str) -> Iterator[IntArray]:
-        """Orders to try for a request, the preferred one first."""
-        if order == "given":
-            yield self.given
-        else:
-            yield self.shortest
-            yield self.along_boundaries
-
-    @cached_property
-    def shortest(self) -> IntArray:
-        """The shortest order by distances along edges, (k,)."""
-        return shortest_order(self._on_mesh[2], self.closed)
-
-    @cached_property
-    def along_boundaries(self) -> IntArray:
-        """A short order that is possible even if points lie on boundaries, (k,)."""
-        working, vertices, distance = self._on_mesh
-        index = np.full(len(working.vertices), -1)
-        index[vertices] = np.arange(len(vertices))
-        loops = [index[loop] for loop in boundary_loops(working.faces)]
-        return order_along_boundaries(distance, [loop[loop >= 0] for loop in loops], self.closed)
-
-    @cached_property
-    def _on_mesh(self) -> tuple[WorkingMesh, IntArray, FloatArray]:
-        """The working mesh with all points inserted, their vertices and their edge distances."""
-        split = SplitMesh(self._mesh)
-        controls = split.insert_points(self._points)
-        component = int(self._mesh.face_component[self._points.faces[0]])
-        working, renumbered = split.assemble(component)
-        vertices = renumbered[controls]
-        distance = csgraph.dijkstra(working.edge_graph(), directed=False, indices=vertices)
-        return working, vertices, distance[:, vertices]
+def _orders(mesh: Mesh, points: SurfacePoints, closed: bool) -> Iterator[IntArray]:
+    """Orders of the points, (k,) each: as given, short, and possible with points on boundaries."""
+    yield np.arange(len(points))
+    split = SplitMesh(mesh)
+    inserted = split.insert_points(points)
+    working, renumbered = split.assemble(int(mesh.face_component[points.faces[0]]))
+    vertices = renumbered[inserted]
+    along_edges = csgraph.dijkstra(working.edge_graph(), directed=False, indices=vertices)
+    distance = along_edges[:, vertices]
+    yield shortest_order(distance, closed)
+    index = np.full(len(working.vertices), -1)
+    index[vertices] = np.arange(len(vertices))
+    loops = [index[loop] for loop in boundary_loops(working.faces)]
+    yield order_along_boundaries(distance, [loop[loop >= 0] for loop in loops], closed)
 
 
 def boundary_loops(faces: IntArray) -> list[IntArray]:
@@ -191,55 +170,46 @@ def boundary_loops(faces: IntArray) -> list[IntArray]:
     _, edge, count = np.unique(
         np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
     )
-    around: dict[int, list[int]] = {}
-    for start, end in sides[count[edge.ravel()] == 1].tolist():
-        around.setdefault(start, []).insert(0, end)
-        around.setdefault(end, []).append(start)
+    rim = sides[count[edge.ravel()] == 1]
+    size = int(faces.max()) + 1
+    graph = sparse.csr_array((np.ones(len(rim)), (rim[:, 0], rim[:, 1])), shape=(size, size))
+    seen = np.zeros(size, dtype=bool)
     loops = []
-    while around:
-        here, (onward, *_) = next(iter(around.items()))
-        loop = [here]
-        del around[here]
-        while onward in around:
-            here, beside = onward, around.pop(onward)
-            onward = next(vertex for vertex in beside if vertex != loop[-1])
-            loop.append(here)
-        loops.append(np.array(loop, dtype=np.int64))
+    for start, end in rim.tolist():
+        if not seen[start]:
+            loop = csgraph.depth_first_order(graph, start, False, return_predecessors=False)
+            loops.append(loop if loop[1] == end else np.roll(loop[::-1], 1))
+            seen[loop] = True
     return loops
 
 
 def _advice(
     mesh: Mesh,
     points: SurfacePoints,
-    tours: _Tours,
-    visited: IntArray,
     phi_fea: FloatArray | None,
+    closed: bool,
     via: bool,
+    failed: list[list[int]],
 ) -> str:
-    """Advice for the error message: an order that was tried and works, or what else to change.
+    """Advice for the error message: another order that works, or what else to change.
 
     Parameters
     ----------
-    mesh, points, phi_fea
+    mesh, points, phi_fea, closed
         Arguments of `find_initial_path`.
-    tours : _Tours
-        Orders to try.
-    visited : (k,) int array
-        The order that failed.
     via : bool
-        Whether the failed path had via points. If so, the same order is tried without them.
+        Whether the path had via points. If so, the same order is tried without them.
+    failed : list of (k,) lists of int
+        Orders in which no path has been found.
     """
-    tried = [] if via else [visited.tolist()]
-    for order in (tours.given, tours.shortest, tours.along_boundaries):
-        if order.tolist() in tried:
-            continue
-        tried.append(order.tolist())
-        try:
-            find_path(mesh, points[order], phi_fea, tours.closed)
-        except UnreachableError:
-            continue
-        leave_out = "leave the via points out and " if via else ""
-        return f"{leave_out}visit the points in the order {order.tolist()}, which works"
+    failed = [] if via else failed
+    for order in _orders(mesh, points, closed):
+        if order.tolist() not in failed:
+            failed.append(order.tolist())
+            with suppress(UnreachableError):
+                find_path(mesh, points[order], phi_fea, closed)
+                leave_out = "leave the via points out and " if via else ""
+                return f"{leave_out}visit the points in the order {order.tolist()}, which works"
     return (
         "no order works, not even the shortest; use fewer points, or move points off the boundary"
     )

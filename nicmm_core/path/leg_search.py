@@ -7,7 +7,9 @@ vertices it has.
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
@@ -15,10 +17,10 @@ from scipy.sparse import csgraph
 
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from ..geometry.grouping import components, path_between
-from ..geometry.mesh import Mesh, side_keys, unique_edges
+from ..geometry.mesh import Mesh, edge_lengths
 from ..maps.guidance import length_factor
 from ..progress import checkpoint
-from .leg_graph import Node, Patch
+from .leg_graph import LegGraph, Node
 from .virtual_splits import SplitMesh
 
 MIDPOINT_DETOUR = 2.0
@@ -37,21 +39,21 @@ set between them.
 
 @dataclass(frozen=True)
 class BlockedElements:
-    """Vertices and edges that a leg must avoid.
+    """Vertices and edges that a leg must avoid; by default none.
 
     Attributes
     ----------
-    vertices : (q,) int array
+    vertices : set of int
         Vertices of other legs, and waypoints that do not belong to this leg.
-    edges : (p, 2) int array
+    edges : set of (int, int)
         Edges of other legs, which must not be crossed.
-    ends : (e,) int array
+    ends : set of int
         Waypoints at which exactly one leg ends so far, from which the path may continue.
     """
 
-    vertices: IntArray
-    edges: IntArray
-    ends: IntArray
+    vertices: AbstractSet[int] = frozenset()
+    edges: AbstractSet[tuple[int, int]] = frozenset()
+    ends: AbstractSet[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -100,11 +102,8 @@ class LegSearch:
         self._component = component
         self._phi_fea = phi_fea
         self._clearance = clearance
-        corners = mesh.vertices[mesh.faces]
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        self._longest_edge = np.zeros(len(mesh.vertices))
-        np.maximum.at(self._longest_edge, mesh.faces, sides[:, None])
-        self._kept: tuple[int, Patch] | None = None
+        self._longest_edge = float(edge_lengths(mesh.vertices, mesh.edges).max())
+        self._whole: tuple[int, LegGraph] | None = None
         self._least_factor = 1.0
         if phi_fea is not None:
             self._least_factor = min(1.0, float(length_factor(phi_fea).min()))
@@ -124,147 +123,83 @@ class LegSearch:
             checkpoint()
             near = apart <= reach + 2.0 * (self._clearance + self._longest_edge)
             inside = self._component & near[self._mesh.faces].any(axis=1)
-            whole = inside.sum() >= 0.5 * self._component.sum()
-            limit = np.inf if whole else self._least_factor * reach
-            patch = self._whole() if whole else self._patch(inside)
-            leg = self._search(patch, source, target, blocked, limit)
-            if leg is not None or whole:
+            if inside.sum() >= 0.5 * self._component.sum():
+                return self._search(self._whole_graph(), source, target, blocked, np.inf)
+            graph = LegGraph(self._split.assemble_faces(inside), self._phi_fea)
+            leg = self._search(graph, source, target, blocked, self._least_factor * reach)
+            if leg is not None:
                 return leg
             reach *= 2.0
 
     def are_joinable(self, pairs: list[tuple[int, int]], blocked: BlockedElements) -> bool:
-        """Whether each pair of vertices, taken alone, can be joined by a leg."""
-        patch = self._whole()
-        free = self._free(patch, blocked, np.zeros(0, dtype=np.int64))
-        free_arcs = patch.arcs[free[patch.arcs].all(axis=1)]
-        _, label = components(patch.size, *free_arcs.T)
-        whole = patch.graph(patch.lengths)
+        """Whether each pair of blocked vertices, taken alone, can be joined by a leg."""
+        graph = self._whole_graph()
+        free = _free(graph, blocked)
+        _, label = components(graph.size, *graph.arcs[free[graph.arcs].all(axis=1)].T)
 
         def reached(vertex: int) -> set[int]:
-            (index,) = patch.node_indices(np.array([vertex]))
-            around = whole[[int(index)]].indices
-            return set(label[around[free[around]]].tolist())
+            """Components of free nodes beside a vertex."""
+            beside = graph.arcs[(graph.arcs == graph.vertex_nodes({vertex})).any(axis=1)]
+            return set(label[beside[free[beside]]].tolist())
 
         return all(reached(first) & reached(second) for first, second in pairs)
 
-    def _search(
-        self, patch: Patch, source: int, target: int, blocked: BlockedElements, limit: float
-    ) -> Leg | None:
-        """The cheapest leg on a patch, penalties included; None if all exceed the cost limit."""
-        lengths = np.where(patch.through_midpoints, MIDPOINT_DETOUR, 1.0) * patch.lengths
-        checkpoint()
-        avoided = patch.node_indices(np.append(blocked.vertices, source))
-        ends = patch.node_indices(np.append(blocked.ends, source))
-        beside = _closeness(patch.graph(lengths), avoided, ends, self._clearance)
-        lengths *= 1.0 + STRAND_PENALTY * beside[patch.arcs].mean(axis=1)
+    def _whole_graph(self) -> LegGraph:
+        """Graph of the whole component, kept until the mesh is split again."""
+        if self._whole is None or self._whole[0] != self._split.n_faces:
+            working = self._split.assemble_faces(self._component)
+            self._whole = self._split.n_faces, LegGraph(working, self._phi_fea)
+        return self._whole[1]
 
-        (here,), (there,) = (patch.node_indices(np.array([vertex])) for vertex in (source, target))
-        free = self._free(patch, blocked, np.array([here, there]))
-        lengths[~free[patch.arcs].all(axis=1)] = np.inf
+    def _search(
+        self, graph: LegGraph, source: int, target: int, blocked: BlockedElements, limit: float
+    ) -> Leg | None:
+        """The cheapest leg in a graph, penalties included; None if all exceed the cost limit."""
+        through_midpoints = (graph.arcs >= graph.n_vertices).any(axis=1)
+        costs = np.where(through_midpoints, MIDPOINT_DETOUR, 1.0) * graph.lengths(graph.arcs)
+        checkpoint()
+        avoided = graph.vertex_nodes(blocked.vertices | {source})
+        ends = graph.vertex_nodes(blocked.ends | {source})
+        beside = _closeness(graph.matrix(costs), avoided, ends, self._clearance)
+        costs *= 1.0 + STRAND_PENALTY * beside[graph.arcs].mean(axis=1)
+
+        (here,), (there,) = (graph.vertex_nodes({vertex}).tolist() for vertex in (source, target))
+        free = _free(graph, blocked)
+        free[[here, there]] = True
+        costs[~free[graph.arcs].all(axis=1)] = np.inf
         _, previous = csgraph.dijkstra(
-            patch.graph(lengths), indices=here, return_predecessors=True, limit=limit
+            graph.matrix(costs), indices=here, return_predecessors=True, limit=limit
         )
         if previous[there] < 0:
             return None
-        path = self._without_crossing(patch, path_between(previous, int(here), int(there)))
-        steps = np.stack([path[:-1], path[1:]], axis=1)
-        length = float(patch.step_lengths(steps).sum())
-        return Leg([patch.node(index) for index in path], length)
+        path = _without_crossing(graph, path_between(previous, here, there))
+        length = float(graph.lengths(np.array(list(pairwise(path)))).sum())
+        return Leg([graph.node(index) for index in path], length)
 
-    def _whole(self) -> Patch:
-        """Graph of the whole component, cached until the mesh is split again."""
-        if self._kept is None or self._kept[0] != self._split.n_faces:
-            self._kept = self._split.n_faces, self._patch(self._component)
-        return self._kept[1]
 
-    def _patch(self, inside: BoolArray) -> Patch:
-        """Graph of the living faces inside selected input faces.
+def _free(graph: LegGraph, blocked: BlockedElements) -> BoolArray:
+    """Whether a leg may pass through each node: interior nodes that are not blocked."""
+    free = graph.interior.copy()
+    free[graph.vertex_nodes(blocked.vertices)] = False
+    # A leg through the midpoint of an edge of another leg would cross that leg.
+    free[graph.midpoint_nodes(blocked.edges)] = False
+    return free
 
-        The arcs are the edges, the two halves of each edge, and the three lines between edge
-        midpoints in every face. Lines from a vertex to the midpoint of the opposite edge are
-        omitted: with them, splitting the edges of a path one by one would not always turn the lines
-        of the path into edges. Boundary edges have no arcs, because a path along the boundary would
-        separate the surface.
-        """
-        vertices, faces = np.unique(self._split.living_faces(inside), return_inverse=True)
-        faces = faces.reshape(-1, 3)
-        edges, count = unique_edges(faces)
-        n_vertices = len(vertices)
-        corner = self._split.positions(vertices)
-        node_position = np.concatenate([corner, corner[edges].mean(axis=1)])
-        keys = side_keys(faces, n_vertices).reshape(-1, 3)[:, [2, 0, 1]]
-        side_node = n_vertices + np.searchsorted(edges @ [n_vertices, 1], keys)
-        inner = count > 1
-        midpoint = n_vertices + np.flatnonzero(inner)
-        arcs = np.concatenate(
-            [
-                edges[inner],
-                np.stack([edges[inner, 0], midpoint], axis=1),
-                np.stack([edges[inner, 1], midpoint], axis=1),
-                side_node[:, [0, 1]],
-                side_node[:, [1, 2]],
-                side_node[:, [2, 0]],
-            ]
-        )
-        weight = np.ones(len(node_position))
-        if self._phi_fea is not None:
-            phi_fea = self._phi_fea_at(vertices)
-            at_nodes = np.concatenate([phi_fea, phi_fea[edges].mean(axis=1)])
-            weight = length_factor(at_nodes)
-        return Patch(
-            vertices=vertices,
-            edges=edges,
-            on_rim=~inner,
-            positions=node_position,
-            weight=weight,
-            arcs=arcs,
-            through_midpoints=np.arange(len(arcs)) >= len(midpoint),
-        )
 
-    def _free(self, patch: Patch, blocked: BlockedElements, ends: IntArray) -> BoolArray:
-        """Whether a leg may use each node: its ends, and interior nodes that are not blocked."""
-        n_vertices = len(patch.vertices)
-        free = np.ones(patch.size, dtype=bool)
-        free[patch.edges[patch.on_rim]] = False
-        free[n_vertices + np.flatnonzero(patch.on_rim)] = False
-        free[patch.node_indices(blocked.vertices)] = False
-        if len(blocked.edges):
-            # A leg through the midpoint of an edge of another leg would cross that leg.
-            size = self._split.n_vertices
-            keys = patch.vertices[patch.edges] @ [size, 1]
-            on_path = np.isin(keys, np.sort(blocked.edges, axis=1) @ [size, 1])
-            free[n_vertices + np.flatnonzero(on_path)] = False
-        free[ends] = True
-        return free
+def _without_crossing(graph: LegGraph, path: list[int]) -> list[int]:
+    """Shorten a path that both runs along an edge and passes the midpoint of that edge.
 
-    def _phi_fea_at(self, vertices: IntArray) -> FloatArray:
-        """φ_fea at vertices of the split mesh, interpolated at inserted vertices."""
-        assert self._phi_fea is not None
-        n_input = len(self._mesh.vertices)
-        result = self._phi_fea[np.minimum(vertices, n_input - 1)]
-        for index in np.flatnonzero(vertices >= n_input).tolist():
-            weights = self._split.weights(int(vertices[index]))
-            result[index] = sum(w * self._phi_fea[vertex] for vertex, w in weights.items())
-        return result
-
-    def _without_crossing(self, patch: Patch, path: list[int]) -> list[int]:
-        """Shorten a path that both runs along an edge and passes the midpoint of that edge.
-
-        Such a path may be the cheapest where the penalty beside other legs varies strongly.
-        """
-        at = {node_index: number for number, node_index in enumerate(path)}
-        for node_index in path:
-            if node_index < len(patch.vertices):
-                continue
-            low, high = sorted(
-                at.get(int(end), -2 - side)
-                for side, end in enumerate(patch.edges[node_index - len(patch.vertices)])
-            )
-            if low >= 0 and high == low + 1:
-                here = at[node_index]
-                first, last = (here, high) if here < low else (low, here)
-                return self._without_crossing(patch, path[: first + 1] + path[last:])
-        return path
+    Such a path may be the cheapest where the penalty beside other legs varies strongly.
+    """
+    step_along = {frozenset(step): number for number, step in enumerate(pairwise(path))}
+    for here, node in enumerate(path):
+        if node >= graph.n_vertices:
+            edge = frozenset(graph.edges[node - graph.n_vertices].tolist())
+            if edge in step_along:
+                start = step_along[edge]
+                first, last = (here, start + 1) if here < start else (start, here)
+                return _without_crossing(graph, path[: first + 1] + path[last:])
+    return path
 
 
 def _closeness(

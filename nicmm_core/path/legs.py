@@ -8,6 +8,9 @@ legs are still possible.
 
 from __future__ import annotations
 
+from collections import Counter
+from itertools import chain, pairwise
+
 import numpy as np
 
 from ..errors import UnreachableError
@@ -50,6 +53,8 @@ class Legs:
 
     Attributes
     ----------
+    split : SplitMesh
+    waypoints : list of int
     count : int
         Number of legs.
     """
@@ -57,29 +62,26 @@ class Legs:
     def __init__(
         self, split: SplitMesh, search: LegSearch, waypoints: list[int], closed: bool
     ) -> None:
-        self._split = split
-        self._search = search
-        self._waypoints = waypoints
+        self.split = split
+        self.waypoints = waypoints
         self.count = len(waypoints) - (not closed)
+        self._search = search
+        self._on_boundary = {v for v in waypoints if split.is_on_boundary(v)}
         self._paths: dict[int, list[int]] = {}
-        self._length: dict[int, float] = {}
+        self._lengths: dict[int, float] = {}
         self._splits_before = split.n_vertices
-
-    def ends(self, leg: int) -> tuple[int, int]:
-        """The first and last vertex of a leg."""
-        return self._waypoints[leg], self._waypoints[(leg + 1) % len(self._waypoints)]
 
     @property
     def length(self) -> float:
         """Total length of the legs found so far, weighted by φ_fea."""
-        return sum(self._length.values())
+        return sum(self._lengths.values())
 
     @property
     def vertices(self) -> list[int]:
         """Vertices of the whole path; the first vertex of a closed path is not repeated."""
         path = [vertex for leg in range(self.count) for vertex in self._paths[leg][:-1]]
-        closed = self.count == len(self._waypoints)
-        return path if closed else [*path, self._waypoints[-1]]
+        closed = self.count == len(self.waypoints)
+        return path if closed else [*path, self.waypoints[-1]]
 
     def lengths_alone(self, ratio: float) -> FloatArray:
         """Length of each leg if no other leg had to be avoided, shape (count,).
@@ -95,28 +97,20 @@ class Legs:
         CrossingError
             If a leg does not exist even without the other legs.
         """
-        nothing = np.zeros(0, dtype=np.int64)
-        free = BlockedElements(nothing, np.zeros((0, 2), dtype=np.int64), nothing)
-        lengths = np.zeros(self.count)
+        lengths = np.array([self._lengths.get(leg, np.inf) for leg in range(self.count)])
         for leg in range(self.count):
-            start, end = (self._split.position(vertex) for vertex in self.ends(leg))
-            lengths[leg] = self._length.get(leg, np.inf)
+            start, end = map(self.split.position, self._ends(leg))
             if lengths[leg] > ratio * np.linalg.norm(end - start):
-                self._open_corners(leg)
-                alone = self._search.shortest(*self.ends(leg), free)
-                if alone is None:
-                    raise CrossingError(leg)
-                lengths[leg] = alone.length
+                lengths[leg] = self._shortest(leg, BlockedElements()).length
         return lengths
 
-    def find_all(self, sequence: IntArray | None = None, most_length: float = np.inf) -> bool:
+    def find_all(self, sequence: IntArray, most_length: float) -> bool:
         """Find every leg, unless the path gets too long.
 
         Parameters
         ----------
-        sequence : (count,) int array, optional
-            Sequence in which legs are found, by default that of the path. Legs found earlier are
-            more direct.
+        sequence : (count,) int array
+            Sequence in which legs are found. Legs found earlier are more direct.
         most_length : float
             Length of the path, weighted by φ_fea, above which the search stops.
 
@@ -132,34 +126,19 @@ class Legs:
         UnreachableError
             If the path has too many windings, or its strands are too close for this mesh.
         """
-        legs = list(range(self.count)) if sequence is None else sequence.tolist()
-        safe, separating = self._by_separation(legs)
-        for leg in safe:
-            found = self._find(leg)
-            if found is None:
-                raise CrossingError(leg)
-            self._record(leg, found)
-            if self.length > most_length:
-                return False
-        while separating:
-            leg = self._find_one_of(separating)
-            separating.remove(leg)
+        safe, separating = self._by_separation(sequence.tolist())
+        while safe or separating:
+            if safe:
+                self._find(safe.pop(0))
+            else:
+                separating.remove(self._find_one_of(separating))
             if self.length > most_length:
                 return False
         return True
 
-    def _find_one_of(self, separating: list[int]) -> int:
-        """Find the first leg after which all remaining legs are possible; return its index."""
-        for leg in separating:
-            found = self._find(leg)
-            if found is None:
-                raise CrossingError(leg)
-            self._record(leg, found)
-            if self._all_possible([other for other in separating if other != leg]):
-                return leg
-            # The leg is discarded, but its splits of the mesh remain.
-            del self._paths[leg], self._length[leg]
-        raise CrossingError(separating[0])
+    def _ends(self, leg: int) -> tuple[int, int]:
+        """The first and last vertex of a leg."""
+        return self.waypoints[leg], self.waypoints[(leg + 1) % len(self.waypoints)]
 
     def _by_separation(self, sequence: list[int]) -> tuple[list[int], list[int]]:
         """Legs that join different groups of waypoints, and legs that close a cycle.
@@ -167,62 +146,57 @@ class Legs:
         All waypoints on boundaries are one group. Without such waypoints, only the last leg of a
         closed path closes a cycle.
         """
-        on_rim = {vertex for vertex in self._waypoints if self._is_on_rim(vertex)}
-        group = {vertex: -1 if vertex in on_rim else vertex for vertex in self._waypoints}
+        group = {vertex: -1 if vertex in self._on_boundary else vertex for vertex in self.waypoints}
         safe: list[int] = []
         separating: list[int] = []
         for leg in sequence:
-            first, second = (group[vertex] for vertex in self.ends(leg))
+            first, second = (group[vertex] for vertex in self._ends(leg))
             (separating if first == second else safe).append(leg)
             group = {v: first if own == second else own for v, own in group.items()}
         return safe, separating
 
-    def _find(self, leg: int) -> Leg | None:
-        """The shortest path for a leg around the legs found so far; None if it does not exist."""
-        self._open_corners(leg)
-        return self._search.shortest(*self.ends(leg), self._blocked(*self.ends(leg)))
+    def _find_one_of(self, separating: list[int]) -> int:
+        """Find the first leg after which all remaining legs are possible; return its index."""
+        for leg in separating:
+            self._find(leg)
+            others = [other for other in separating if other != leg]
+            for other in others:
+                self._open_corners(other)
+            if not others or self._search.are_joinable(
+                [self._ends(other) for other in others], self._blocked()
+            ):
+                return leg
+            # The leg is discarded, but its splits of the mesh remain.
+            del self._paths[leg], self._lengths[leg]
+        raise CrossingError(separating[0])
 
-    def _record(self, leg: int, found: Leg) -> None:
-        """Split the mesh along a leg and record it."""
-        self._paths[leg] = split_along(self._split, found.nodes)
-        self._length[leg] = found.length
-        if self._split.n_vertices - self._splits_before > MOST_PATH_SPLITS:
+    def _find(self, leg: int) -> None:
+        """Find a leg around the legs found so far, split the mesh along it and record it."""
+        found = self._shortest(leg, self._blocked(*self._ends(leg)))
+        self._paths[leg] = split_along(self.split, found.nodes)
+        self._lengths[leg] = found.length
+        if self.split.n_vertices - self._splits_before > MOST_PATH_SPLITS:
             raise UnreachableError(
                 "control_points: in this order the curve winds around itself too often (its path "
                 f"needs more than {MOST_PATH_SPLITS} virtual splits)"
             )
 
-    def _all_possible(self, legs: list[int]) -> bool:
-        """Whether each of the legs given, taken alone, can still be found."""
-        if not legs:
-            return True
-        for leg in legs:
-            self._open_corners(leg)
-        return self._search.are_joinable([self.ends(leg) for leg in legs], self._blocked())
+    def _shortest(self, leg: int, blocked: BlockedElements) -> Leg:
+        """The shortest path for a leg; raises CrossingError if there is none."""
+        self._open_corners(leg)
+        found = self._search.shortest(*self._ends(leg), blocked)
+        if found is None:
+            raise CrossingError(leg)
+        return found
 
     def _blocked(self, *free: int) -> BlockedElements:
         """All legs found so far, and all waypoints except the free ones."""
-        paths = [np.array(path, dtype=np.int64) for path in self._paths.values()]
-        edges = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
-        nothing = np.zeros((0, 2), dtype=np.int64)
-        vertices = np.concatenate([*paths, np.array(self._waypoints, dtype=np.int64)])
+        paths = self._paths.values()
+        legs_at = Counter(chain.from_iterable(map(self._ends, self._paths)))
         return BlockedElements(
-            vertices=np.setdiff1d(vertices, free),
-            edges=np.concatenate([*edges, nothing]),
-            ends=self._open_ends(),
-        )
-
-    def _open_ends(self) -> IntArray:
-        """Waypoints at which exactly one of the legs found so far ends."""
-        reached = [vertex for leg in self._paths for vertex in self.ends(leg)]
-        vertices, count = np.unique(np.array(reached, dtype=np.int64), return_counts=True)
-        return vertices[count == 1]
-
-    def _is_on_rim(self, vertex: int) -> bool:
-        """Whether a vertex belongs to an edge with only one face."""
-        return any(
-            len(self._split.faces_around(vertex) & self._split.faces_around(other)) == 1
-            for other in self._split.neighbours(vertex)
+            vertices={*self.waypoints, *chain.from_iterable(paths)}.difference(free),
+            edges={edge for path in paths for edge in pairwise(path)},
+            ends={vertex for vertex, count in legs_at.items() if count == 1},
         )
 
     def _open_corners(self, leg: int) -> None:
@@ -230,18 +204,15 @@ class Legs:
 
         These are the faces whose two edges at the waypoint belong to the boundary or to legs.
         """
-        for vertex in filter(self._is_on_rim, self.ends(leg)):
-            around = self._split.faces_around(vertex)
-            closed = {
-                other for path in self._paths.values() for other in _path_neighbours(path, vertex)
-            }
-            for face in sorted(around):
-                others = [corner for corner in self._split.corners(face) if corner != vertex]
+        paths = self._paths.values()
+        of_legs = {frozenset(edge) for path in paths for edge in (path[:2], path[-2:])}
+        for vertex in filter(self._on_boundary.__contains__, self._ends(leg)):
+            for face in sorted(self.split.faces_around(vertex)):
+                sides = [{vertex, other} for other in self.split.corners(face) if other != vertex]
                 if all(
-                    other in closed or len(around & self._split.faces_around(other)) == 1
-                    for other in others
+                    side in of_legs or len(self.split.faces_at_edge(*side)) == 1 for side in sides
                 ):
-                    self._split.split_face(face)
+                    self.split.split_face(face)
 
 
 def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
@@ -256,15 +227,10 @@ def split_along(split: SplitMesh, nodes: list[Node]) -> list[int]:
         If two consecutive vertices of the path cannot be joined by an edge.
     """
     path = [node if isinstance(node, int) else split.split_edge(*node) for node in nodes]
-    for start, end in zip(path[:-1], path[1:], strict=True):
+    for start, end in pairwise(path):
         if not split.join(start, end):
             raise UnreachableError(
                 "control_points: the paths between the control points come too close to each other "
                 "for this mesh; use a finer mesh or fewer points"
             )
     return path
-
-
-def _path_neighbours(path: list[int], vertex: int) -> list[int]:
-    """Neighbours of a vertex on a path if the vertex is an end of the path, otherwise empty."""
-    return [path[1]] * (path[0] == vertex) + [path[-2]] * (path[-1] == vertex)

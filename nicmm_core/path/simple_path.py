@@ -7,8 +7,6 @@ forth, the length varies by a large factor, and no rule finds the best sequence.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import UnreachableError
@@ -44,28 +42,7 @@ The second one is used as long as no path has been found because legs would cros
 """
 
 
-@dataclass(frozen=True)
-class Path:
-    """A simple path of edges of a split mesh.
-
-    Attributes
-    ----------
-    split : SplitMesh
-    vertices : list of int
-        Vertices of the path in order; the first vertex of a closed path is not repeated.
-    waypoints : (k,) int array
-        Vertices of the given points, in order.
-    length : float
-        Length of the path, weighted by φ_fea.
-    """
-
-    split: SplitMesh
-    vertices: list[int]
-    waypoints: IntArray
-    length: float
-
-
-def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Path:
+def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, closed: bool) -> Legs:
     """Find a simple path through points in their order, with virtual splits of the mesh.
 
     The first attempt finds the legs in the order of the points. If it fails, or if the path is much
@@ -84,8 +61,8 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
 
     Returns
     -------
-    Path
-        The shortest path found.
+    Legs
+        The legs of the shortest path found.
 
     Raises
     ------
@@ -99,26 +76,23 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
     clearance = STRAND_CLEARANCE * float(np.sqrt(mesh.face_areas[component].sum()))
     clearance *= min(1.0, (FULL_CLEARANCE_POINTS / len(points)) ** 0.5)
     generator = np.random.default_rng(0)
-    best: Path | None = None
+    best: Legs | None = None
     failure: UnreachableError | None = None
-    sequence: IntArray | None = None
-    splits = 0
+    sequence, splits = np.arange(len(points) - (not closed)), 0
     for attempt in range(MOST_TRIES_WHILE_CROSSING):
         split = SplitMesh(mesh)
         waypoints = split.insert_points(points)
         separate(split, waypoints)
         search = LegSearch(mesh, split, component, phi_fea, clearance)
         legs = Legs(split, search, waypoints.tolist(), closed)
-        done = False
         try:
-            done = legs.find_all(sequence, np.inf if best is None else best.length)
+            if legs.find_all(sequence, np.inf if best is None else best.length):
+                best = legs
         except UnreachableError as error:
             # Too many windings are reported rather than a crossing: they show that a path exists,
             # whereas after a crossing perhaps none does.
             if failure is None or not isinstance(error, CrossingError):
                 failure = error
-        if done:
-            best = Path(split, legs.vertices, waypoints, legs.length)
         if attempt == 0:
             lengths_alone = legs.lengths_alone(ACCEPTABLE_LENGTH_RATIO)
         if best is not None and best.length <= ACCEPTABLE_LENGTH_RATIO * lengths_alone.sum():
@@ -138,9 +112,7 @@ def find_path(mesh: Mesh, points: SurfacePoints, phi_fea: FloatArray | None, clo
 
 def separate(split: SplitMesh, waypoints: IntArray) -> None:
     """Split every edge between two waypoints, so that no two waypoints are neighbours."""
-    wanted = {int(waypoint) for waypoint in waypoints}
+    wanted = set(waypoints.tolist())
     for waypoint in sorted(wanted):
-        for face in sorted(split.faces_around(waypoint)):
-            for other in sorted(wanted.intersection(split.corners(face)) - {waypoint}):
-                if split.faces_around(waypoint) & split.faces_around(other):
-                    split.split_edge(waypoint, other)
+        for other in sorted(wanted & split.neighbours(waypoint)):
+            split.split_edge(waypoint, other)

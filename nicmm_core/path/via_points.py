@@ -151,7 +151,7 @@ def _off_the_boundary(mesh: Mesh, points: SurfacePoints, which: BoolArray) -> Su
     The path may touch the boundary at control points, but not at via points.
     """
     on_rim = np.zeros(len(mesh.vertices), dtype=bool)
-    on_rim[mesh.faces[:, [[1, 2], [2, 0], [0, 1]]][mesh.face_neighbours < 0]] = True
+    on_rim[mesh.unpaired_edges[0]] = True
     support = (points.barycentric > 0.0) & ~on_rim[mesh.faces[points.faces]]
     moved = (which & ~support.any(axis=1))[:, None]
     inside = (1.0 - OFF_BOUNDARY) * points.barycentric + OFF_BOUNDARY / 3.0

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from scipy import sparse
@@ -20,13 +21,16 @@ from ..geometry.mesh import Mesh, edge_lengths, triangle_areas, unique_edges
 from ..geometry.surface_points import SurfacePoints
 from ..progress import checkpoint
 
+Corners = tuple[int, ...]
+"""The three vertices of a face."""
+
 Weights = dict[int, float]
 """A point of the surface as weights of input vertices; vertices not listed have weight 0."""
 
 
 @dataclass(frozen=True)
 class WorkingMesh:
-    """The split mesh as arrays: n vertices and m faces of one component.
+    """Some faces of the split mesh as arrays: n vertices and m faces.
 
     Attributes
     ----------
@@ -37,25 +41,30 @@ class WorkingMesh:
     interpolation : (n, V) sparse array
         Row i holds the weights of the input vertices at vertex i, so that
         ``vertices == interpolation @ mesh.vertices``.
-    input_vertex : (n,) int array
-        The input vertex of each vertex, or -1 if it was inserted.
+    split_vertex : (n,) int array
+        Index of each vertex in the split mesh, ascending.
     """
 
     vertices: FloatArray
     faces: IntArray
     parent_face: IntArray
     interpolation: sparse.csr_array
-    input_vertex: IntArray
+    split_vertex: IntArray
+
+    @property
+    def input_vertex(self) -> IntArray:
+        """The input vertex of each vertex, or -1 if it was inserted, shape (n,)."""
+        return np.where(self.split_vertex < self.interpolation.shape[1], self.split_vertex, -1)
 
     @cached_property
-    def _unique_edges(self) -> tuple[IntArray, IntArray]:
-        """Edges, and the number of faces at each."""
+    def edges_and_counts(self) -> tuple[IntArray, IntArray]:
+        """Edges, (E, 2), and the number of faces at each, (E,)."""
         return unique_edges(self.faces)
 
     @property
     def edges(self) -> IntArray:
         """Undirected edges, shape (E, 2), smaller index first, sorted."""
-        return self._unique_edges[0]
+        return self.edges_and_counts[0]
 
     @cached_property
     def edge_lengths(self) -> FloatArray:
@@ -70,7 +79,7 @@ class WorkingMesh:
     @cached_property
     def on_boundary(self) -> BoolArray:
         """Whether each vertex belongs to an edge with only one face, shape (n,)."""
-        edges, count = self._unique_edges
+        edges, count = self.edges_and_counts
         result = np.zeros(len(self.vertices), dtype=bool)
         result[edges[count == 1]] = True
         return result
@@ -91,27 +100,35 @@ class SplitMesh:
     """
 
     def __init__(self, mesh: Mesh) -> None:
+        self.n_faces = len(mesh.faces)  # living or not
         self._mesh = mesh
+        self._is_living = np.ones(len(mesh.faces), dtype=bool)  # of the input faces
         self._new_weights: list[Weights] = []
-        self._new_faces: list[tuple[int, int, int]] = []
-        self._new_parents: list[int] = []
-        self._new_positions: list[FloatArray] = []
-        self._alive = np.ones(len(mesh.faces), dtype=bool)
-        self._new_alive = bytearray()
+        self._new_faces: dict[int, Corners] = {}  # only living ones
+        self._parents: dict[int, int] = {}
         self._faces_around: dict[int, set[int]] = {}
 
-    def corners(self, face: int) -> tuple[int, int, int]:
-        """Vertices of a face."""
-        n_input = len(self._mesh.faces)
-        if face >= n_input:
-            return self._new_faces[face - n_input]
-        a, b, c = self._mesh.faces[face]
-        return int(a), int(b), int(c)
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, those of the input mesh included."""
+        return len(self._mesh.vertices) + len(self._new_weights)
+
+    def corners(self, face: int) -> Corners:
+        """Vertices of a living face."""
+        if face in self._new_faces:
+            return self._new_faces[face]
+        return tuple(self._mesh.faces[face].tolist())
 
     def weights(self, vertex: int) -> Weights:
         """Position of a vertex as weights of input vertices."""
         n_input = len(self._mesh.vertices)
         return self._new_weights[vertex - n_input] if vertex >= n_input else {vertex: 1.0}
+
+    def position(self, vertex: int) -> FloatArray:
+        """Position of a vertex, shape (3,)."""
+        weights = self.weights(vertex)
+        values = np.fromiter(weights.values(), dtype=np.float64)
+        return values @ self._mesh.vertices[list(weights)]
 
     def faces_around(self, vertex: int) -> set[int]:
         """Living faces at a vertex."""
@@ -119,52 +136,22 @@ class SplitMesh:
             self._faces_around[vertex] = set(self._mesh.faces_at(np.array([vertex])).tolist())
         return self._faces_around[vertex]
 
+    def faces_at_edge(self, start: int, end: int) -> set[int]:
+        """Living faces that have both vertices; a boundary edge has only one."""
+        return self.faces_around(start) & self.faces_around(end)
+
     def input_face_with(self, start: int, end: int) -> int:
         """An input face that contains the edge between two vertices."""
-        return min(map(self._parent, self.faces_around(start) & self.faces_around(end)))
-
-    def position(self, vertex: int) -> FloatArray:
-        """Position of a vertex, shape (3,)."""
-        n_input = len(self._mesh.vertices)
-        return (
-            self._new_positions[vertex - n_input]
-            if vertex >= n_input
-            else self._mesh.vertices[vertex]
-        )
-
-    def positions(self, vertices: IntArray) -> FloatArray:
-        """Positions of several vertices, shape (q, 3)."""
-        n_input = len(self._mesh.vertices)
-        result = self._mesh.vertices[np.minimum(vertices, n_input - 1)]
-        for index in np.flatnonzero(vertices >= n_input).tolist():
-            result[index] = self._new_positions[vertices[index] - n_input]
-        return result
-
-    @property
-    def n_vertices(self) -> int:
-        """Number of vertices, those of the input mesh included."""
-        return len(self._mesh.vertices) + len(self._new_weights)
-
-    @property
-    def n_faces(self) -> int:
-        """Number of faces, living or not, those of the input mesh included."""
-        return len(self._mesh.faces) + len(self._new_faces)
-
-    def living_faces(self, inside: BoolArray) -> IntArray:
-        """Corners of the living faces inside selected input faces, shape (m, 3).
-
-        Parameters
-        ----------
-        inside : (F,) bool array
-            Selection of input faces.
-        """
-        new, parents = self._living_new_faces()
-        return np.concatenate([self._mesh.faces[inside & self._alive], new[inside[parents]]])
+        return min(map(self._parent, self.faces_at_edge(start, end)))
 
     def neighbours(self, vertex: int) -> set[int]:
         """Vertices joined to a vertex by an edge."""
         corners = {corner for face in self.faces_around(vertex) for corner in self.corners(face)}
         return corners - {vertex}
+
+    def is_on_boundary(self, vertex: int) -> bool:
+        """Whether a vertex belongs to an edge with only one face."""
+        return any(len(self.faces_at_edge(vertex, v)) == 1 for v in self.neighbours(vertex))
 
     def insert_points(self, points: SurfacePoints) -> IntArray:
         """Make every point a vertex by splitting the face or edge it lies on (Fig. 1).
@@ -197,15 +184,14 @@ class SplitMesh:
         bool
             Whether an edge joins the vertices afterwards.
         """
-        if second in self.neighbours(first):
+        if self.faces_at_edge(first, second):
             return True
         for face in sorted(self.faces_around(first)):
-            start, end = (corner for corner in self.corners(face) if corner != first)
-            across = self.faces_around(start) & self.faces_around(end) & self.faces_around(second)
-            if across and self._parent(face) == self._parent(other := min(across)):
-                a, b, c = self.corners(face)
-                if (start, end) not in ((a, b), (b, c), (c, a)):
-                    start, end = end, start
+            corners = self.corners(face)
+            place = corners.index(first)
+            start, end = corners[place - 2], corners[place - 1]
+            beyond = self.faces_at_edge(start, end) & self.faces_around(second)
+            if beyond and self._parent(face) == self._parent(other := min(beyond)):
                 self._replace_face(face, [(first, start, second)])
                 self._replace_face(other, [(first, second, end)])
                 return True
@@ -218,45 +204,47 @@ class SplitMesh:
     def assemble(self, component: int) -> tuple[WorkingMesh, IntArray]:
         """Return one connected component of the input mesh, with all splits, as arrays.
 
-        All splits have to lie on that component.
-
         Returns
         -------
         WorkingMesh
         (n_vertices,) int array
             Index in the working mesh of each vertex of this mesh, or -1 on other components.
         """
-        mesh = self._mesh
-        kept = np.flatnonzero(self._alive & (mesh.face_component == component))
-        new_faces, new_parents = self._living_new_faces()
-
-        faces = np.concatenate([mesh.faces[kept], new_faces])
-        used = np.unique(faces)
-        n_input = len(mesh.vertices)
-        renumbered = np.full(n_input + len(self._new_weights), -1, dtype=np.int64)
-        renumbered[used] = np.arange(len(used))
-        interpolation = self._interpolation(used)
-        working = WorkingMesh(
-            vertices=interpolation @ mesh.vertices,
-            faces=renumbered[faces],
-            parent_face=np.concatenate([kept, new_parents]),
-            interpolation=interpolation,
-            input_vertex=np.where(used < n_input, used, -1),
-        )
+        working = self.assemble_faces(self._mesh.face_component == component)
+        renumbered = np.full(self.n_vertices, -1, dtype=np.int64)
+        renumbered[working.split_vertex] = np.arange(len(working.split_vertex))
         return working, renumbered
 
-    def _interpolation(self, used: IntArray) -> sparse.csr_array:
-        """Matrix of the weights of input vertices, with one row for each vertex in ``used``."""
-        n_input = len(self._mesh.vertices)
-        kept = used[used < n_input]
-        new = [self._new_weights[vertex - n_input] for vertex in used[len(kept) :]]
-        columns = np.concatenate([kept, *(list(weights) for weights in new)])
-        values = np.concatenate([np.ones(len(kept)), *(list(w.values()) for w in new)])
-        ends = len(kept) + np.cumsum([0, *map(len, new)])
-        indptr = np.concatenate([np.arange(len(kept)), ends])
-        matrix = sparse.csr_array((values, columns, indptr), shape=(len(used), n_input))
-        matrix.sort_indices()
-        return matrix
+    def assemble_faces(self, inside: BoolArray) -> WorkingMesh:
+        """Return the living faces inside selected input faces, (F,), as arrays."""
+        mesh, n_input = self._mesh, len(self._mesh.vertices)
+        kept = np.flatnonzero(self._is_living & inside)
+        new = [face for face in self._new_faces if inside[self._parents[face]]]
+        corners = np.array([self._new_faces[face] for face in new], dtype=np.int64)
+        parents = np.array([self._parents[face] for face in new], dtype=np.int64)
+        used, faces = np.unique(
+            np.concatenate([mesh.faces[kept], corners.reshape(-1, 3)]), return_inverse=True
+        )
+        n_kept = int(np.searchsorted(used, n_input))
+        weights = [self._new_weights[vertex - n_input] for vertex in used[n_kept:].tolist()]
+        ends = n_kept + np.cumsum([0, *map(len, weights)])
+        columns = np.fromiter(chain.from_iterable(weights), dtype=np.int64)
+        values = np.fromiter(chain.from_iterable(w.values() for w in weights), dtype=np.float64)
+        interpolation = sparse.csr_array(
+            (
+                np.concatenate([np.ones(n_kept), values]),
+                np.concatenate([used[:n_kept], columns]),
+                np.concatenate([np.arange(n_kept), ends]),
+            ),
+            shape=(len(used), n_input),
+        )
+        return WorkingMesh(
+            vertices=interpolation @ mesh.vertices,
+            faces=faces.reshape(-1, 3),
+            parent_face=np.concatenate([kept, parents]),
+            interpolation=interpolation,
+            split_vertex=used,
+        )
 
     def _insert_point(self, input_face: int, barycentric: FloatArray) -> int:
         """Make a point of an input face a vertex, and return the vertex."""
@@ -278,17 +266,12 @@ class SplitMesh:
         return self._split_face_at(face, weights)
 
     def _locate(
-        self, input_face: int, input_corners: tuple[int, int, int], barycentric: FloatArray
+        self, input_face: int, input_corners: Corners, barycentric: FloatArray
     ) -> tuple[int, FloatArray]:
         """The living face that contains a point of an input face, and its barycentrics there."""
-        if self._alive[input_face]:
+        if self._is_living[input_face]:
             return input_face, barycentric
-        n_input = len(self._mesh.faces)
-        inside = [
-            n_input + child
-            for child, parent in enumerate(self._new_parents)
-            if parent == input_face and self._new_alive[child]
-        ]
+        inside = [face for face in self._new_faces if self._parents[face] == input_face]
         # One matrix per child face; its columns are the corners of the child in barycentric
         # coordinates of the input face.
         matrices = [
@@ -304,7 +287,7 @@ class SplitMesh:
     def _split_edge_at(self, start: int, end: int, weights: Weights) -> int:
         """Insert a vertex on an edge and bisect the faces at the edge."""
         middle = self._add_vertex(weights)
-        for face in sorted(self.faces_around(start) & self.faces_around(end)):
+        for face in sorted(self.faces_at_edge(start, end)):
             corners = self.corners(face)
             halves = [
                 tuple(middle if corner == replaced else corner for corner in corners)
@@ -320,44 +303,30 @@ class SplitMesh:
         self._replace_face(face, [(a, b, middle), (b, c, middle), (c, a, middle)])
         return middle
 
-    def _living_new_faces(self) -> tuple[IntArray, IntArray]:
-        """Corners of the living faces created by splits, and the input faces that contain them."""
-        new = np.flatnonzero(np.frombuffer(bytes(self._new_alive), dtype=bool))
-        faces = np.array(self._new_faces, dtype=np.int64).reshape(-1, 3)
-        parents = np.array(self._new_parents, dtype=np.int64)
-        return faces[new], parents[new]
-
     def _add_vertex(self, weights: Weights) -> int:
         """Append a vertex without faces, and return its index."""
         checkpoint()
         vertex = self.n_vertices
         self._new_weights.append(weights)
-        corners = self._mesh.vertices[list(weights)]
-        self._new_positions.append(np.fromiter(weights.values(), dtype=np.float64) @ corners)
         self._faces_around[vertex] = set()
         return vertex
 
     def _parent(self, face: int) -> int:
         """The input face that contains a face."""
-        n_input = len(self._mesh.faces)
-        return face if face < n_input else self._new_parents[face - n_input]
+        return self._parents.get(face, face)
 
-    def _replace_face(self, face: int, children: list[tuple[int, ...]]) -> None:
+    def _replace_face(self, face: int, children: Sequence[Corners]) -> None:
         """Replace a living face by new faces, given by their corners, in the same input face."""
-        n_input = len(self._mesh.faces)
-        parent = self._parent(face)
-        if face < n_input:
-            self._alive[face] = False
-        else:
-            self._new_alive[face - n_input] = False
         for corner in self.corners(face):
             self.faces_around(corner).discard(face)
-        for a, b, c in children:
-            for corner in (a, b, c):
+        if self._new_faces.pop(face, None) is None:
+            self._is_living[face] = False
+        for corners in children:
+            for corner in corners:
                 self.faces_around(corner).add(self.n_faces)
-            self._new_faces.append((a, b, c))
-            self._new_parents.append(parent)
-            self._new_alive.append(True)
+            self._new_faces[self.n_faces] = corners
+            self._parents[self.n_faces] = self._parent(face)
+            self.n_faces += 1
 
 
 def _centroid(points: Sequence[Weights]) -> Weights:

@@ -162,12 +162,6 @@ def noded(
     return DiscreteCurve(nodes, control_nodes, places, np.arange(len(places)))
 
 
-def arc_lengths(positions: FloatArray, closed: bool) -> FloatArray:
-    """Arc lengths at the starts of the s segments of a polyline and at its end, shape (s + 1,)."""
-    steps = np.linalg.norm(np.roll(positions, -1, axis=0) - positions, axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps if closed else steps[:-1])])
-
-
 def shifted(
     surface: CurveSurface, nodes: Nodes, direction: FloatArray, length: FloatArray
 ) -> tuple[Nodes, BoolArray, int]:
