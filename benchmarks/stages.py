@@ -15,7 +15,14 @@ from unittest import mock
 import numpy as np
 
 import nicmm_core as nicmm
-from nicmm_core import design, repaired_surface, shapes, start_search, surface_designer
+from nicmm_core import (
+    design,
+    mapped_surface,
+    repaired_surface,
+    shapes,
+    start_search,
+    surface_designer,
+)
 from nicmm_core.coarsening import coarse_start
 from nicmm_core.courses import course_candidates, course_search, course_surface
 from nicmm_core.geometry.array_types import IntArray
@@ -50,7 +57,7 @@ STAGES: dict[str, list[tuple[ModuleType | type, str]]] = {
         (repaired_surface.Manifold, "request"),
         (repaired_surface.Manifold, "design_on_original"),
     ],
-    "normals": [(start_search, "curve_surface"), (course_surface, "curve_surface")],
+    "normals": [(mapped_surface, "curve_surface"), (course_surface, "curve_surface")],
     "coarse mesh": [(coarse_start, "build_coarse_mesh")],
     "hop graph": [(course_surface, "build_hop_graph")],
     "distances, order of the points": [
