@@ -355,13 +355,17 @@ def test_sanitized(arguments: Sequence[str]) -> int:
     """Run the quick tests of the core with kernels that check themselves, compiled by gcc."""
     if run([VENV_PYTHON, KERNELS / "compile_library.py", "sanitized"]) != 0:
         raise BuildError("gcc with its sanitizers is needed; see the output above")
-    runtime = subprocess.run(
-        ["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
-    )
+    # Without the library of C++, the runtime aborts where a library throws an exception.
+    runtime = [
+        subprocess.run(
+            ["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for name in ("libasan.so", "libstdc++.so")
+    ]
     environment = {
         **ONE_THREAD,
         "NICMM_KERNELS_LIBRARY": str(KERNELS / "nicmm_kernels/libnicmm_kernels_sanitized.so"),
-        "LD_PRELOAD": runtime.stdout.strip(),
+        "LD_PRELOAD": " ".join(runtime),
         # Python itself frees little at its end, and tests ask for more memory than there is.
         "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",
     }
