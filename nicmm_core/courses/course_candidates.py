@@ -24,7 +24,7 @@ from .leg_combinations import (
     steps_of_course,
 )
 from .leg_orders import MOST_POINTS, cheapest_orders, legs_of_order
-from .leg_routes import Routes, cells_beside, leg_choices, routes_of_legs
+from .leg_routes import LegChoices, Routes, cells_beside, leg_choices, routes_of_legs
 
 
 def candidates(
@@ -69,18 +69,7 @@ def candidates(
         choices = leg_choices(courses, ((start, end) for start, end in legs), n_legs)
         orders = [order]
     checkpoint()
-    routes: list[list[Routes]] = []
-    possible: list[IntArray] = []
-    beside = cells_beside(courses)
-    for order in orders:
-        if any(np.array_equal(order, other) for other in possible):
-            continue
-        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed, beside)
-        if of_order:
-            routes.append(of_order)
-            possible.append(order)
-        if len(routes) == len(numbers):
-            break
+    possible, routes = _routes_of_orders(courses, choices, orders, closed, len(numbers))
     if not routes:
         return None
     with subrange(0.2, 0.3):
@@ -112,3 +101,26 @@ def candidates(
     point[at_points] = np.concatenate(visit)
     # Legs were placed on the surface without maps.
     return nodes_at(surface, nodes.places, closed, nodes.curves), point
+
+
+def _routes_of_orders(
+    courses: CourseGraph,
+    choices: dict[tuple[int, int], LegChoices],
+    orders: list[IntArray],
+    closed: bool,
+    most: int,
+) -> tuple[list[IntArray], list[list[Routes]]]:
+    """The first orders all of whose legs have routes, each once, with the routes of their legs."""
+    routes: list[list[Routes]] = []
+    possible: list[IntArray] = []
+    beside = cells_beside(courses)
+    for order in orders:
+        if any(np.array_equal(order, other) for other in possible):
+            continue
+        of_order = routes_of_legs(courses, choices, legs_of_order(order, closed), closed, beside)
+        if of_order:
+            routes.append(of_order)
+            possible.append(order)
+        if len(routes) == most:
+            break
+    return possible, routes
