@@ -113,49 +113,35 @@ def relax_curves(
     faces, barycentric = faces.copy(), barycentric.copy()
 
     def relax(part: slice, meanwhile: Callable[[], object]) -> None:
-        given = faces[part], barycentric[part], fixed[part]
-        _relax_curves(surface, *given, closed, rules, batch, meanwhile)
+        count = part.stop - part.start
+        iterations, quiet = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+        dampings = np.full(count, rules.steps.least_damping)
+        curves = _CurveBatch(
+            count, n, int(closed), faces[part].ctypes.data, barycentric[part].ctypes.data,
+            fixed[part].ctypes.data, iterations.ctypes.data, quiet.ctypes.data,
+            dampings.ctypes.data,
+        )  # fmt: skip
+        room, started = steps.PAIRS_OF_A_NODE * n, False
+        while (iterations < batch.iterations).any():
+            if started:
+                meanwhile()
+            started = True
+            items = _ITEMS.result(n, room)
+            scratch = np.empty(items)
+            code = _RELAX.result(
+                surface.pointers,
+                rules,
+                batch,
+                curves,
+                room,
+                scratch.ctypes.data,
+                items,
+                library.MOST_WORK,
+            )
+            if code == library.TOO_SMALL and room < n * n:
+                room = steps.more_room(room, n)
+            else:
+                _RELAX.check(code)
 
     in_threads(relax, c, meanwhile)
     return faces, barycentric
-
-
-def _relax_curves(
-    surface: SurfaceArrays,
-    faces: IntArray,
-    barycentric: FloatArray,
-    fixed: BoolArray,
-    closed: bool,
-    rules: RelaxationRules,
-    batch: BatchRules,
-    meanwhile: Callable[[], object],
-) -> None:
-    """Relax some curves; their faces and coordinates are replaced."""
-    c, n = faces.shape
-    iterations, quiet = np.zeros(c, dtype=np.int64), np.zeros(c, dtype=np.int64)
-    dampings = np.full(c, rules.steps.least_damping)
-    curves = _CurveBatch(
-        c, n, int(closed), faces.ctypes.data, barycentric.ctypes.data, fixed.ctypes.data,
-        iterations.ctypes.data, quiet.ctypes.data, dampings.ctypes.data,
-    )  # fmt: skip
-    room, started = steps.PAIRS_OF_A_NODE * n, False
-    while (iterations < batch.iterations).any():
-        if started:
-            meanwhile()
-        started = True
-        items = _ITEMS.result(n, room)
-        scratch = np.empty(items)
-        code = _RELAX.result(
-            surface.pointers,
-            rules,
-            batch,
-            curves,
-            room,
-            scratch.ctypes.data,
-            items,
-            library.MOST_WORK,
-        )
-        if code == library.TOO_SMALL and room < n * n:
-            room = steps.more_room(room, n)
-        else:
-            _RELAX.check(code)
