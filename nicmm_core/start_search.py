@@ -86,14 +86,14 @@ class StartSearch:
         request: Request,
         seed: int = 0,
         most_failures: int | None = None,
-        search: SearchSize = WHOLE,
+        search_size: SearchSize = WHOLE,
     ) -> Iterator[InitialCurve]:
         """Courses that are simple on the mesh, the best first; seeds above 0 use random lengths.
 
         The search ends after `most_failures` courses in a row that are not simple.
         """
         failures = 0
-        for start in self._joined_courses(request, seed, search):
+        for start in self._joined_courses(request, seed, search_size):
             failures = failures + 1 if start is None else 0
             if start is not None:
                 yield start
@@ -109,7 +109,7 @@ class StartSearch:
         """
         known = [curve]
         part_request = request_for_part(request, curve, part)
-        for course in self.courses(part_request, most_failures=MOST_FAILURES, search=PART):
+        for course in self.courses(part_request, most_failures=MOST_FAILURES, search_size=PART):
             assert isinstance(course.curve, DiscreteCurve)
             changed = with_part(start.surface, curve, part, course.curve)
             if changed is not None and is_apart(start.surface, changed, known):
@@ -130,16 +130,16 @@ class StartSearch:
         return InitialCurve(path_curve(self.mesh, path), path.order, surface, self.surface.unit)
 
     def _joined_courses(
-        self, request: Request, seed: int, search: SearchSize
+        self, request: Request, seed: int, search_size: SearchSize
     ) -> Iterator[InitialCurve | None]:
         """Courses joined on the mesh; None for each course that is not simple there."""
         mapped, unit = self.surface.of(request), self.surface.unit
         if self._coarse_starts.is_large:
-            for found in self._coarse_starts.courses(request, seed, search):
+            for found in self._coarse_starts.courses(request, seed, search_size):
                 self.transferred += 1
                 yield None if found is None else InitialCurve(*found, mapped, unit)
             return
-        for course in self._courses.courses(request, seed, search):
+        for course in self._courses.courses(request, seed, search_size):
             checkpoint()
             curve = simple_curve(
                 self.surface.without_maps,

@@ -45,19 +45,19 @@ class CoarseStarts:
         self._copies: dict[int, tuple[Renumbered, CourseSurface]] = {}
 
     def courses(
-        self, request: Request, seed: int = 0, search: SearchSize = WHOLE
+        self, request: Request, seed: int = 0, search_size: SearchSize = WHOLE
     ) -> Iterator[tuple[DiscreteCurve, IntArray] | None]:
         """Yield the courses on the coarse mesh, the best first, as curves on the fine mesh.
 
         With each comes the order in which it visits the control points. A course that is not simple
         on the fine mesh is None. There may be no courses where points are close together. `seed`
-        and `search` are those of `CourseSurface.courses`.
+        and `search_size` are those of `CourseSurface.courses`.
         """
         with contextlib.suppress(NicmmError):
             on_coarse = _on_coarse(self._mesh, self._coarse, request)
             copy, surface = self._copy_under(on_coarse.points)
             on_copy = mapped_request(on_coarse, copy.points_to, copy.weights_to)
-            for course in surface.courses(on_copy, seed, search):
+            for course in surface.courses(on_copy, seed, search_size):
                 checkpoint()
                 places = copy.points_back(course.places)
                 nodes = noded(self._coarse_surface, places, course.control_nodes, request.closed)

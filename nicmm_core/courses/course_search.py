@@ -112,7 +112,7 @@ def find_courses(
     smoothness: float,
     any_order: bool,
     seed: int = 0,
-    search: SearchSize = WHOLE,
+    search_size: SearchSize = WHOLE,
 ) -> Iterator[tuple[Nodes, IntArray]]:
     """Yield relaxed courses through points, by ascending energy, simple ones first.
 
@@ -142,7 +142,7 @@ def find_courses(
     seed : int
         Seed of random factors of the lengths in the graph, which give other courses; 0 for no
         factors.
-    search : SearchSize
+    search_size : SearchSize
     """
     legs = legs_of_order(np.arange(len(points)), closed)
     if len(legs) > MOST_LEGS:
@@ -154,7 +154,7 @@ def find_courses(
     tension = TENSIONS[seed % len(TENSIONS)] * 4.0 * np.pi**2 / smoothness
     courses = with_control_points(graph, points, along, legs, factor, tension)
     checkpoint()
-    found = candidates(courses, surface, closed, smoothness, any_order, search.candidates)
+    found = candidates(courses, surface, closed, smoothness, any_order, search_size.candidates)
     if found is None:
         return
     nodes, point = found
@@ -163,9 +163,11 @@ def find_courses(
     nodes, visit, _ = remove_crossings(surface, nodes, number[point], any_order)
     with subrange(0.4, 0.6):
         nodes, visit = _relaxed(surface, nodes, visit, smoothness, OF_CANDIDATES)
-        nodes, visit, doublings = _resolved(surface, nodes, visit, smoothness, search.finalists)
+        nodes, visit, doublings = _resolved(
+            surface, nodes, visit, smoothness, search_size.finalists
+        )
     nodes, visit, simple = remove_crossings(surface, nodes, visit, any_order)
-    combined = recombined(surface, nodes, visit, simple, smoothness, search.recombined)
+    combined = recombined(surface, nodes, visit, simple, smoothness, search_size.recombined)
     if combined is not None:
         new, new_visit, _ = remove_crossings(surface, *combined, any_order)
         with subrange(0.6, 0.7):
@@ -174,7 +176,7 @@ def find_courses(
         places = joined([nodes.places, new.places])
         nodes = nodes_at(surface, places, closed, nodes.curves + new.curves)
         visit, simple = np.append(visit, new_visit), np.append(simple, new_simple)
-    best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search.finalists]
+    best = np.concatenate(_best(surface, nodes, simple, smoothness))[: search_size.finalists]
     nodes, visit = _selected(nodes, visit, best)
     nodes, visit = _resampled(surface, nodes, visit, 2 if doublings < MOST_DOUBLINGS else 1)
     with subrange(0.7, 1.0):

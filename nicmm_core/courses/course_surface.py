@@ -105,7 +105,7 @@ class CourseSurface:
         return MappedSurface(mesh, replace(own, vertex_normals=normals))
 
     def courses(
-        self, request: Request, seed: int = 0, search: SearchSize = WHOLE
+        self, request: Request, seed: int = 0, search_size: SearchSize = WHOLE
     ) -> Iterator[Course]:
         """Yield courses for a request, the best first, each once more with twice as many nodes.
 
@@ -117,7 +117,7 @@ class CourseSurface:
         seed : int
             Seed of random factors of the lengths in the hop graph, which give other courses; 0 for
             no factors.
-        search : SearchSize
+        search_size : SearchSize
 
         Raises
         ------
@@ -153,7 +153,7 @@ class CourseSurface:
             request.smoothness,
             any_order=request.order == "shortest" and not request.via_points,
             seed=seed,
-            search=search,
+            search_size=search_size,
         )
         for nodes, visit in found:
             places = self._refined.in_parents(nodes.places)

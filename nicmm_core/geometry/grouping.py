@@ -135,7 +135,7 @@ def path_between(previous: IntArray | Mapping[int, int], start: int, end: int) -
 def shortest_chain(
     start: int, neighbours: Callable[[int], Iterable[int]], is_end: Callable[[int], bool]
 ) -> list[int]:
-    """Nodes of a path of the fewest arcs from a node to an end; empty if there is none."""
+    """Nodes of a path of the fewest arcs from a node to an end; empty without one."""
     previous = {start: start}
     queue = [start]
     for node in queue:

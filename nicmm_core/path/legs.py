@@ -182,7 +182,7 @@ class Legs:
             )
 
     def _shortest(self, leg: int, blocked: BlockedElements) -> Leg:
-        """The shortest path for a leg; raises CrossingError if there is none."""
+        """The shortest path for a leg; raises CrossingError without one."""
         self._open_corners(leg)
         found = self._search.shortest(*self._ends(leg), blocked)
         if found is None:

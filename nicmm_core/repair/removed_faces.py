@@ -99,7 +99,7 @@ class RemovedFaces:
         """Where a curve passes from a face across removed faces to one that holds a point.
 
         Consecutive faces have a vertex or an edge at the position of the point in common. The place
-        on each is given in the face that is left and in the face that is entered. There are none if
+        on each is given in the face that is left and in the face that is entered. Both are empty if
         the first face holds the point, or if no such chain of faces leads to the point.
         """
         position = point.positions(self._mesh)[0]
