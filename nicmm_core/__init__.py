@@ -1,4 +1,4 @@
-"""NICMM: smooth curves on triangle meshes that pass exactly through control points.
+"""NICMM Curves: smooth curves on triangle meshes that pass exactly through control points.
 
 The entry point is `design_curve`; `design.py` lists the stages in order. The modules behind the
 public names are imported on first use, so `nicmm_core.options` can be imported without loading the

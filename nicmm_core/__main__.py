@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import Status, design_curve, options
-from .errors import ArgumentError, NicmmError
+from .errors import ArgumentError, MissingPackageError, NicmmError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh
 from .io.files import check_curve_path, read_mesh, write_curve, write_mesh
@@ -146,7 +146,14 @@ def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> Float
 
 
 def _pretrain(given: argparse.Namespace) -> None:
-    from tqdm import tqdm
+    try:
+        import torch  # noqa: F401
+        from tqdm import tqdm
+    except ImportError as error:
+        raise MissingPackageError(
+            f"pretrain needs PyTorch and tqdm, which cannot be imported ({error}); install them "
+            "into this Python with 'pip install torch tqdm'"
+        ) from error
 
     from .paper.network import NetworkConfig
     from .paper.pretraining import PretrainingConfig, pretrain

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import options
-from .errors import ArgumentError, MissingPackageError
+from .errors import ArgumentError
 from .geometry.array_types import FloatArray
 from .geometry.mesh import Mesh, real_array
 from .options import Kind, Option
@@ -121,17 +121,6 @@ def check_iterations(max_iterations: Any) -> None:
         raise ArgumentError(
             f"max_iterations is {max_iterations!r}; pass a positive whole number or None"
         )
-
-
-def check_torch() -> None:
-    """Raise MissingPackageError unless PyTorch can be imported."""
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise MissingPackageError(
-            f'method "nicmm-paper" needs PyTorch, which cannot be imported ({error}); install it '
-            "into this Python with 'pip install torch', or choose the method \"nicmm\""
-        ) from error
 
 
 def checked_vertex_values(name: str, values: ArrayLike, mesh: Mesh, kind: str) -> FloatArray:

@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_iterations, check_torch, checked_options
+from .arguments import check_iterations, checked_options
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -88,7 +88,7 @@ class Designer:
         closed: bool = True,
         order: str = "given",
         via_points: ViaPoints | None = None,
-        method: str = "nicmm",
+        method: str = "elastic",
         obstacles: ArrayLike | None = None,
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
@@ -105,7 +105,7 @@ class Designer:
         Parameters
         ----------
         start : Design or SurfaceCurve, optional
-            A curve on this mesh from which the design starts; only with the method "nicmm". Its
+            A curve on this mesh from which the design starts; only with the method "elastic". Its
             course and the order of its points are kept, so the result may differ from a design
             without a start, and `via_points` have no effect. Obstacles, maps and smoothness may
             differ from those of the start. If the start is a converged Design and only painted
@@ -113,7 +113,7 @@ class Designer:
             removed, or moved by up to a tenth of the curve's length. The cost depends on the curve
             and not on the size of the mesh, so a start suits interactive dragging of a point.
         max_iterations : int, optional
-            Limit on the iterations of the relaxation; only with the method "nicmm". If the curve
+            Limit on the iterations of the relaxation; only with the method "elastic". If the curve
             has not converged by then, the status is `ITERATION_LIMIT`. For interactive drawing,
             pass each design as the next start until the curve has converged.
 
@@ -141,8 +141,6 @@ class Designer:
             with watched(progress), self._exclusive():
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
-                if method == "nicmm-paper":
-                    check_torch()
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)
                 options["via_points"] = located_via_points(
                     self.mesh, points, options["via_points"], order, closed
@@ -217,18 +215,18 @@ def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
 def _check_start(start: object, method: str, max_iterations: int | None, alternatives: int) -> None:
     """Raise ArgumentError unless the arguments fit the method and each other."""
     check_iterations(max_iterations)
-    if alternatives and (method != "nicmm" or start is not None or max_iterations is not None):
+    if alternatives and (method != "elastic" or start is not None or max_iterations is not None):
         raise ArgumentError(
-            f'alternatives is {alternatives}, which needs the method "nicmm" and neither start nor '
-            "max_iterations; leave it out"
+            f'alternatives is {alternatives}, which needs the method "elastic" and neither start '
+            "nor max_iterations; leave it out"
         )
     if start is not None and not isinstance(start, Design | SurfaceCurve):
         raise ArgumentError(
             f"start is a {type(start).__name__}; pass a Design, a SurfaceCurve or None"
         )
     for name, value in (("start", start), ("max_iterations", max_iterations)):
-        if value is not None and method != "nicmm":
-            raise ArgumentError(f'{name} needs the method "nicmm", not {method!r}; leave one out')
+        if value is not None and method != "elastic":
+            raise ArgumentError(f'{name} needs the method "elastic", not {method!r}; leave one out')
 
 
 def design_curve(
@@ -238,7 +236,7 @@ def design_curve(
     closed: bool = True,
     order: str = "given",
     via_points: ViaPoints | None = None,
-    method: str = "nicmm",
+    method: str = "elastic",
     obstacles: ArrayLike | None = None,
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
@@ -265,10 +263,10 @@ def design_curve(
         ``{1: [57]}``. The key is the index of a control point. The value has points, in any form
         that control points may have, through which the curve from which the computation starts
         runs to the next control point. The result passes near them. Only for the order "given".
-    method : {"nicmm", "nicmm-paper", "variational"}
-        The best of many candidate courses, or else the initial path, relaxed on the surface (the
-        default); the method of the paper, which trains a network for every curve; or the same
-        energy minimised without a network.
+    method : {"elastic", "nicmm", "variational"}
+        The best of many candidate courses, or else the initial path, relaxed as an elastic curve
+        (the default); the network of the paper, fitted to each curve; or the same energy as for
+        "nicmm", minimised without a network.
     obstacles, alignment : (V,) array_like of weights in [0, 1], optional
         Weights of vertices that the curve avoids, and of vertices that it follows. No curve enters
         a face whose three corners are obstacles of weight 1; smaller weights only add to the cost.
@@ -278,7 +276,7 @@ def design_curve(
         Larger values give a fairer curve that follows the shortest path less closely.
     alternatives : int, default 0
         Largest number of further curves, along other courses, to return in `Design.alternatives`.
-        Only with the method "nicmm".
+        Only with the method "elastic".
     progress : callable, optional
         Called up to ten times a second with the fraction done and the points of the current curve,
         an (n, 3) array that is empty at first. If the function returns False, the design stops and
@@ -297,8 +295,6 @@ def design_curve(
         around itself too often, or if obstacles of weight 1 separate the points.
     ArgumentError
         If another argument cannot be used.
-    MissingPackageError
-        If the method needs PyTorch and it cannot be imported.
 
     Examples
     --------

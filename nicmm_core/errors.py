@@ -54,4 +54,4 @@ class CurveError(NicmmError):
 
 
 class MissingPackageError(NicmmError):
-    """The chosen method needs a package that is not installed."""
+    """Pretraining needs a package that is not installed."""

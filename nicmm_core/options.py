@@ -110,17 +110,21 @@ OPTIONS: tuple[Option, ...] = (
     Option(
         "method",
         Kind.CHOICE,
-        "nicmm",
+        "elastic",
         "Method",
         "How the curve is computed",
         choices=(
-            Choice("nicmm", "NICMM", "Compare many courses and relax the best one"),
             Choice(
-                "nicmm-paper",
-                "NICMM (Paper)",
-                "The method of the paper, which trains a network for each curve. Needs PyTorch",
+                "elastic",
+                "Elastic",
+                "Search for the fairest course and relax it as an elastic curve",
             ),
-            Choice("variational", "Variational", "The same energy without a network"),
+            Choice("nicmm", "NICMM (Neural)", "The network of the paper, fitted to each curve"),
+            Choice(
+                "variational",
+                "Variational",
+                "The same energy as NICMM, minimised without a network",
+            ),
         ),
     ),
     Option(

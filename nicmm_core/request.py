@@ -25,7 +25,7 @@ class Request:
     order : {"given", "shortest"}
     via_points : dict
         Points on the path to the next control point, by the index of the control point before.
-    method : {"nicmm", "nicmm-paper", "variational"}
+    method : {"elastic", "nicmm", "variational"}
     smoothness : float
     obstacles : (V,) float array or None
     clearance : float

@@ -27,7 +27,7 @@ class Status(enum.Enum):
     )
     NOT_ONE_CURVE = (
         "the level set is not one simple curve through all control points; the mesh may be too "
-        "coarse there; subdivide it, or use the method 'nicmm'"
+        "coarse there; subdivide it, or use the method 'elastic'"
     )
 
     def __str__(self) -> str:

@@ -66,7 +66,7 @@ class SurfaceDesigner:
         started : float
             Value of `time.perf_counter` when the design began.
         start : Resumable or SurfaceCurve, optional
-            A curve on this mesh from which the method "nicmm" starts.
+            A curve on this mesh from which the method "elastic" starts.
         max_iterations : int, optional
             Limit on the total number of iterations of the relaxation.
 
@@ -77,7 +77,7 @@ class SurfaceDesigner:
         CurveError
             If the start cannot be used.
         """
-        if request.method == "nicmm":
+        if request.method == "elastic":
             if start is not None:
                 return self._resumed(request, start, max_iterations, started)
             return self._designed(request, max_iterations, started)

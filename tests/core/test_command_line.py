@@ -188,6 +188,16 @@ def test_pretrain_refuses_to_train_nothing(mesh_file, tmp_path, capsys, options)
     assert not output.exists()
 
 
+@pytest.mark.parametrize("package", ["torch", "tqdm"])
+def test_pretrain_says_which_package_is_missing(mesh_file, tmp_path, capsys, monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)  # makes its import fail
+    output = tmp_path / "weights.npz"
+    assert main(["pretrain", str(mesh_file), "-o", str(output)]) == 2
+    message = capsys.readouterr().err
+    assert package in message.partition("(")[2] and "pip install" in message
+    assert not output.exists()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "arguments"),

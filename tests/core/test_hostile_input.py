@@ -23,7 +23,7 @@ EACH = 35
 @pytest.mark.parametrize(
     "arguments",
     [
-        {"method": np.array(["nicmm", "nicmm"])},
+        {"method": np.array(["elastic", "elastic"])},
         {"order": np.array([1, 2, 3])},
         {"order": []},
         {"closed": np.array([1, 2, 3])},

@@ -33,7 +33,7 @@ STAGES = {
     "paper": (
         shapes.sphere(2),
         [3, 50, 90, 140],
-        {"closed": False, "method": "nicmm-paper"},
+        {"closed": False, "method": "nicmm"},
         "leg_search leg_graph virtual_splits band_refinement sign_bundle sparse_solver smoothing "
         "finetuning",
     ),

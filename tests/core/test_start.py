@@ -432,7 +432,7 @@ class TestRefusals:
         self.refused(ball, CHOSEN, "max_iterations is", nicmm.ArgumentError, max_iterations=bad)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("method", ["variational", "nicmm-paper"])
+    @pytest.mark.parametrize("method", ["variational", "nicmm"])
     def test_methods_that_start_from_nothing(self, ball, method):
         start = nicmm.design_curve(ball, CHOSEN, order="shortest")
         for arguments in ({"start": start}, {"max_iterations": 3}):

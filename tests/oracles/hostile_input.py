@@ -42,7 +42,7 @@ NUMBERS = (
 INDICES = (0, 1, 2, 7, -1, -5, 10**6, 2**31 - 1, 2**31, 2**63 - 1, -(2**63))
 
 OBJECTS: tuple[Any, ...] = (
-    None, True, False, 0, -1, 3, 1.5, np.nan, "", "3", "nicmm", b"\0", (), [], {}, [None], [[]],
+    None, True, False, 0, -1, 3, 1.5, np.nan, "", "3", "elastic", b"\0", (), [], {}, [None], [[]],
     [1, [2, 3]], ["a", "b", "c"], [1, 2, "3"], {1: 2}, {0, 1, 2}, object(), print, 1j, [1j, 2, 3],
     10**400, [10**400, 1, 2], np.array(5), np.array([], dtype=object), np.zeros((0, 3)),
     np.zeros((3, 0)), np.zeros((2, 3, 4)), np.array([1, 2, 3], dtype=object),
@@ -51,7 +51,7 @@ OBJECTS: tuple[Any, ...] = (
     np.array(["2020-01-01"] * 3, dtype="datetime64[D]"), np.float16(2), range(3), "012",
 )  # fmt: skip
 
-METHODS = ("nicmm", "nicmm", "nicmm", "nicmm", "nicmm", "nicmm", "variational", "variational")
+METHODS = (*["elastic"] * 6, *["variational"] * 2)
 
 
 class CallersError(Exception):
@@ -336,7 +336,8 @@ def _ask(
     if design.field.shape != (len(mesh.vertices),) or not np.isfinite(design.field).all():
         result.faults.append("the field has another shape or is not finite")
     # Only the default method guarantees one curve.
-    if design.status is nicmm.Status.NOT_ONE_CURVE and arguments.get("method", "nicmm") != "nicmm":
+    method = arguments.get("method", "elastic")
+    if design.status is nicmm.Status.NOT_ONE_CURVE and method != "elastic":
         return design
     closed = bool(arguments.get("closed", True))
     given = locate_control_points(mesh, points, closed)

@@ -13,7 +13,7 @@ from tests.core.checks import assert_valid_curve, assert_valid_design, circle
 from tests.oracles.checker import judge
 from tests.oracles.named_curves import handle_points, nearest_vertices, torus_points
 
-METHODS = ("variational", "nicmm-paper")
+METHODS = ("variational", "nicmm")
 
 
 def design(mesh, points, **settings):

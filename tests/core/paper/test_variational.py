@@ -46,7 +46,7 @@ def test_points_of_a_circle_in_a_disc_give_that_circle():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["nicmm-paper", "nicmm"])
+@pytest.mark.parametrize("method", ["nicmm", "elastic"])
 def test_network_and_variational_method_reach_the_same_curve(method):
     """In easy cases, within `SAME_CURVE`."""
     mesh = shapes.sphere(3)

@@ -291,7 +291,7 @@ class TestOpenEdgesAtOnePlace:
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        "method", ["nicmm", pytest.param("variational", marks=pytest.mark.slow)]
+        "method", ["elastic", pytest.param("variational", marks=pytest.mark.slow)]
     )
     def test_a_soup_has_the_curve_of_the_surface_that_it_is(self, ball, soup, method):
         faces = np.array([3, 100, 400, 900])
