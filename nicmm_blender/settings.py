@@ -50,6 +50,7 @@ def _property(option: Option) -> "bpy.props._PropertyDeferred":
     if option.kind is Kind.SWITCH:
         return BoolProperty(**words, default=option.default)
     if option.kind is Kind.CHOICE:
+        # Blender numbers the items in this order, and files store the numbers of scene settings.
         items = [
             (curve_record.identifier(each.name), each.label, each.description)
             for each in option.choices
@@ -328,7 +329,7 @@ def draw_design(
     for name in ("closed", "order", "method", "smoothness"):
         layout.prop(properties, name)
     row = layout.row()
-    row.active = properties.method == "NICMM"
+    row.active = properties.method == "ELASTIC"
     row.prop(properties, "alternatives")
     layout.prop(properties, "use_modifiers")
 

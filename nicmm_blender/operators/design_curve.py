@@ -130,7 +130,7 @@ class NICMM_OT_design_curve(
 
 def _alternatives(operator: NICMM_OT_design_curve) -> int:
     """Number of alternatives; the setting has no effect with other methods."""
-    return operator.alternatives if operator.method == "NICMM" else 0
+    return operator.alternatives if operator.method == "ELASTIC" else 0
 
 
 def _summary(

@@ -147,7 +147,7 @@ def open_curve(
         mesh_object = mesh_data.mesh_object(context)
         if mesh_object is None:
             raise InputError("Make a mesh or a designed curve active")
-        before = replace(curve_record.settings_from(context.scene.nicmm_curves), method="NICMM")
+        before = replace(curve_record.settings_from(context.scene.nicmm_curves), method="ELASTIC")
     else:
         mesh_object = curve_record.mesh_in_view_layer(context, edited)
         writing.check_replaceable(edited)
@@ -187,7 +187,7 @@ def request(edited: Opened, points: SurfacePoints) -> list[DesignRequest]:
     """The request for the curve through new points, as a list; empty if they are too few."""
     if len(points) < FEWEST_OPEN:
         return []
-    settings = replace(edited.settings, method="NICMM")
+    settings = replace(edited.settings, method="ELASTIC")
     found = design_request.for_drawing(edited.mesh_object, edited.surface, points, settings)
     return [replace(found, start=edited.curve)]
 
@@ -245,7 +245,7 @@ def _record(
     curves: list[SurfaceCurve],
     drawn: Drawn | None,
 ) -> None:
-    curve_settings = replace(edited.settings, method="NICMM")
+    curve_settings = replace(edited.settings, method="ELASTIC")
     curve_record.write_record(
         result, mesh_object, edited.surface, curves, curve_settings, drawn, points
     )

@@ -36,9 +36,12 @@ RECORD_KEY = "nicmm_curve"
 KINDS = ("CURVE", "CURVES")
 """Types of the objects that may have a record."""
 
-VERSION = 2
+VERSION = 3
 """Version of the record's format. Records of release 0.1.0 have no version and count as 0; records
-of version 1 do not store whether modifiers are used."""
+of version 1 do not store whether modifiers are used, and those up to 2 have `FORMER_METHODS`."""
+
+FORMER_METHODS = {"NICMM": "ELASTIC", "NICMM_PAPER": "NICMM"}
+"""Methods by their names in records of versions before 3."""
 
 SAME_PLACE = 1e-5
 """Distance, in diagonals of the mesh, up to which a control point counts as not moved."""
@@ -82,7 +85,7 @@ class CurveSettings:
     """The settings of a curve, besides its control points: `RECORDED`, and the use of modifiers."""
 
     closed: bool = True
-    method: str = "NICMM"
+    method: str = "ELASTIC"
     smoothness: float = 1.0
     obstacle_group: str = ""
     clearance: float = 0.0
@@ -207,7 +210,9 @@ def _flat(arrays: list[np.ndarray]) -> list[float]:
 def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSettings) -> str:
     """A hash of everything that a curve depends on besides its control points."""
     # Digests in saved files must remain valid: the text begins with the first name of the class,
-    # and without modifiers it is that of version 1.
+    # methods have their former names, and without modifiers it is that of version 1.
+    former = {now: before for before, now in FORMER_METHODS.items()}
+    settings = settings.with_value("method", former.get(settings.method, settings.method))
     words = "Asked" + repr(settings).removeprefix(CurveSettings.__name__)
     words = words.replace(WITHOUT_MODIFIERS, "")
     found = hashlib.blake2b(words.encode(), digest_size=16)
@@ -385,12 +390,15 @@ def settings_of(curve_object: bpy.types.Object) -> CurveSettings:
     if stored is None:  # an early record without settings
         return CurveSettings(closed=bool(record["closed"][0]), use_modifiers=False)
     before = {"use_modifiers": False}  # how versions behaved that did not record a setting
-    return CurveSettings(
+    found = CurveSettings(
         **{
             name: type(default)(stored.get(name, before.get(name, default)))
             for name, default in asdict(CurveSettings()).items()
         }
     )
+    if record.get("version", 0) < 3:
+        return replace(found, method=FORMER_METHODS.get(found.method, found.method))
+    return found
 
 
 def drawn_as(curve_object: bpy.types.Object) -> Drawn | None:

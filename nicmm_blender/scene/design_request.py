@@ -132,7 +132,7 @@ def for_curve(
         raise InputError(curve_record.no_curve_message(curve_object))
     request = for_drawing(mesh_object, surface, points, settings)
     start = None
-    if settings.method == "NICMM" and curve_record.lies_on(curve_object, surface):
+    if settings.method == "ELASTIC" and curve_record.lies_on(curve_object, surface):
         curves = curve_record.read_curves(curve_object, surface)
         if len(curves) == 1:
             start = surface_cache.design_of(surface, curves[0]) or curves[0]

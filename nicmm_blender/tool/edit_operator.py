@@ -151,7 +151,7 @@ class NICMM_OT_edit_curve(settings.EditingProperties, bpy.types.Operator):
             for name in settings.EditingProperties.__annotations__
             if self.properties.is_property_set(name)
         }
-        return replace(curve_settings, method="NICMM", **given)
+        return replace(curve_settings, method="ELASTIC", **given)
 
     def _store(self, opened: Opened, points: "SurfacePoints") -> None:
         """Store points and settings for the redo panel."""

@@ -131,6 +131,14 @@ def test_labels_and_tooltips_follow_blender(extension):
     assert tooltip and not tooltip.endswith(".")
 
 
+def test_methods_keep_the_numbers_that_files_store(extension):
+    settings = bpy.types.Scene.bl_rna.properties["nicmm_curves"].fixed_type
+    items = settings.properties["method"].enum_items
+    # The same numbers as when they were called NICMM, NICMM_PAPER and VARIATIONAL.
+    numbers = {"ELASTIC": 0, "NICMM": 1, "VARIATIONAL": 2}
+    assert {item.identifier: item.value for item in items} == numbers
+
+
 def test_panel_hands_its_settings_to_the_operator(extension):
     operator = bpy.ops.nicmm.design_curve.get_rna_type().properties.keys()
     settings = bpy.context.scene.nicmm_curves.bl_rna.properties.keys()

@@ -60,7 +60,9 @@ def test_settings_of_curves(kept):
     record = module(kept, "scene.curve_record")
     settings = {name: record.settings_of(bpy.data.objects[name]) for name in CURVES}
     assert settings["Open"].smoothness == 2.0
-    assert settings["Variational"].method == "VARIATIONAL"
+    methods = {name: found.method for name, found in settings.items()}
+    assert methods.pop("Variational") == "VARIATIONAL"
+    assert set(methods.values()) == {"ELASTIC"}
     assert (settings["Maps"].obstacle_group, settings["Maps"].alignment_group) == ("Wall", "Lane")
     assert settings["Maps"].clearance == pytest.approx(0.05)
     panel = bpy.context.scene.nicmm_curves
@@ -149,6 +151,18 @@ def test_outputs_that_changed_their_mesh(kept):
     loose = bpy.data.objects["Loose"]
     assert not any(edge.is_loose for edge in loose.data.edges)
     assert len(loose.data.vertices) > len(bpy.data.objects["Body"].data.vertices)
+
+
+@pytest.mark.parametrize(
+    ("version", "recorded", "method"),
+    [(2, "NICMM", "ELASTIC"), (2, "NICMM_PAPER", "NICMM"), (3, "NICMM", "NICMM")],
+)
+def test_methods_had_other_names_before_version_3(kept, version, recorded, method):
+    curve = bpy.data.objects["Closed"]
+    record = curve["nicmm_curve"].to_dict()
+    asked = {**record["asked"], "method": recorded}
+    curve["nicmm_curve"] = {**record, "version": version, "asked": asked}
+    assert module(kept, "scene.curve_record").settings_of(curve).method == method
 
 
 def test_a_record_of_a_newer_version_says_so(kept):

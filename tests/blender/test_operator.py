@@ -83,7 +83,7 @@ def test_alternatives_of_outputs_that_change_the_mesh_are_refused(empty_scene):
         ({"order": "SHORTEST"}, {"order": "shortest"}),
         ({"order": "GIVEN"}, {"order": "given"}),
         ({"smoothness": 3.0}, {"smoothness": 3.0}),
-        pytest.param({"method": "NICMM_PAPER"}, {"method": "nicmm-paper"}, marks=pytest.mark.slow),
+        pytest.param({"method": "NICMM"}, {"method": "nicmm"}, marks=pytest.mark.slow),
         pytest.param({"method": "VARIATIONAL"}, {"method": "variational"}, marks=pytest.mark.slow),
     ],
 )
