@@ -37,11 +37,11 @@ BLENDER_PYTHONS = ("3.11", "3.13")  # of Blender 4.5 and 5.0, and of later versi
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),
     "windows-x64": ("win_amd64",),
-    "macos-arm64": ("macosx_12_0_arm64", "macosx_14_0_arm64"),  # PyTorch needs the newer one
+    "macos-arm64": ("macosx_12_0_arm64",),
 }
 
 LARGEST_ZIP = 120e6
-"""Largest size of a zip without PyTorch, in bytes."""
+"""Largest size of a zip, in bytes."""
 
 ONE_THREAD = {
     **{f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")},
@@ -54,16 +54,6 @@ KERNEL_PLATFORMS = ("linux-x64", "linux-arm64", "windows-x64", "macos-arm64", "m
 
 # NumPy is not bundled: all extensions share the NumPy that Blender includes.
 BUNDLED = ("libigl", "scipy")
-TORCH_COMPANIONS = (
-    "filelock==4.2.11",
-    "fsspec==2026.9.0",
-    "jinja2==3.1.6",
-    "markupsafe==3.0.4",
-    "mpmath==1.3.0",
-    "networkx==3.6.1",
-    "sympy==1.14.0",
-    "typing_extensions==4.16.0",
-)
 
 EXTENSION_INIT = '''\
 # SPDX-License-Identifier: GPL-3.0-or-later
@@ -209,7 +199,6 @@ def download(requirement: str, blender_platform: str, python: str) -> Path:
                 f"There is no wheel of {requirement} for {blender_platform} and Python {python} "
                 "where pip looks. Check the network connection, or choose other platforms or "
                 "Pythons (--platform, --python)"
-                + ("" if name in BUNDLED else ", or leave out --with-torch")
             )
     return next(folder.glob(pattern))
 
@@ -226,13 +215,9 @@ def kernel_wheel(name: str) -> Path:
     return next(folder.glob("nicmm_kernels-*.whl"))
 
 
-def collect_wheels(blender_platform: str, pythons: Sequence[str], with_torch: bool) -> list[Path]:
+def collect_wheels(blender_platform: str, pythons: Sequence[str]) -> list[Path]:
     """The wheels that a zip contains, each once."""
     requirements = [pinned(name) for name in BUNDLED]
-    if with_torch:
-        # The Linux wheel on PyPI depends on gigabytes of CUDA packages; the CPU build does not.
-        local = "+cpu" if blender_platform == "linux-x64" else ""
-        requirements += [pinned("torch") + local, *TORCH_COMPANIONS]
     wheels = {}
     for python in pythons:
         found = [download(requirement, blender_platform, python) for requirement in requirements]
@@ -262,16 +247,15 @@ def blender_tool() -> tuple[Path, Path]:
 def package(
     blender_platform: str,
     pythons: Sequence[str] = BLENDER_PYTHONS,
-    with_torch: bool = False,
     output: Path = DIST,
 ) -> Path:
     """Build the zip of one platform, validate it with Blender's own tool, and return its path."""
     ensure_environment()
-    wheels = collect_wheels(blender_platform, pythons, with_torch)
+    wheels = collect_wheels(blender_platform, pythons)
     tool, tags = blender_tool()
     facts = manifest()
     name = f"{facts['id']}-{facts['version']}-{blender_platform.replace('-', '_')}"
-    archive = output / f"{name}{'-torch' if with_torch else ''}.zip"
+    archive = output / f"{name}.zip"
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         source = Path(temporary) / facts["id"]
@@ -283,7 +267,7 @@ def package(
             if run([VENV_PYTHON, tool, *arguments, "--valid-tags", tags]) != 0:
                 raise BuildError("Blender's tool rejected the extension; see the output above")
     size = archive.stat().st_size
-    if size > LARGEST_ZIP and not with_torch:
+    if size > LARGEST_ZIP:
         raise BuildError(
             f"{archive.name} is {size / 1e6:.0f} MB large, more than {LARGEST_ZIP / 1e6:.0f} MB. "
             "Build it for fewer versions of Python (--python)"
@@ -379,7 +363,6 @@ def command_package(arguments: argparse.Namespace) -> int:
         archive = package(
             blender_platform,
             arguments.python or BLENDER_PYTHONS,
-            arguments.with_torch,
             arguments.output.resolve(),
         )
         say(f"{archive} ({archive.stat().st_size / 1e6:.0f} MB)")
@@ -427,7 +410,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="X.Y",
         help=f"Python of Blender; default: {' and '.join(BLENDER_PYTHONS)}; repeatable",
     )
-    pack.add_argument("--with-torch", action="store_true", help="bundle PyTorch where wheels exist")
     pack.add_argument("--output", type=Path, default=DIST, help="folder of the zips; default: dist")
     pack.set_defaults(command=command_package)
 

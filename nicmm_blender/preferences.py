@@ -82,13 +82,6 @@ def library_report() -> tuple[str, ...]:
         version = _version(module, name)
         missing = f"{name} is missing. Install the zip for this platform and Blender version"
         lines.append(f"{name} {version}" if version else missing)
-    version = _version("torch", "torch")
-    lines.append(
-        f"PyTorch {version}: the method NICMM (Paper) can be used"
-        if version
-        else "PyTorch was not found. Only the method NICMM (Paper), which is slower than the "
-        "default method, needs it"
-    )
     return (*lines, "The extension does not access the internet")
 
 

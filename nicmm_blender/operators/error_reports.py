@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 
 import bpy
@@ -25,12 +24,6 @@ def with_error_reports(operator: bpy.types.Operator, work: Callable[[], set[str]
         )
     try:
         return work()
-    except nicmm.MissingPackageError:
-        return _cancelled(
-            operator,
-            f"The method NICMM (Paper) needs PyTorch, which Blender's Python ({sys.executable}) "
-            "cannot import. Install a zip built with --with-torch, or choose the method NICMM",
-        )
     except nicmm.NicmmError as error:
         return _cancelled(operator, user_message(error))
     except InputError as error:

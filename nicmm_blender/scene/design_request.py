@@ -156,8 +156,6 @@ def answer(request: DesignRequest, progress: Progress) -> Design:
                 design = designer.design(request.points, **arguments)
             surface_cache.store_design(request.surface, design)
             return design
-        except nicmm.MissingPackageError:
-            raise
         except nicmm.NicmmError as error:
             vertices = request.points if isinstance(request.points, np.ndarray) else None
             at = vertices if vertices is not None and vertices.ndim == 1 else None

@@ -27,7 +27,6 @@ KINDS = {
     "ArgumentError",
     "ControlPointError",
     "CurveError",
-    "MissingPackageError",
     "UnreachableError",
 }
 

@@ -93,17 +93,15 @@ def test_number_of_meshes_in_memory(empty_scene, preferences):
         found.property_unset("kept_meshes")
 
 
-def test_torch_is_reported_and_not_loaded(preferences, monkeypatch):
-    (scipy, igl, torch, network) = preferences.library_report()
+def test_libraries_are_reported(preferences, monkeypatch):
+    (scipy, igl, network) = preferences.library_report()
     assert scipy == f"SciPy {importlib.metadata.version('scipy')}"
     assert igl == f"libigl {importlib.metadata.version('libigl')}"
-    assert torch.startswith("PyTorch 2") and "NICMM (Paper) can be used" in torch
     assert "internet" in network
     preferences.library_report.cache_clear()
     found = importlib.util.find_spec
     monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name in ("torch", "igl") else found(name)
+        importlib.util, "find_spec", lambda name: None if name == "igl" else found(name)
     )
-    (_, igl, torch, _) = preferences.library_report()
+    (_, igl, _) = preferences.library_report()
     assert igl.startswith("libigl is missing. Install the zip")
-    assert torch.startswith("PyTorch was not found. Only the method")
