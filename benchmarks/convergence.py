@@ -87,7 +87,7 @@ def section(results: Results) -> str:
         "(yellow) iterations (Fig. 4)",
     )
     return (
-        "Fine-tuning by `nicmm-paper` was continued beyond its early stop, to see how the loss "
+        "Fine-tuning by `nicmm` was continued beyond its early stop, to see how the loss "
         "decreases and how much the curve still changes, as in Fig. 3 and 4 of the paper. Each row "
         "is a mesh with one set of 3–5 random vertices. Its columns are the iteration of the early "
         f"stop; the time of fine-tuning up to the early stop and up to iterations {first}, "

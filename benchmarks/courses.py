@@ -149,7 +149,7 @@ def section(results: Results) -> str:
     header = ("start", "curves", "geometric mean", "median", "75 %", "90 %", "greatest")
     return (
         "Curves through the same points may take different courses; the first table shows how far "
-        "the course that `nicmm` chooses by default is from the best known one, in energy. Each "
+        "the course that `elastic` chooses by default is from the best known one, in energy. Each "
         "row is a kind of start, for closed or open curves, with statistics over "
         f"{sum(each['closed'] for each in requests)} meshes ({results['meshes']}, and closed "
         "manifold meshes, people and animals as they are; one set of 3–5 random vertices per mesh, "
@@ -289,7 +289,7 @@ def _portfolio(job: Job) -> tuple[dict[str, list[Answer]], int]:
 
 def _answer(design: nicmm.Design, change: Similarity = UNCHANGED) -> Answer:
     """A design on a mesh after a similarity."""
-    assert design.resumable is not None  # `nicmm` relaxes every curve
+    assert design.resumable is not None  # `elastic` relaxes every curve
     curve, whole = design.resumable.curve, design.curves[0]
     factor = curve.length / whole.length * change.factor
     return Answer(curve, factor, change.undone(whole.points))

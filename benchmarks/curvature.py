@@ -31,7 +31,7 @@ TITLE = "Geodesic curvature (Fig. 7, 8, Eq. 10)"
 WITHOUT = ("outputs", "splines")
 
 SEED = 0
-INITIAL, ELASTIC = "initial path", "elastic curve"
+INITIAL, REFERENCE = "initial path", "reference curve"
 
 BIN_WIDTH = 2.0
 CURVATURE_RANGE = 60.0
@@ -95,8 +95,8 @@ def section(results: Results) -> str:
     )
     stills = report.figure(
         results["stills"],
-        "The curves of nicmm (blue), nicmm-paper (orange), variational (green) and the elastic "
-        "curve (white) through the same points (Fig. 7)",
+        "The curves of elastic (blue), nicmm (orange), variational (green) and the "
+        "reference curve (white) through the same points (Fig. 7)",
     )
     return (
         "The table compares how much the curves of the methods bend through the same control "
@@ -104,7 +104,7 @@ def section(results: Results) -> str:
         "method, and an explicit elastic curve as the reference. The values are quartiles over "
         f"{len(sets)} sets of the bending L ∮ κ_g² ds, with κ_g by Eq. 10 at "
         f"{' or '.join(str(samples) for samples in results['samplings'])} evenly spaced points, "
-        "and of its ratio to the bending of the elastic curve. A set has 3–5 random vertices, one "
+        "and of its ratio to the bending of the reference. A set has 3–5 random vertices, one "
         f"set per mesh, in the shortest order (seed {results['seed']}); {results['left_out']} "
         "sets for which a method did not give one curve are left out. Meshes "
         f"({results['collection']}): {report.listed(each['mesh'] for each in sets)}.\n\n"
@@ -138,7 +138,7 @@ def draw(results: Results, folder: Path) -> None:
 
 
 def _curves(name: str, mesh: Mesh, points: IntArray) -> dict[str, SurfaceCurve] | None:
-    """Initial path, curve of each method and elastic curve; None if a method gives no curve."""
+    """Initial path, curve of each method and reference curve; None if a method gives no curve."""
     try:
         designs = {
             method: nicmm.design_curve(mesh, points, order="shortest", method=method)
@@ -155,7 +155,7 @@ def _curves(name: str, mesh: Mesh, points: IntArray) -> dict[str, SurfaceCurve] 
     ways = {method: design.curves[0] for method, design in designs.items()}
     path = initial_path(mesh, problem)
     fair = [elastic_curve(mesh, start) for start in (path, *ways.values())]
-    return {INITIAL: path, **ways, ELASTIC: min(fair, key=lambda one: one.energies[-1]).curve}
+    return {INITIAL: path, **ways, REFERENCE: min(fair, key=lambda one: one.energies[-1]).curve}
 
 
 def _bends(mesh: Mesh, curve: SurfaceCurve) -> list[float]:
@@ -178,8 +178,8 @@ def _histogram(curvatures: Mapping[str, Sequence[FloatArray]]) -> Results:
 
 
 def _picture(name: str, mesh: Mesh, curves: Mapping[str, SurfaceCurve]) -> renders.Picture:
-    colours = {**renders.METHOD_COLOURS, ELASTIC: renders.WHITE}
-    shown = [(curves[label], colours[label]) for label in (*METHODS, ELASTIC)]
+    colours = {**renders.METHOD_COLOURS, REFERENCE: renders.WHITE}
+    shown = [(curves[label], colours[label]) for label in (*METHODS, REFERENCE)]
     return renders.Picture(name, mesh, shown)
 
 
@@ -200,13 +200,13 @@ def _table(results: Results) -> str:
         row = [label]
         for sampling in range(len(results["samplings"])):
             row.append(_quartiles([bend[label][sampling] for bend in bends], 0))
-            row.append(_quartiles(_ratios(results, label, ELASTIC, sampling), 2))
+            row.append(_quartiles(_ratios(results, label, REFERENCE, sampling), 2))
         rows.append(row)
     header = ["curve"]
     for samples in results["samplings"]:
         header += [
             f"L ∮ κ_g² ds, {samples} samples",
-            f"relative to the elastic curve, {samples} samples",
+            f"relative to the reference, {samples} samples",
         ]
     return report.table(header, rows)
 
@@ -215,21 +215,21 @@ def _findings(results: Results) -> str:
     """What the table shows, in words, and whether it agrees with the paper."""
     samplings = results["samplings"]
     text = (
-        f"The {ELASTIC} is the fairest of those that start from the initial path and from the "
-        "curve of each method. It is a local optimum, and it may cross itself. "
+        f"The {REFERENCE} is the fairest of the elastic curves that start from the initial path "
+        "and from the curve of each method. It is a local optimum, and it may cross itself. "
     )
     for method in results["methods"]:
         both = " and ".join(
-            f"{np.median(_ratios(results, method, ELASTIC, place)):.2f} times ({samples} samples)"
+            f"{np.median(_ratios(results, method, REFERENCE, place)):.2f} times ({samples} samples)"
             for place, samples in enumerate(samplings)
         )
-        text += f"By the median, `{method}` bends {both} as much as the elastic curve. "
+        text += f"By the median, `{method}` bends {both} as much as the reference. "
     if "variational" not in results["methods"]:
         return text + "There are no curves of the variational method to compare with the paper."
-    middle = float(np.median(_ratios(results, "nicmm-paper", "variational", 0)))
+    middle = float(np.median(_ratios(results, "nicmm", "variational", 0)))
     verdict = "which agrees with" if 0.8 <= middle <= 1.25 else "which contradicts"
     return text + (
-        f"By the median, `nicmm-paper` bends {middle:.2f} times as much as `variational` "
+        f"By the median, `nicmm` bends {middle:.2f} times as much as `variational` "
         f"({samplings[0]} samples), {verdict} the paper's “comparable distributions of geodesic "
         "curvature”."
     )

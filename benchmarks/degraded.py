@@ -250,18 +250,18 @@ def _findings(results: Results) -> str:
     text = (
         f"At the worst severity ({_name(worst)}), {'; '.join(parts)} (greatest distance, median). "
     )
-    greatest = _greatest(at_worst["nicmm-paper"])
+    greatest = _greatest(at_worst["nicmm"])
     if greatest:
         visible = np.median(greatest) > 100 * REMARKABLE
         text += (
-            f"For `nicmm-paper` that is {'more' if visible else 'not more'} than the "
+            f"For `nicmm` that is {'more' if visible else 'not more'} than the "
             f"{100 * REMARKABLE:g} % from which a difference is obvious to the eye, which "
             f"{'contradicts' if visible else 'agrees with'} the “nearly identical shapes” of "
             "Fig. 12. "
         )
     if "variational" not in at_worst:
         return text + "There are no curves of the variational method to compare with the paper."
-    variational, paper = (_succeeded(at_worst[each]) for each in ("variational", "nicmm-paper"))
+    variational, paper = (_succeeded(at_worst[each]) for each in ("variational", "nicmm"))
     verdict = (
         "agrees with the paper, where the variational method fails on such meshes (Fig. 11)."
         if variational < paper
@@ -269,7 +269,7 @@ def _findings(results: Results) -> str:
     )
     return text + (
         f"`variational` succeeds on {variational} of {len(at_worst['variational'])} of these "
-        f"meshes and `nicmm-paper` on {paper}, which {verdict}"
+        f"meshes and `nicmm` on {paper}, which {verdict}"
     )
 
 
@@ -302,6 +302,6 @@ def _shown_picture(name: str | None) -> str:
         return "There is no picture, because no method gave a curve on the first mesh."
     return report.figure(
         name,
-        "nicmm (blue), nicmm-paper (orange) and variational (green) on the first mesh at "
+        "elastic (blue), nicmm (orange) and variational (green) on the first mesh at "
         "increasing severity (Fig. 11, top of Fig. 12)",
     )

@@ -77,7 +77,7 @@ def section(results: Results) -> str:
         rows.append((name, quartiles, f"{np.median(greatest):.2f}"))
     header = ("mesh and start", "mean distance, %, quartiles", "greatest distance, %, median")
     return (
-        "Curves of `nicmm` on degraded meshes were computed twice, with a new search for the "
+        "Curves of `elastic` on degraded meshes were computed twice, with a new search for the "
         "course and started from the curve on the clean mesh, to see whether the faces or another "
         "course move them. Each row is a mesh and a start; its distances are those to the curve on "
         "the clean mesh, in percent of the diagonal. The first row is a control, which should be "

@@ -28,7 +28,7 @@ from .evidence import ROOT, Record, Results
 
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
-METHODS = ("nicmm", "nicmm-paper", "variational")
+METHODS = ("elastic", "nicmm", "variational")
 
 AROUND = "around a torus, the handles of a double torus, a Möbius strip, a hole"
 """Where the named curves run."""
@@ -90,7 +90,7 @@ def _methods(curvature: Results, degraded: Results, runtime: Results) -> str:
     """The three methods beside each other, with the paper's words."""
     sets = [each["bending"] for each in curvature["sets"]]
     bends = [
-        f"{np.median([bend[method][0] / bend['elastic curve'][0] for bend in sets]):.2f}"
+        f"{np.median([bend[method][0] / bend['reference curve'][0] for bend in sets]):.2f}"
         for method in METHODS
     ]
     worst = [each for each in degraded["sets"] if each["n"] == degraded["severities"][-1]]
@@ -161,12 +161,12 @@ def _runtime(results: Results) -> str:
         method: np.array([np.mean(each["answers"][method]["seconds"]) for each in sets])
         for method in methods
     }
-    ratio = float(np.median(mean["nicmm"] / mean["variational"]))
+    ratio = float(np.median(mean["elastic"] / mean["variational"]))
     seconds = report.listed(f"`{method}` {mean[method].mean():.2f} s" for method in methods)
     medians = report.listed(f"{np.median(mean[method]):.2f} s" for method in methods)
     return _paragraph(
         f"A first curve takes {seconds} on average over {len(sets)} meshes of some 4,000 vertices "
-        f"(`python -m benchmarks runtime`; medians {medians}). The median ratio of `nicmm` to "
+        f"(`python -m benchmarks runtime`; medians {medians}). The median ratio of `elastic` to "
         f"`variational` is {ratio:.2f}."
     )
 
@@ -230,7 +230,7 @@ def _cancellation(results: Results) -> str:
 
 def _degraded(results: Results) -> str:
     means = [
-        np.median([s["answers"]["nicmm"]["offset"][0] for s in results["sets"] if s["n"] == n])
+        np.median([s["answers"]["elastic"]["offset"][0] for s in results["sets"] if s["n"] == n])
         for n in results["severities"]
         if n
     ]

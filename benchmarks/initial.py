@@ -132,7 +132,7 @@ def section(results: Results) -> str:
         results["stills"], "Initial loops (white) and the curves from them (blue) (Fig. 6)"
     )
     return (
-        "Curves through the same control points were computed by `nicmm-paper` from different "
+        "Curves through the same control points were computed by `nicmm` from different "
         "initial loops, to see how much the curve depends on the loop, as in Fig. 6 of the paper. "
         "Each row is a kind of loop: the shortest one, and loops through the same points in the "
         f"same order that are displaced between them by {results['push']:g} √area or more, by an "

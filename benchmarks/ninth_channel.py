@@ -1,4 +1,4 @@
-"""Measures what the ninth input channel, φ_fea, contributes to `nicmm-paper` on sets with maps."""
+"""Measures what the ninth input channel, φ_fea, contributes to `nicmm` on sets with maps."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def section(results: Results) -> str:
     )  # fmt: skip
     last = {label: run["mean_losses"][iterations] for label, run in runs.items()}
     return (
-        "Three networks were fine-tuned as in `nicmm-paper` on sets with maps, to see what the "
+        "Three networks were fine-tuned as in `nicmm` on sets with maps, to see what the "
         f"input channel φ_fea contributes. There are {len(best)} sets on {results['collection']} "
         f"(seed {results['seed']}), each of 3–5 random vertices in the shortest order with one to "
         "three random obstacles or lanes. The first row is the network with nine channels, which "

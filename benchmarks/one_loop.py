@@ -1,4 +1,4 @@
-"""Measures how often `nicmm-paper` gives one closed loop through all points (section 5, Fig. 16).
+"""Measures how often `nicmm` gives one closed loop through all points (section 5, Fig. 16).
 
 An outcome "by itself" means that the level set of the network, as in the paper, is already one
 loop. In all other cases some vertices had to keep the sign that they have in φ₀.
@@ -27,7 +27,7 @@ WITHOUT = ("coarsening", "courses", "outputs", "relaxation", "splines")
 
 SEED = 0
 SETS = 2
-METHOD = "nicmm-paper"
+METHOD = "nicmm"
 
 REFUSED, SEVERAL, NOT_FINITE = "refused", "several", "not finite"
 BY_ITSELF, KEPT = "by itself", "kept"

@@ -103,7 +103,7 @@ def section(results: Results) -> str:
     )
     return (
         "The weights λ_sdf and λ_smooth of the energy were multiplied by factors, one weight at a "
-        "time, to see how much the curve of `nicmm-paper` depends on them, as in Fig. 5 of the "
+        "time, to see how much the curve of `nicmm` depends on them, as in Fig. 5 of the "
         "paper. Each row is a factor and a weight. Distances are mean and greatest distances to "
         "the curve with factor 1, in percent of the bounding box diagonal; all values are medians "
         f"over {len(varied)} meshes, with one set of 3–5 random vertices per mesh (seed "

@@ -22,7 +22,7 @@ SUBDIVISIONS = (2, 3, 4)
 PATIENCE = 120.0
 """Time limit of a system in seconds."""
 
-FIRST, ANOTHER = "nicmm, first curve", "nicmm, another on the same Designer"
+FIRST, ANOTHER = "elastic, first curve", "elastic, another on the same Designer"
 RIVAL = "potpourri3d, signed heat"
 
 

@@ -260,6 +260,6 @@ def _shown_picture(name: str | None) -> str:
         return "There is no picture, because no system gave a single curve."
     return report.figure(
         name,
-        "nicmm (blue), nicmm-paper (orange), variational (green), MeshLib's projected spline "
+        "elastic (blue), nicmm (orange), variational (green), MeshLib's projected spline "
         "(yellow), edge-flip loop (black) and signed heat (red) through the same points (Fig. 9)",
     )

@@ -16,11 +16,11 @@ from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.ticker import FuncFormatter, MaxNLocator  # noqa: E402
 
 METHOD_COLOURS = {
-    "nicmm-paper": "tab:orange",
-    "nicmm": "tab:blue",
+    "nicmm": "tab:orange",
+    "elastic": "tab:blue",
     "variational": "tab:green",
     "initial path": "0.55",
-    "elastic curve": "black",
+    "reference curve": "black",
 }
 """Colour of each method, the same in all plots."""
 

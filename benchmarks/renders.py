@@ -37,7 +37,7 @@ ORANGE: Colour = (0.90, 0.25, 0.01)
 GREEN: Colour = (0.02, 0.45, 0.12)
 YELLOW: Colour = (1.0, 0.60, 0.02)
 
-METHOD_COLOURS = {"nicmm-paper": ORANGE, "nicmm": BLUE, "variational": GREEN}
+METHOD_COLOURS = {"nicmm": ORANGE, "elastic": BLUE, "variational": GREEN}
 
 TUBE = 0.006
 BALL = 0.015

@@ -32,9 +32,9 @@ measurements of the package. Each section is one measurement: it says what was m
 how to read the table and, where the paper has a corresponding table or figure, whether the result
 agrees with it.
 
-- **Methods.** `nicmm` is the default of this package, `nicmm-paper` trains a network for each curve
-  as the paper does, and `variational` minimises the same energy without a network
-  ([docs/method.md](../docs/method.md)).
+- **Methods.** `elastic`, the default of this package, searches for a course and relaxes it as an
+  elastic curve; `nicmm` is the network of the paper, fitted to each curve; and `variational`
+  minimises the same energy as `nicmm` without a network ([docs/method.md](../docs/method.md)).
 - **Bending.** L ∮ κ_g² ds is the scale-free bending of a curve: its length times the integral of
   its squared geodesic curvature. A circle in the plane has 4π² ≈ 39; less is fairer.
 - **Times and losses** of the paper were measured on other hardware and with weights in other units,

@@ -25,10 +25,10 @@ WITHOUT = ("outputs",)
 
 SEED = 5
 
-REPEATED = tuple(method for method in METHODS if method != "nicmm-paper")
+REPEATED = tuple(method for method in METHODS if method != "nicmm")
 """Methods that are fast enough to be run several times."""
 
-PAPER = {"nicmm-paper": (398, 62, 262, 697), "variational": (102, 106, 24, 538)}
+PAPER = {"nicmm": (398, 62, 262, 697), "variational": (102, 106, 24, 538)}
 """Average, standard deviation, least and greatest time in milliseconds, Table 5."""
 
 PLOT = "runtime.png"
@@ -52,7 +52,7 @@ def measure(scale: Scale) -> Results:
             print(f"  {name}: {error}", flush=True)
             continue
         answers = {method: _answer(runs, method) for method in METHODS}
-        ours, theirs = (runs[0][method].curves[0] for method in ("nicmm", "variational"))
+        ours, theirs = (runs[0][method].curves[0] for method in ("elastic", "variational"))
         ratio = round(bending(mesh, ours) / bending(mesh, theirs), 6)
         sets.append(
             {"mesh": name, "vertices": len(mesh.vertices), "answers": answers, "bending": ratio}
@@ -83,7 +83,7 @@ def section(results: Results) -> str:
         "The last two columns are the median number of iterations, and the number of sets for "
         "which the result is not exactly one curve. A set has 3–5 random vertices, one set per "
         f"mesh, in the shortest order (seed {results['seed']}). Each set was repeated "
-        f"{results['repetitions']} times, but only once with `nicmm-paper`; the methods take turns "
+        f"{results['repetitions']} times, but only once with `nicmm`; the methods take turns "
         "in one process, after a warm-up. Each method uses its own stopping criterion, whereas the "
         "paper stops both of its methods by the change of the loss. Meshes "
         f"({results['collection']}, {min(sizes)} to {max(sizes)} vertices): {names}.\n\n"
@@ -169,9 +169,9 @@ def _findings(averages: Mapping[str, FloatArray], bends: Sequence[float]) -> str
         "The times in the paper are from an i9-14900K and an RTX 4090, so only ratios can be "
         "compared. "
     )
-    paired = float(np.median(averages["nicmm"] / averages["variational"]))
+    paired = float(np.median(averages["elastic"] / averages["variational"]))
     text += (
-        f"By the median of the sets, `nicmm` takes {paired:.2f} times as long as `variational`, "
+        f"By the median of the sets, `elastic` takes {paired:.2f} times as long as `variational`, "
         f"and its curve bends {np.median(bends):.2f} times as much (L ∮ κ_g² ds); it bends more on "
         f"{sum(ratio > 1.0 for ratio in bends)} of {len(bends)} sets. By the averages: "
     )
@@ -188,7 +188,7 @@ def _findings(averages: Mapping[str, FloatArray], bends: Sequence[float]) -> str
 
 
 def _against_the_paper(slow: str, ratio: float) -> str:
-    published = PAPER["nicmm-paper"][0] / PAPER["variational"][0]
+    published = PAPER["nicmm"][0] / PAPER["variational"][0]
     if slow == "variational":
         return f", which contradicts the paper, where it is {published:.2f} times as fast"
     return f", which agrees with the paper that it is slower ({published:.2f} times)"

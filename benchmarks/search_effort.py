@@ -109,7 +109,7 @@ def _compared(mesh: Mesh, points: IntArray) -> Results:
     designs, seconds = [], []
     for effort in EFFORTS.values():
         with _effort(*effort):
-            design, spent = _timed(mesh, points, "nicmm")
+            design, spent = _timed(mesh, points, "elastic")
         designs.append(design)
         seconds.append(round(spent, 3))
     found = [design.resumable for design in designs]

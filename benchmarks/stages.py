@@ -129,7 +129,7 @@ def section(results: Results) -> str:
         f"{body['bytes_a_vertex']:,.0f} with {body['faces']:,} faces" for body in bodies
     )
     return (
-        "The tables show how the time and the function calls of a design by `nicmm` are "
+        "The tables show how the time and the function calls of a design by `elastic` are "
         "distributed over its stages, on a generated body of each size. Each row is a stage and "
         "each column a mesh size and a kind of design. *First* is the first curve on a mesh, of "
         "which only the arrays have been checked; *another* is a curve through other points on the "
