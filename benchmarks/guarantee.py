@@ -116,23 +116,23 @@ def section(results: Results) -> str:
         f"\n\n{_table(meshes)}\n\n{_faults(meshes)}\n\n{_fairness(results)}\n\n"
         + report.figure(
             PLOT,
-            "Share of the sets whose bending is at most the given multiple of that of the elastic "
-            "curve",
+            "Share of the sets whose bending is at most the given multiple of that of the "
+            "reference curve",
         )
     )
 
 
 def draw(results: Results, folder: Path) -> None:
-    """Plot the distribution of the bending relative to elastic curves."""
+    """Plot the distribution of the bending relative to reference curves."""
     samplings = results["samplings"]
     figure, axes = plots.labelled(
         f"Fairness of {results['method']}",
-        f"L ∫ κ_g² ds relative to the elastic curve ({samplings[-1]} samples)",
+        f"L ∫ κ_g² ds relative to the reference curve ({samplings[-1]} samples)",
         "share of the sets",
     )
     lines = {
-        "relative to the fairest elastic curve": ("to_best", "-"),
-        "relative to the elastic curve started from it": ("to_own", ":"),
+        "relative to the fairest reference curve": ("to_best", "-"),
+        "relative to the reference curve started from it": ("to_own", ":"),
     }
     for closed, colour in ((True, "tab:blue"), (False, "tab:orange")):
         for label, (name, style) in lines.items():
@@ -335,10 +335,10 @@ def _faults(meshes: Sequence[Results]) -> str:
 
 COLUMNS = {
     "L ∫ κ_g² ds": ("bending", 0),
-    "relative to the elastic curve started from it": ("to_own", 2),
-    "relative to the fairest elastic curve": ("to_best", 2),
-    "∫ κ_g² ds, relative to the elastic curve started from it": ("squared_to_own", 2),
-    "∫ κ_g² ds, relative to the fairest elastic curve": ("squared_to_best", 2),
+    "relative to the reference curve started from it": ("to_own", 2),
+    "relative to the fairest reference curve": ("to_best", 2),
+    "∫ κ_g² ds, relative to the reference curve started from it": ("squared_to_own", 2),
+    "∫ κ_g² ds, relative to the fairest reference curve": ("squared_to_best", 2),
 }
 """Columns of the table of fairness: measure and number of decimals, by header."""
 
@@ -358,15 +358,15 @@ def _fairness(results: Results) -> str:
     which = "every mesh" if every == 1 else f"every {every}th mesh of each collection"
     return (
         "The second table shows how fair the curves are: their bending L ∫ κ_g² ds, its ratio to "
-        "that of explicit elastic curves through the same points in the same order, and the same "
-        "ratio without the factor L. Each row is a kind of curve and the number of samples at "
-        "which curvature is measured. Each cell has the "
+        "that of reference curves, which are explicit elastic curves through the same points in "
+        "the same order, and the same ratio without the factor L. Each row is a kind of curve and "
+        "the number of samples at which curvature is measured. Each cell has the "
         f"{', '.join(f'{100 * share:.0f}' for share in SHARES)} % quantiles over the sets and, in "
-        "parentheses, the number of sets; named curves are left out. One elastic curve starts from "
-        "the curve itself, and another one from the curve of `variational`; the fairest is the "
-        "better of the two. Both are local optima, and they may cross themselves. The ratios are "
-        f"measured on {which}; {straight} of {straight + compared} sets are left out of them "
-        "because the elastic curve is nearly straight (L ∫ κ_g² ds below "
+        "parentheses, the number of sets; named curves are left out. One reference curve starts "
+        "from the curve itself, and another one from the curve of `variational`; the fairest is "
+        "the better of the two. Both are local optima, and they may cross themselves. The ratios "
+        f"are measured on {which}; {straight} of {straight + compared} sets are left out of them "
+        "because the reference curve is nearly straight (L ∫ κ_g² ds below "
         f"{results['nearly_straight']}).\n\n"
         f"{report.table(('curves', 'samples', *COLUMNS), rows)}"
     )
