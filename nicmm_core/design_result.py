@@ -33,9 +33,9 @@ class Design:
         The terms of Eq. 2 without their weights: "sdf", "int", "smooth" and "fea", with lengths in
         units of the square root of the surface's area. Empty if there is no curve.
     breaking_vertices : int
-        Number of vertices whose predicted sign would have split the curve or missed a control
-        point. Around them the initial level set replaces the predicted one. 0 if the predicted zero
-        set was one loop, or if no level set was predicted.
+        Number of vertices that the methods "nicmm" and "variational" had to hold, over all steps,
+        because another sign of φ there would have split the curve or detached it from a control
+        point. 0 if every step gave one curve by itself, and with the method "elastic".
     find_field : callable
         Computes `field` on first access.
     resumable : Resumable or None

@@ -1,4 +1,4 @@
-"""Linear finite elements on the working mesh: gradient, Laplacian and centroid values."""
+"""Linear finite elements on the working mesh: gradient, divergence and centroid values."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ class FiniteElements:
     stiffness : (n, n) sparse array
         Cotangent stiffness: positive semidefinite, and zero on constants unless a sign bundle is
         used.
-    laplacian : (n, n) sparse array
-        Pointwise Laplacian, ``-stiffness / vertex_areas``. Rows of selected vertices are zero, such
-        as those on the boundary, where the stiffness contains the boundary flux.
+    divergence : (n, 3 m) sparse array
+        Pointwise divergence, at the vertices, of a vector field that is constant in each face; all
+        x components, then y, then z. Rows of selected vertices are zero, such as those on the
+        boundary, where the sum over faces contains the boundary flux.
     centroid : (m, n) sparse array
         Value of a linear function at the centroid of each face.
     plain_centroid : (m, n) sparse array
@@ -50,7 +51,7 @@ class FiniteElements:
     vertex_areas: FloatArray
     gradient: sparse.csr_array
     stiffness: sparse.csr_array
-    laplacian: sparse.csr_array
+    divergence: sparse.csr_array
     centroid: sparse.csr_array
     plain_centroid: sparse.csr_array
 
@@ -69,7 +70,7 @@ def mollified(lengths: FloatArray) -> FloatArray:
 def build_finite_elements(
     vertices: FloatArray,
     faces: IntArray,
-    without_laplacian: BoolArray,
+    without_divergence: BoolArray,
     bundle: SignBundle | None = None,
 ) -> FiniteElements:
     """Assemble the operators of a mesh, in double precision.
@@ -78,8 +79,8 @@ def build_finite_elements(
     ----------
     vertices : (n, 3) float array
     faces : (m, 3) int array
-    without_laplacian : (n,) bool array
-        Whether a vertex has a zero row in the Laplacian, such as the vertices on the boundary.
+    without_divergence : (n,) bool array
+        Whether a vertex has a zero row in the divergence, such as the vertices on the boundary.
     bundle : SignBundle, optional
         Signs with which faces read the values of their corners.
 
@@ -116,13 +117,16 @@ def build_finite_elements(
         gradient = sparse.csr_array(igl.grad(at_corners, apart) @ reading)
     if not (face_areas > 0.0).all():
         raise MeshError(DEGENERATE)
-    inside = np.where(without_laplacian, 0.0, 1.0 / vertex_areas)
+    inside = np.where(without_divergence, 0.0, 1.0 / vertex_areas)
+    divergence = (
+        sparse.diags_array(-inside) @ gradient.T @ sparse.diags_array(np.tile(face_areas, 3))
+    )
     return FiniteElements(
         face_areas=face_areas,
         vertex_areas=vertex_areas,
         gradient=gradient,
         stiffness=stiffness,
-        laplacian=sparse.csr_array(sparse.diags_array(-inside) @ stiffness),
+        divergence=sparse.csr_array(divergence),
         centroid=centroid,
         plain_centroid=plain_centroid,
     )

@@ -1,28 +1,29 @@
-"""Designs a curve by the method of the paper or the variational method, as a zero set."""
+"""Designs a curve as a zero set, by the method of the paper or the variational method."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from ..design_result import Design
 from ..geometry.array_types import FloatArray
+from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
 from ..progress import CancelledError, checkpoint, subrange
 from ..request import Request
 from ..status import Status
-from . import variational
+from . import fitting, variational
 from .losses import LossWeights, balanced, energy_of
 from .problem import Problem, requested_problem
 from .solution import Solution
-from .zero_set import ZeroSet, zero_set
+from .weights_file import shipped_network
+from .zero_set import is_simple_curve, zero_set
 
 
 def level_set_design(mesh: Mesh, request: Request, started: float) -> Design:
-    """Design a curve by a method other than "nicmm".
+    """Design a curve by the method "nicmm" or "variational".
 
     Parameters
     ----------
@@ -43,54 +44,44 @@ def level_set_design(mesh: Mesh, request: Request, started: float) -> Design:
     try:
         with subrange(0.3, 0.9):
             solution = _solution(problem, request, watch)
-        zeros = zero_set(mesh, problem, solution.field, solution.keeps_topology)
+        curves = zero_set(mesh, problem, solution.field)
+        iterations = solution.iterations
     except CancelledError:
         if watch.shown is None:
             raise
-        field = watch.shown.field
+        field, curves, iterations = watch.shown
         solution = Solution(field, energy_of(problem, field), [], Status.CANCELLED)
-        design = _design(mesh, problem, solution, watch.shown, started)
-        return replace(design, iterations=watch.shown_after)
-    return _design(mesh, problem, solution, zeros, started)
+    one = is_simple_curve(mesh, curves, problem.loop.closed)
+    return Design(
+        status=solution.status if one else Status.NOT_ONE_CURVE,
+        curves=curves,
+        iterations=iterations,
+        seconds=time.perf_counter() - started,
+        energy=solution.terms,
+        breaking_vertices=solution.held,
+        find_field=partial(_at_input_vertices, mesh, problem, solution.field),
+    )
 
 
 def _solution(problem: Problem, request: Request, watch: _FieldWatch) -> Solution:
     """Solve for the level set by the method of a request."""
     weights = balanced(LossWeights(smooth=request.smoothness * LossWeights.smooth), problem)
     if request.method == "variational":
-        return variational.solve(problem, weights, variational.VariationalConfig(), watch)
-    # These modules import PyTorch, which only this method needs.
-    from .finetuning import FinetuningConfig, finetune
-    from .weights_file import shipped_network
-
+        return variational.solve(problem, weights, watch=watch)
     network = shipped_network(problem.features.shape[1])
-    return finetune(network, problem, weights, FinetuningConfig(), watch)
-
-
-def _design(
-    mesh: Mesh, problem: Problem, solution: Solution, zeros: ZeroSet, started: float
-) -> Design:
-    """The design whose curve is a zero set."""
-    one = zeros.is_simple_curve(mesh, problem.loop.closed)
-    return Design(
-        status=solution.status if one else Status.NOT_ONE_CURVE,
-        curves=zeros.curves,
-        iterations=solution.iterations,
-        seconds=time.perf_counter() - started,
-        energy=solution.terms,
-        breaking_vertices=zeros.breaking_vertices,
-        find_field=partial(_at_input_vertices, mesh, problem, zeros.field),
-    )
+    return fitting.fit(network, problem, weights, watch=watch)
 
 
 class _FieldWatch:
-    """Reports the zero set while a level set is computed, and keeps the last one reported."""
+    """Reports the zero set while a level set is computed.
+
+    `shown` is the last one reported: φ, its zero set and the number of iterations.
+    """
 
     def __init__(self, mesh: Mesh, problem: Problem) -> None:
         self._mesh, self._problem = mesh, problem
         self._iterations = 0
-        self.shown: ZeroSet | None = None
-        self.shown_after = 0
+        self.shown: tuple[FloatArray, list[SurfaceCurve], int] | None = None
 
     def __call__(self, done: float, field: FloatArray) -> bool:
         self._iterations += 1
@@ -98,9 +89,9 @@ class _FieldWatch:
         return True
 
     def _show(self, field: FloatArray, iteration: int) -> FloatArray:
-        zeros = zero_set(self._mesh, self._problem, field)
-        self.shown, self.shown_after = zeros, iteration
-        return zeros.curves[0].points if zeros.curves else np.zeros((0, 3))
+        curves = zero_set(self._mesh, self._problem, field)
+        self.shown = field, curves, iteration
+        return curves[0].points if curves else np.zeros((0, 3))
 
 
 def _at_input_vertices(mesh: Mesh, problem: Problem, field: FloatArray) -> FloatArray:

@@ -28,6 +28,9 @@ edge lengths in which the paper tests convergence.
 """
 
 
+LEAST_SLOPE = 1e-3
+"""Value of |∇φ| where ∇φ vanishes; it is 1 beside the curve."""
+
 MOST_BENDING = 0.25
 """Upper bound of the weighted smoothness term at φ₀."""
 
@@ -49,7 +52,7 @@ class LossWeights:
     interpolation : float
         λ_int, Eq. 4.
     smooth : float
-        λ_smooth, Eq. 6.
+        λ_smooth, Eq. 5.
     feature : float
         λ_fea, Eq. 7.
     """
@@ -69,8 +72,8 @@ class EnergySurface:
     face_areas : (m,) array
     gradient : operator (3 m, n)
         Gradient in every face; all x components, then y, then z.
-    laplacian : operator (n, n)
-        Pointwise Laplacian at the vertices.
+    divergence : operator (n, 3 m)
+        Pointwise divergence, at the vertices, of a vector field in the faces.
     centroid : operator (m, n)
         Values at the centroids of the faces.
     control_vertices : (k,) array
@@ -82,7 +85,7 @@ class EnergySurface:
 
     face_areas: Array
     gradient: Operator
-    laplacian: Operator
+    divergence: Operator
     centroid: Operator
     control_vertices: Array
     delta_width: float
@@ -96,7 +99,7 @@ def energy_surface(problem: Problem) -> EnergySurface:
     return EnergySurface(
         face_areas=elements.face_areas,
         gradient=lambda phi: elements.gradient @ phi,
-        laplacian=lambda phi: elements.laplacian @ phi,
+        divergence=lambda field: elements.divergence @ field,
         centroid=lambda phi: elements.centroid @ phi,
         control_vertices=problem.loop.control_vertices,
         delta_width=DELTA_WIDTH * problem.edge_length,
@@ -114,9 +117,14 @@ def slope_residual(squared_slope: Array) -> Array:
     return squared_slope - 1.0
 
 
-def bending_residual(laplacian: Array, phi: Array, width: float) -> Array:
-    """Residual of Eq. 6, Δφ √G_σ(φ)."""
-    return laplacian * root_delta(phi, width)
+def slope(squared_slope: Array) -> Array:
+    """|∇φ|, kept above zero so that the direction ∇φ/|∇φ| is differentiable."""
+    return (squared_slope + LEAST_SLOPE**2) ** 0.5
+
+
+def bending_residual(curvature: Array, slope: Array, phi: Array, width: float) -> Array:
+    """Residual of Eq. 5, div(∇φ/|∇φ|) √(|∇φ| G_σ(φ))."""
+    return curvature * slope**0.5 * root_delta(phi, width)
 
 
 def feature_residual(phi_fea: Array, phi: Array, width: float) -> Array:
@@ -146,12 +154,15 @@ def interpolation_loss(surface: EnergySurface, phi: Array) -> Array:
 
 def smoothness_density(surface: EnergySurface, phi: Array) -> Array:
     """Integrand of the smoothness constraint in every face, shape (m,)."""
-    laplacian = surface.centroid(surface.laplacian(phi))  # (m,)
-    return 0.5 * bending_residual(laplacian, surface.centroid(phi), surface.delta_width) ** 2
+    gradient = surface.gradient(phi).reshape(3, -1)  # (3, m)
+    length = slope((gradient**2).sum(0))  # (m,)
+    curvature = surface.centroid(surface.divergence((gradient / length).reshape(-1)))  # (m,)
+    centroid = surface.centroid(phi)  # (m,)
+    return 0.5 * bending_residual(curvature, length, centroid, surface.delta_width) ** 2
 
 
 def smoothness_loss(surface: EnergySurface, phi: Array) -> Array:
-    """Smoothness constraint, Eq. 6 and 8: ∫ ½ (Δφ)² G_σ(φ), for ∫ ½ κ_g² dl while |∇φ| ≈ 1."""
+    """Smoothness constraint, Eq. 5 and 8: ∫ ½ div(∇φ/|∇φ|)² |∇φ| G_σ(φ), for ∫ ½ κ_g² dl."""
     return (smoothness_density(surface, phi) * surface.face_areas).sum()
 
 

@@ -3,8 +3,7 @@
 The unknowns are the values of φ at the vertices of the band's faces, except at control points,
 where φ is zero. The level-set term acts on all faces of the band. The bending and feature terms act
 only on inner faces: every face around each corner of an inner face is in the band. On other faces
-an incomplete Laplacian would treat φ as zero outside the band and attract spurious curves along the
-rim.
+the divergence would be incomplete and attract spurious curves along the rim.
 """
 
 from __future__ import annotations
@@ -15,14 +14,8 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry.array_types import FloatArray, IntArray
-from .losses import (
-    DELTA_WIDTH,
-    LossWeights,
-    bending_residual,
-    feature_residual,
-    root_delta,
-    slope_residual,
-)
+from . import losses
+from .losses import DELTA_WIDTH, LossWeights
 from .problem import Problem
 
 
@@ -38,10 +31,10 @@ class NarrowBand:
         Areas of all faces of the band.
     gradient : (3 b, u) sparse array
         ∇φ in every face; all x components, then y, then z.
-    inner_areas : (c,) float array
-        Areas of the inner faces.
-    laplacian : (c, u) sparse array
-        Δφ at the centroids of the inner faces.
+    inner : (c,) int array
+        Positions of the inner faces among the faces of the band.
+    divergence : (c, 3 b) sparse array
+        Divergence, at the centroids of the inner faces, of a vector field in the faces of the band.
     centroid : (c, u) sparse array
         φ at the centroids of the inner faces.
     feature_map : (c,) float array or None
@@ -55,8 +48,8 @@ class NarrowBand:
     unknowns: IntArray
     face_areas: FloatArray
     gradient: sparse.csr_array
-    inner_areas: FloatArray
-    laplacian: sparse.csr_array
+    inner: IntArray
+    divergence: sparse.csr_array
     centroid: sparse.csr_array
     feature_map: FloatArray | None
     damping: sparse.csr_array
@@ -69,14 +62,16 @@ class Residuals:
 
     Attributes
     ----------
-    gradient : (3 b,) float array
-        ∇φ in every face; all x components, then y, then z.
+    gradient : (3, b) float array
+        ∇φ in every face.
+    length : (b,) float array
+        |∇φ| in every face, kept above zero.
     slope : (b,) float array
         Residual of Eq. 3 in every face.
     centroid : (c,) float array
         φ at the centroids of the inner faces.
     bending : (c,) float array
-        Residual of Eq. 6 in the inner faces.
+        Residual of Eq. 5 in the inner faces.
     feature : (c,) float array or None
         Residual of Eq. 7 in the inner faces.
     energy : float
@@ -84,6 +79,7 @@ class Residuals:
     """
 
     gradient: FloatArray
+    length: FloatArray
     slope: FloatArray
     centroid: FloatArray
     bending: FloatArray
@@ -110,7 +106,8 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
     vertices[faces[band]] = True
     complete = vertices.copy()
     complete[faces[~in_band]] = False
-    inner = band[complete[faces[band]].all(axis=1)]
+    inner = np.flatnonzero(complete[faces[band]].all(axis=1))
+    faces_inside = band[inner]
     vertices[problem.loop.control_vertices] = False
     unknowns = np.flatnonzero(vertices)
 
@@ -119,16 +116,17 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
     areas = elements.face_areas[band]
     mass = elements.vertex_areas[unknowns] / problem.edge_length**2
     stiffness = gradient.T @ _rows(np.tile(areas, 3), gradient)
-    centroid = elements.centroid[inner]
+    centroid = elements.centroid[faces_inside]
+    divergence = (centroid @ elements.divergence)[:, components]
     phi_fea = problem.feature_map
     return NarrowBand(
         unknowns=unknowns,
         face_areas=areas,
         gradient=gradient,
-        inner_areas=elements.face_areas[inner],
-        laplacian=(centroid @ elements.laplacian)[:, unknowns],
+        inner=inner,
+        divergence=sparse.csr_array(divergence),
         centroid=centroid[:, unknowns],
-        feature_map=None if phi_fea is None else elements.plain_centroid[inner] @ phi_fea,
+        feature_map=None if phi_fea is None else elements.plain_centroid[faces_inside] @ phi_fea,
         # A share of the mass matrix makes the system definite.
         damping=stiffness + sparse.diags_array(0.01 * mass),
         delta_width=DELTA_WIDTH * problem.edge_length,
@@ -137,17 +135,19 @@ def build_narrow_band(problem: Problem, field: FloatArray, half_width: float) ->
 
 def evaluate(band: NarrowBand, weights: LossWeights, values: FloatArray) -> Residuals:
     """Residuals and energy for given values of φ at the unknowns, (u,)."""
-    gradient = band.gradient @ values
-    slope = slope_residual((gradient.reshape(3, -1) ** 2).sum(axis=0))
+    gradient = (band.gradient @ values).reshape(3, -1)
+    squared = (gradient**2).sum(axis=0)
+    slope, length = losses.slope_residual(squared), losses.slope(squared)
     centroid = band.centroid @ values
-    bending = bending_residual(band.laplacian @ values, centroid, band.delta_width)
-    energy = weights.sdf * (band.face_areas @ slope**2)
-    energy += weights.smooth * (band.inner_areas @ bending**2)
+    curvature = band.divergence @ (gradient / length).ravel()
+    bending = losses.bending_residual(curvature, length[band.inner], centroid, band.delta_width)
+    areas = band.face_areas[band.inner]
+    energy = weights.sdf * (band.face_areas @ slope**2) + weights.smooth * (areas @ bending**2)
     feature = None
     if band.feature_map is not None:
-        feature = feature_residual(band.feature_map, centroid, band.delta_width)
-        energy += weights.feature * (band.inner_areas @ feature**2)
-    return Residuals(gradient, slope, centroid, bending, feature, 0.5 * float(energy))
+        feature = losses.feature_residual(band.feature_map, centroid, band.delta_width)
+        energy += weights.feature * (areas @ feature**2)
+    return Residuals(gradient, length, slope, centroid, bending, feature, 0.5 * float(energy))
 
 
 def gauss_newton_system(
@@ -158,22 +158,21 @@ def gauss_newton_system(
     The Hessian is the weighted JᵀJ of all residuals plus the second derivative of |∇φ|² in faces
     where the slope is above 1. In other faces that derivative would make it indefinite.
     """
-    n_faces = len(band.face_areas)
-    # Row f holds 2 ∇φ of face f; times the gradient operator it is the derivative of |∇φ|².
-    components = (np.tile(np.arange(n_faces), 3), np.arange(3 * n_faces))
-    along = sparse.csr_array((2.0 * residuals.gradient, components))
-    slope = along @ band.gradient
+    areas = band.face_areas[band.inner]
+    along = _along_gradient(residuals) @ band.gradient
+    slope = _rows(2.0 * residuals.length, along)
     # The derivative of √G is -φ / (2 σ²) √G.
-    decay = -residuals.centroid / (2.0 * band.delta_width**2)
-    delta = root_delta(residuals.centroid, band.delta_width)
-    bending = _rows(delta, band.laplacian) + _rows(residuals.bending * decay, band.centroid)
+    decay = _rows(-residuals.centroid / (2.0 * band.delta_width**2), band.centroid)
     terms = [
         (weights.sdf * band.face_areas, slope, residuals.slope),
-        (weights.smooth * band.inner_areas, bending, residuals.bending),
+        (
+            weights.smooth * areas,
+            _bending_jacobian(band, residuals, along, decay),
+            residuals.bending,
+        ),
     ]
     if residuals.feature is not None:
-        feature = _rows(residuals.feature * decay, band.centroid)
-        terms.append((weights.feature * band.inner_areas, feature, residuals.feature))
+        terms.append((weights.feature * areas, _rows(residuals.feature, decay), residuals.feature))
     excess = 2.0 * weights.sdf * band.face_areas * np.maximum(residuals.slope, 0.0)
     hessian = band.gradient.T @ _rows(np.tile(excess, 3), band.gradient)
     gradient = np.zeros(len(band.unknowns))
@@ -184,6 +183,29 @@ def gauss_newton_system(
     return sparse.csr_array(hessian), gradient
 
 
-def _rows(factor: FloatArray, matrix: sparse.csr_array) -> sparse.csr_array:
+def _along_gradient(residuals: Residuals) -> sparse.csr_array:
+    """Component of a vector field along ∇φ/|∇φ| in each face, shape (b, 3 b)."""
+    n_faces = len(residuals.length)
+    direction = (residuals.gradient / residuals.length).ravel()
+    return sparse.csr_array((direction, (np.tile(np.arange(n_faces), 3), np.arange(3 * n_faces))))
+
+
+def _bending_jacobian(
+    band: NarrowBand, residuals: Residuals, along: sparse.csr_array, decay: sparse.csr_array
+) -> sparse.csr_array:
+    """Derivative of the residual of Eq. 5, div(n) √(|∇φ| G) with n = ∇φ/|∇φ|, shape (c, u).
+
+    The derivative of n is the part of the derivative of ∇φ that is orthogonal to n, over |∇φ|.
+    ``along`` is the derivative of |∇φ|, (b, u), and ``decay`` that of log √G, (c, u).
+    """
+    length = residuals.length[band.inner]
+    delta = losses.bending_residual(1.0, length, residuals.centroid, band.delta_width)
+    across = band.gradient - _along_gradient(residuals).T @ along
+    turning = band.divergence @ _rows(np.tile(1.0 / residuals.length, 3), across)
+    stretching = _rows(0.5 / length, along[band.inner]) + decay
+    return _rows(delta, turning) + _rows(residuals.bending, stretching)
+
+
+def _rows(factor: FloatArray, matrix: sparse.sparray) -> sparse.csr_array:
     """Multiply each row of a matrix by a factor."""
     return sparse.csr_array(sparse.diags_array(factor) @ matrix)

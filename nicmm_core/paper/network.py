@@ -2,18 +2,22 @@
 
 It processes one vertex at a time, except that the attention weights depend on means over the
 surface. The paper gives neither widths nor kernel sizes; `NetworkConfig` has the values chosen
-here, with reasons.
+here, with reasons. The functions accept NumPy arrays, with which curves are designed, and torch
+tensors, with which networks are pretrained.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from types import ModuleType
 from typing import NamedTuple
 
-import torch
-from torch import Tensor, nn
+import numpy as np
 
+from ..geometry.array_types import Array, IntArray
 from .features import BASE_CHANNELS
+from .problem import Problem
 
 POSITION_CHANNELS, NORMAL_CHANNELS = slice(0, 3), slice(3, 6)
 INDICATOR_CHANNEL, DISTANCE_CHANNEL = 6, 7
@@ -72,118 +76,238 @@ class NetworkInput(NamedTuple):
 
     Attributes
     ----------
-    features : (n, channels) tensor
-        Input features of every vertex, see `features`.
-    initial_distance : (n,) tensor
+    features : (n, channels) array
+        Input features of every vertex, see `features`; zero in channels that are switched off.
+    initial_distance : (n,) array
         φ₀, zero at the control vertices.
-    area_share : (n,) tensor
+    area_share : (n,) array
         Fraction of the surface's area at each vertex; sums to 1.
-    response : (n, k) tensor
+    response : (n, k) array
         Smooth fields, one per control point. Column j is 1 at control vertex j and 0 at all other
         control vertices.
-    control_vertices : (k,) int tensor
+    control_vertices : (k,) int array
     """
 
-    features: Tensor
-    initial_distance: Tensor
-    area_share: Tensor
-    response: Tensor
-    control_vertices: Tensor
+    features: Array
+    initial_distance: Array
+    area_share: Array
+    response: Array
+    control_vertices: Array
 
 
-class CurveNetwork(nn.Module):
-    """Computes φ = φ₀ + a correction that is zero at the control points.
+def network_input(problem: Problem, config: NetworkConfig) -> NetworkInput:
+    """The input of a network for a problem, in single precision.
 
-    φ₀ is "the foundation for network initialization" (section 3.1): the last layer starts at zero,
-    so the untrained network returns φ₀. Smooth fields cancel the output of the layers at the
-    control points, so that φ is exactly zero there. The paper relies on a large λ_int instead, but
-    then AdamW spends its steps on the interpolation term: in 200 steps, a curve that reached a
-    great circle with exact zeros hardly moved.
+    φ then differs by about 1e-7, in units of the problem, from φ in double precision.
+    """
+    features = problem.features.astype(np.float32)
+    features[:, NORMAL_CHANNELS] *= config.normals
+    features[:, INDICATOR_CHANNEL] *= config.control_indicator
+    features[:, DISTANCE_CHANNEL] *= config.distance
+    areas = problem.elements.vertex_areas
+    return NetworkInput(
+        features=features,
+        initial_distance=problem.initial_distance.astype(np.float32),
+        area_share=(areas / areas.sum()).astype(np.float32),
+        response=problem.smoother.response.astype(np.float32),
+        control_vertices=problem.loop.control_vertices,
+    )
+
+
+@dataclass(frozen=True)
+class Network:
+    """A network with C channels in its hidden layers.
+
+    Attributes
+    ----------
+    config : NetworkConfig
+    parameters : dict of str to array
+        Weights and biases of all layers by name: ``stem``, ``head`` and, for block b,
+        ``blocks.b.linear``, ``.value``, ``.gate_down`` and ``.gate_up``, with a weight (out, in)
+        and a bias (out,) each, and ``blocks.b.attention.weight``. The layers ``gate_down`` have no
+        bias.
+    """
+
+    config: NetworkConfig
+    parameters: dict[str, Array]
+
+    @property
+    def channels(self) -> int:
+        """Number of input channels."""
+        return int(self.parameters["stem.weight"].shape[1])
+
+
+class BlockValues(NamedTuple):
+    """Values in a block at r vertices.
+
+    Attributes
+    ----------
+    hidden : (r, C) array
+        Input of the block.
+    activated : (r, C) array
+        Output of its linear layer, after tanh.
+    attention : (C,) array or 1
+        Weights of the channels, by which ``activated`` is multiplied.
+    lowered : (r, rank) array or None
+        Output of the first layer of the gate.
+    gate : (r, C) array or 1
+    value : (r, C) array
+        The gated unit returns ``gate * value``, which is added to ``hidden``.
+    """
+
+    hidden: Array
+    activated: Array
+    attention: Array
+    lowered: Array | None
+    gate: Array
+    value: Array
+
+    @property
+    def output(self) -> Array:
+        """Output of the block, (r, C)."""
+        return self.hidden + self.gate * self.value
+
+
+Attention = Callable[[int, Array], Array]
+"""Weights (C,) of the channels from the index of a block and its activated values (r, C)."""
+
+
+def parameter_shapes(config: NetworkConfig, channels: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the parameters of a network by name."""
+    width, rank = config.width, config.gate_rank
+    layers = {"stem": (width, channels)}
+    for block in range(config.depth):
+        layers[f"blocks.{block}.linear"] = (width, width)
+        layers[f"blocks.{block}.value"] = (width, width)
+        if config.gating:
+            layers[f"blocks.{block}.gate_down"] = (rank, width)
+            layers[f"blocks.{block}.gate_up"] = (width, rank)
+    layers["head"] = (1, width)
+    shapes: dict[str, tuple[int, ...]] = {}
+    for name, shape in layers.items():
+        shapes[f"{name}.weight"] = shape
+        if not name.endswith("gate_down"):
+            shapes[f"{name}.bias"] = shape[:1]
+    if config.attention:
+        for block in range(config.depth):
+            shapes[f"blocks.{block}.attention.weight"] = (config.attention_kernel,)
+    return shapes
+
+
+def initial_network(
+    config: NetworkConfig | None = None, channels: int = BASE_CHANNELS, seed: int = 0
+) -> Network:
+    """The network from which pretraining starts, in single precision.
+
+    Weights and biases are uniform within ±1/√in. The last layer is zero, so that φ is φ₀: "the
+    foundation for network initialization" (section 3.1).
+    """
+    config = config or NetworkConfig()
+    generator = np.random.default_rng(seed)
+    shapes = parameter_shapes(config, channels)
+    parameters = {}
+    for name, shape in shapes.items():
+        layer, _, _ = name.rpartition(".")
+        bound = shapes[f"{layer}.weight"][-1] ** -0.5
+        parameters[name] = generator.uniform(-bound, bound, shape).astype(np.float32)
+    parameters["stem.weight"][:, POSITION_CHANNELS] *= config.position_gain
+    if config.distance:
+        parameters["head.weight"][:] = 0.0
+        parameters["head.bias"][:] = 0.0
+    return Network(config, parameters)
+
+
+def level_set(network: Network, inputs: NetworkInput, xp: ModuleType = np) -> Array:
+    """Level-set values φ, shape (n,): φ₀ plus a correction that is zero at the control points.
+
+    Smooth fields cancel the correction at the control points. The paper relies on a large λ_int
+    instead, but then AdamW spends its steps on the interpolation term: in 200 steps, a curve that
+    reached a great circle with exact zeros hardly moved.
 
     Parameters
     ----------
-    config : NetworkConfig
-    channels : int
-        Number of input channels.
+    network : Network
+    inputs : NetworkInput
+    xp : module, optional
+        ``numpy`` or ``torch``, whichever the arrays belong to.
+    """
+    attention = surface_attention(network, inputs.area_share, xp)
+    for values in blocks(network, inputs.features, attention, xp):
+        hidden = values.output
+    correction = head(network, hidden)  # (n,)
+    correction = correction - inputs.response @ correction[inputs.control_vertices]
+    return inputs.initial_distance + correction if network.config.distance else correction
+
+
+def surface_attention(network: Network, area_share: Array, xp: ModuleType = np) -> Attention:
+    """Efficient Channel Attention, which needs the values at all vertices of the surface.
+
+    The weight of a channel is the sigmoid of a correlation of the attention kernel with the means
+    of neighbouring channels over the surface.
     """
 
-    def __init__(self, config: NetworkConfig, channels: int = BASE_CHANNELS) -> None:
-        super().__init__()
-        self.config = config
-        self.stem = nn.Linear(channels, config.width)
-        self.blocks = nn.ModuleList(Block(config) for _ in range(config.depth))
-        self.head = nn.Linear(config.width, 1)
-        with torch.no_grad():
-            self.stem.weight[:, POSITION_CHANNELS] *= config.position_gain
-            if config.distance:
-                self.head.weight.zero_()
-                self.head.bias.zero_()
-
-    def forward(self, inputs: NetworkInput) -> Tensor:
-        """Level-set values φ, shape (n,)."""
-        hidden = torch.tanh(self.stem(inputs.features * self._channel_mask(inputs)))  # (n, C)
-        for block in self.blocks:
-            hidden = block(hidden, inputs.area_share)
-        correction = self.head(hidden)[:, 0]  # (n,)
-        at_controls = correction[inputs.control_vertices]  # (k,)
-        phi = correction - inputs.response @ at_controls  # (n,)
-        return inputs.initial_distance + phi if self.config.distance else phi
-
-    def _channel_mask(self, inputs: NetworkInput) -> Tensor:
-        """Factors of the input channels: 0 for channels switched off, 1 for all others."""
-        mask = torch.ones_like(inputs.features[0])  # (channels,)
-        mask[NORMAL_CHANNELS] *= self.config.normals
-        mask[INDICATOR_CHANNEL] *= self.config.control_indicator
-        mask[DISTANCE_CHANNEL] *= self.config.distance
-        return mask
-
-
-class Block(nn.Module):
-    """Linear layer, tanh, attention and a residual step through the gated unit, on (n, C)."""
-
-    def __init__(self, config: NetworkConfig) -> None:
-        super().__init__()
-        width = config.width
-        self.linear = nn.Linear(width, width)
-        self.attention = ChannelAttention(config.attention_kernel) if config.attention else None
-        self.gated = (
-            GatedUnit(width, config.gate_rank) if config.gating else nn.Linear(width, width)
+    def weights(block: int, activated: Array) -> Array:
+        kernel = network.parameters[f"blocks.{block}.attention.weight"]
+        mean = area_share @ activated  # (C,)
+        reach = len(kernel) // 2
+        padding = xp.zeros_like(mean[:reach])
+        padded = xp.concatenate([padding, mean, padding])  # (C + 2 reach,)
+        correlation = sum(
+            weight * padded[shift : shift + len(mean)] for shift, weight in enumerate(kernel)
         )
+        return _sigmoid(correlation, xp)
 
-    def forward(self, hidden: Tensor, area_share: Tensor) -> Tensor:
-        """Values of the next block from values at the vertices and their shares of the area."""
-        inner = torch.tanh(self.linear(hidden))
-        if self.attention is not None:
-            inner = self.attention(inner, area_share)
-        return hidden + self.gated(inner)
+    return weights
 
 
-class ChannelAttention(nn.Module):
-    """Efficient Channel Attention: scale each channel by a weight from its neighbours' means.
+def held_attention(network: Network, inputs: NetworkInput) -> Attention:
+    """The weights that `surface_attention` gives with the present parameters, kept for later."""
+    weigh = surface_attention(network, inputs.area_share)
+    kept = [values.attention for values in blocks(network, inputs.features, weigh)]
+    return lambda block, activated: kept[block]
 
-    The means are taken over the surface, and the weight is the sigmoid of a correlation with the
-    attention kernel.
+
+def blocks(
+    network: Network, features: Array, attention: Attention, xp: ModuleType = np
+) -> Iterator[BlockValues]:
+    """Values in each block in turn.
+
+    Parameters
+    ----------
+    network : Network
+    features : (r, channels) array
+        Input features of r vertices.
+    attention : callable
+        Weights of the channels; not used without attention.
+    xp : module, optional
+        ``numpy`` or ``torch``.
     """
+    config, parameters = network.config, network.parameters
+    hidden = xp.tanh(_linear(parameters, "stem", features))  # (r, C)
+    for block in range(config.depth):
+        name = f"blocks.{block}"
+        activated = xp.tanh(_linear(parameters, f"{name}.linear", hidden))  # (r, C)
+        weights = attention(block, activated) if config.attention else 1.0  # (C,)
+        scaled = activated * weights  # (r, C)
+        lowered, gate = None, 1.0
+        if config.gating:
+            lowered = scaled @ parameters[f"{name}.gate_down.weight"].T  # (r, rank)
+            gate = _sigmoid(_linear(parameters, f"{name}.gate_up", lowered), xp)  # (r, C)
+        value = _linear(parameters, f"{name}.value", scaled)  # (r, C)
+        yield (values := BlockValues(hidden, activated, weights, lowered, gate, value))
+        hidden = values.output
 
-    def __init__(self, kernel: int) -> None:
-        super().__init__()
-        self.across = nn.Conv1d(1, 1, kernel, padding=kernel // 2, bias=False)
 
-    def forward(self, inner: Tensor, area_share: Tensor) -> Tensor:
-        """Scaled values, from values (n, C) and the shares of the area, (n,), which sum to 1."""
-        mean = area_share @ inner  # (C,)
-        return inner * torch.sigmoid(self.across(mean[None, None])[0, 0])
+def head(network: Network, hidden: Array) -> Array:
+    """Output (r,) of the last layer, from the output (r, C) of the last block."""
+    return _linear(network.parameters, "head", hidden)[:, 0]
 
 
-class GatedUnit(nn.Module):
-    """Light GLU: a linear layer multiplied by a sigmoid gate of low rank, on (n, C)."""
+def _linear(parameters: dict[str, Array], name: str, values: Array) -> Array:
+    """A linear layer, from (r, in) to (r, out)."""
+    return values @ parameters[f"{name}.weight"].T + parameters[f"{name}.bias"]
 
-    def __init__(self, width: int, rank: int) -> None:
-        super().__init__()
-        self.value = nn.Linear(width, width)
-        self.gate_down = nn.Linear(width, rank, bias=False)
-        self.gate_up = nn.Linear(rank, width)
 
-    def forward(self, inner: Tensor) -> Tensor:
-        """Gated values, (n, C)."""
-        return self.value(inner) * torch.sigmoid(self.gate_up(self.gate_down(inner)))
+def _sigmoid(values: Array, xp: ModuleType) -> Array:
+    """1 / (1 + exp(-x)), without overflow."""
+    return 0.5 * (1.0 + xp.tanh(0.5 * values))

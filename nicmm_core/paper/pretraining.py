@@ -30,12 +30,15 @@ from .network import (
     DISTANCE_CHANNEL,
     NORMAL_CHANNELS,
     POSITION_CHANNELS,
-    CurveNetwork,
+    Network,
     NetworkConfig,
     NetworkInput,
+    initial_network,
+    level_set,
+    network_input,
 )
 from .problem import Problem, build_problem
-from .tensors import network_input, surface_tensors
+from .tensors import input_tensors, surface_tensors, trainable, trained
 from .torch_threads import single_thread
 from .training_maps import random_maps
 from .weights_file import save_weights
@@ -130,10 +133,9 @@ def pretrain(
     report = progress or (lambda stage, done, total, loss: None)
     _check(meshes, output, config)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    torch.manual_seed(config.seed)
     channels = BASE_CHANNELS + (config.map_share > 0.0)
-    network = CurveNetwork(network_config or NetworkConfig(), channels).to(device)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+    network = trainable(initial_network(network_config, channels, config.seed), device)
+    optimiser = torch.optim.AdamW(network.parameters.values(), lr=config.learning_rate)
     checkpoint = Path(output).with_suffix(".checkpoint.pt")
     configuration = repr((network.config, config, weights, _fingerprint(meshes)))
     losses = _resume(checkpoint, configuration, network, optimiser)
@@ -142,7 +144,7 @@ def pretrain(
     prepared = [
         _PreparedSet(
             surface_tensors(problem, device),
-            network_input(problem, device),
+            input_tensors(network_input(problem, network.config), device),
             balanced(weights, problem),
         )
         for problem in _random_problems(meshes, config, report)
@@ -152,7 +154,7 @@ def pretrain(
             group["lr"] = _learning_rate(config, epoch)
         losses.append(_train_epoch(network, optimiser, prepared, config, epoch, report))
         _save_checkpoint(checkpoint, configuration, network, optimiser, losses)
-    save_weights(output, network)
+    save_weights(output, trained(network))
     checkpoint.unlink(missing_ok=True)
     return losses
 
@@ -185,7 +187,7 @@ def _check(meshes: Sequence[Mesh], output: str | Path, config: PretrainingConfig
 
 
 def _train_epoch(
-    network: CurveNetwork,
+    network: Network,
     optimiser: torch.optim.Optimizer,
     prepared: list[_PreparedSet],
     config: PretrainingConfig,
@@ -201,7 +203,7 @@ def _train_epoch(
         optimiser.zero_grad()
         for index in chosen:
             each = prepared[index]
-            phi = network(randomly_reoriented(each.inputs, generator))
+            phi = level_set(network, randomly_reoriented(each.inputs, generator), torch)
             loss = total_loss(loss_terms(each.surface, phi), each.weights)
             (loss / len(chosen)).backward()
             total += loss.item()
@@ -209,7 +211,7 @@ def _train_epoch(
             all_done = epoch * len(order) + done
             report("training", all_done, config.epochs * len(order), total / done)
         # Single sets with a bad loop would derail the training.
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        torch.nn.utils.clip_grad_norm_(network.parameters.values(), 1.0)
         optimiser.step()
     return total / len(order)
 
@@ -217,7 +219,7 @@ def _train_epoch(
 def _save_checkpoint(
     checkpoint: Path,
     configuration: str,
-    network: CurveNetwork,
+    network: Network,
     optimiser: torch.optim.Optimizer,
     losses: list[float],
 ) -> None:
@@ -227,7 +229,7 @@ def _save_checkpoint(
     """
     state = {
         "configuration": configuration,
-        "network": network.state_dict(),
+        "network": network.parameters,
         "optimiser": optimiser.state_dict(),
         "losses": losses,
     }
@@ -239,7 +241,7 @@ def _save_checkpoint(
 def randomly_reoriented(inputs: NetworkInput, generator: np.random.Generator) -> NetworkInput:
     """Permute and reverse the axes of a network input at random, and choose the sign of φ₀.
 
-    The energy of Eq. 2 is invariant under both changes.
+    The energy is invariant under both changes.
     """
     axes, signs = generator.permutation(3).tolist(), generator.choice([-1.0, 1.0], 3)
     side = float(generator.choice([-1.0, 1.0]))
@@ -256,7 +258,7 @@ def _learning_rate(config: PretrainingConfig, epoch: int) -> float:
 
 
 def _resume(
-    checkpoint: Path, configuration: str, network: CurveNetwork, optimiser: torch.optim.Optimizer
+    checkpoint: Path, configuration: str, network: Network, optimiser: torch.optim.Optimizer
 ) -> list[float]:
     """Load the checkpoint of an interrupted run, if it exists; return the losses of its epochs."""
     if not checkpoint.exists():
@@ -273,7 +275,9 @@ def _resume(
             f"{checkpoint} belongs to a run with other meshes or settings; delete it to start "
             "over, or repeat that run"
         )
-    network.load_state_dict(state["network"])
+    with torch.no_grad():
+        for name, tensor in network.parameters.items():
+            tensor.copy_(state["network"][name])
     optimiser.load_state_dict(state["optimiser"])
     return list(state["losses"])
 

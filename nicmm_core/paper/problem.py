@@ -40,7 +40,7 @@ vanish, and φ₀ falls back on the unsmoothed distance there to keep the topolo
 END_RADIUS = 3.0
 """Distance from an end of an open curve, in edge lengths, within which bending is ignored.
 
-φ is a cone around the end, and the Laplacian of a cone is unbounded.
+φ is a cone around the end, and the curvature of its level sets is unbounded there.
 """
 
 
@@ -155,8 +155,8 @@ def build_problem(
     if side is None:
         bundle = build_sign_bundle(working, loop)
         side = bundle.side
-        without_laplacian = working.on_boundary | _near_ends(working, loop)
-        elements = build_finite_elements(vertices, working.faces, without_laplacian, bundle)
+        without_divergence = working.on_boundary | _near_ends(working, loop)
+        elements = build_finite_elements(vertices, working.faces, without_divergence, bundle)
     distance = signed_distance(plain, loop, edge_length, side)
     length = smoothness**0.25 * SMOOTHING_LENGTH * loop.zigzag / unit
     base = None if bundle is None else plain

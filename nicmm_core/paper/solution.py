@@ -22,15 +22,15 @@ class Solution:
         Total loss of every iteration.
     status : Status
         How the computation ended.
-    keeps_topology : bool
-        Whether the zero set is known to be isotopic to that of φ₀.
+    held : int
+        Number of vertices that had to be held, over all iterations, to keep the topology.
     """
 
     field: FloatArray
     terms: dict[str, float]
     losses: list[float]
     status: Status
-    keeps_topology: bool = False
+    held: int = 0
 
     @property
     def iterations(self) -> int:

@@ -1,15 +1,18 @@
-"""Conversion of problems to torch tensors in single precision, for pretraining and fine-tuning."""
+"""Conversion of problems and networks to torch tensors in single precision, for pretraining."""
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
+
 import torch
+from scipy import sparse
 from torch import Tensor
 
 from ..geometry.array_types import FloatArray
 from .losses import EnergySurface, energy_surface
-from .network import NetworkInput
+from .network import Network, NetworkInput
 from .problem import Problem
-from .sparse_operator import sparse_operator
 
 
 def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
@@ -20,7 +23,7 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
     return EnergySurface(
         face_areas=_tensor(arrays.face_areas, device),
         gradient=sparse_operator(elements.gradient, device),
-        laplacian=sparse_operator(elements.laplacian, device),
+        divergence=sparse_operator(elements.divergence, device),
         centroid=sparse_operator(elements.centroid, device),
         control_vertices=torch.as_tensor(arrays.control_vertices, device=device),
         delta_width=arrays.delta_width,
@@ -28,19 +31,43 @@ def surface_tensors(problem: Problem, device: torch.device) -> EnergySurface:
     )
 
 
-def network_input(problem: Problem, device: torch.device) -> NetworkInput:
-    """The input of the network as tensors on a device.
+def input_tensors(inputs: NetworkInput, device: torch.device) -> NetworkInput:
+    """The input of the network as tensors on a device."""
+    return NetworkInput(*(torch.as_tensor(array, device=device) for array in inputs))
 
-    φ then differs by about 1e-7, in units of the problem, from φ in double precision.
+
+def trainable(network: Network, device: torch.device) -> Network:
+    """A copy of a network, with tensors on a device that have gradients."""
+    parameters = {
+        name: torch.tensor(array, device=device, requires_grad=True)
+        for name, array in network.parameters.items()
+    }
+    return Network(network.config, parameters)
+
+
+def trained(network: Network) -> Network:
+    """A copy of a network of tensors, with NumPy arrays."""
+    arrays = {name: t.detach().cpu().numpy().copy() for name, t in network.parameters.items()}
+    return Network(network.config, arrays)
+
+
+def sparse_operator(matrix: sparse.sparray, device: torch.device) -> Callable[[Tensor], Tensor]:
+    """A function that multiplies a sparse matrix (m, n) by a vector (n,), with derivatives.
+
+    The operator has copies of the arrays: SciPy may sort those of the matrix in place later.
     """
-    areas = problem.elements.vertex_areas
-    return NetworkInput(
-        features=_tensor(problem.features, device),
-        initial_distance=_tensor(problem.initial_distance, device),
-        area_share=_tensor(areas / areas.sum(), device),
-        response=_tensor(problem.smoother.response, device),
-        control_vertices=torch.as_tensor(problem.loop.control_vertices, device=device),
-    )
+    csr = sparse.csr_array(matrix)
+    with warnings.catch_warnings():
+        # torch warns once per process that compressed sparse tensors are in beta.
+        warnings.filterwarnings("ignore", message="Sparse")
+        tensor = torch.sparse_csr_tensor(
+            torch.tensor(csr.indptr, dtype=torch.int32),
+            torch.tensor(csr.indices, dtype=torch.int32),
+            torch.tensor(csr.data, dtype=torch.float32),
+            size=csr.shape,
+            device=device,
+        )
+    return lambda vector: tensor @ vector
 
 
 def _tensor(array: FloatArray, device: torch.device) -> Tensor:

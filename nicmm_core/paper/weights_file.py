@@ -14,12 +14,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from ..errors import ArgumentError
 from ..geometry.array_types import Array
 from .features import BASE_CHANNELS
-from .network import CurveNetwork, NetworkConfig
+from .network import Network, NetworkConfig, parameter_shapes
 
 SHIPPED = Path(__file__).parent / "weights" / "nicmm.npz"
 """Weights shipped with the package; `docs/pretraining.md` gives the command that produced them."""
@@ -31,15 +30,14 @@ MOST_BYTES = 2**28
 """Maximum number of bytes of all arrays in a file; a small archive could unpack to any size."""
 
 
-def save_weights(path: str | Path, network: CurveNetwork) -> None:
-    """Write configuration and parameters of a network to a file."""
+def save_weights(path: str | Path, network: Network) -> None:
+    """Write configuration and parameters of a network, as NumPy arrays, to a file."""
     config = np.array(json.dumps(asdict(network.config)))
-    arrays = {name: array.cpu().numpy() for name, array in network.state_dict().items()}
     with Path(path).open("wb") as file:
-        np.savez_compressed(file, config=config, **arrays)
+        np.savez_compressed(file, config=config, **network.parameters)
 
 
-def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> CurveNetwork:
+def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> Network:
     """Read a network.
 
     If a file has weights for the eight base channels only, the ninth channel, φ_fea, gets zero
@@ -60,24 +58,25 @@ def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> C
     try:
         arrays = _read_arrays(path)
         config = NetworkConfig(**json.loads(str(arrays.pop("config"))))
-        extra = channels - arrays["stem.weight"].shape[1]
-        arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
-        for name, array in arrays.items():
-            arrays[name] = array.astype(np.float32, casting="same_kind")
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} has values that are NaN or infinite")
         if config.depth > len(arrays):
             raise ValueError(f"it has no {config.depth} blocks")
-        with torch.device("meta"):  # without memory, as the configuration may ask for too much
-            network = CurveNetwork(config, channels)
-        tensors = {name: torch.as_tensor(array) for name, array in arrays.items()}
-        network.load_state_dict(tensors, assign=True)
+        extra = channels - arrays["stem.weight"].shape[1]
+        arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
+        shapes = parameter_shapes(config, channels)
+        if arrays.keys() != shapes.keys():
+            raise ValueError(f"it has the parameters {', '.join(sorted(arrays))}")
+        for name, shape in shapes.items():
+            if arrays[name].shape != shape:
+                raise ValueError(f"{name} has the shape {arrays[name].shape} instead of {shape}")
+            arrays[name] = arrays[name].astype(np.float32, casting="same_kind")
+            if not np.isfinite(arrays[name]).all():
+                raise ValueError(f"{name} has values that are NaN or infinite")
     except _UNREADABLE as error:
         raise ArgumentError(
             f"{path} cannot be read as network weights ({error}); create the file with "
             "'python -m nicmm_core pretrain'"
         ) from error
-    return network.requires_grad_()
+    return Network(config, arrays)
 
 
 def _read_arrays(path: str | Path) -> dict[str, Array]:
@@ -92,7 +91,7 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
 
 
 @cache
-def shipped_network(channels: int) -> CurveNetwork:
+def shipped_network(channels: int) -> Network:
     """The shipped network for a number of input channels, cached; do not modify it."""
     return load_network(SHIPPED if channels == BASE_CHANNELS else SHIPPED_WITH_MAPS, channels)
 

@@ -1,0 +1,234 @@
+"""Minimises the energy by damped Gauss–Newton steps in a narrow band (Levenberg–Marquardt).
+
+Each step is looked for among the values of φ at the vertices (`vertex_steps`) or among the
+parameters of the network (`network_steps`). After a step φ is replaced by the signed distance to
+the new curve, because the ridges of the old distance would hold the curve back. If changing the
+sign of a vertex would split the curve or detach it from a control point, the step is solved again
+with this vertex held. So the zero set is always one simple curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy import sparse
+
+from ..geometry.array_types import BoolArray, FloatArray
+from ..geometry.distances import build_distance_surface
+from ..progress import checkpoint
+from ..status import Status
+from .contour import signs_with_zeros
+from .losses import LossWeights, energy_of
+from .narrow_band import NarrowBand, build_narrow_band, evaluate, gauss_newton_system
+from .problem import Problem
+from .redistancing import redistanced
+from .signed_distance import LEAST_DISTANCE
+from .solution import Solution
+from .topology import breaking_vertices
+from .vertex_links import VertexLinks
+
+
+@dataclass(frozen=True)
+class SolverConfig:
+    """Settings of the solver; lengths are in mean edge lengths at the curve.
+
+    Attributes
+    ----------
+    half_width : float
+        Half width of the band. The Gaussian of the bending term ends at 3; wider bands cross the
+        ridge between two strands of the curve more often.
+    longest_move : float
+        Maximum change of φ near the curve in one step, chosen so that the band contains the new
+        curve.
+    beside : float
+        Distance to the curve within which that limit applies.
+    damping : float
+        Initial weight of the step's norm, relative to λ_sdf.
+    least_damping : float
+        Lower bound of that weight.
+    patience : int
+        Number of iterations after which the solver has converged if the least loss has fallen by
+        less than the tolerance in them.
+    tolerance, relative_tolerance : float
+        Decrease of the least loss that counts as progress: absolute, and relative to the loss.
+    iterations : int
+        Maximum number of iterations.
+    trials : int
+        Maximum number of trial steps in one iteration.
+    holds : int
+        Maximum number of these in which vertices are added to those that are held.
+    """
+
+    half_width: float = 4.0
+    longest_move: float = 1.5
+    beside: float = 2.0
+    damping: float = 1e-2
+    least_damping: float = 1e-6
+    patience: int = 10
+    tolerance: float = 1e-5
+    relative_tolerance: float = 0.0
+    iterations: int = 100
+    trials: int = 25
+    holds: int = 6
+
+
+LEAST_GAIN = 1e-3
+"""Least decrease of the energy for which a step is accepted, relative to the predicted decrease."""
+
+GOOD_GAIN, POOR_GAIN = 0.75, 0.25
+"""Relative decreases above which the damping is lowered, and below which it is raised."""
+
+
+class Steps(Protocol):
+    """The steps among which the solver looks, for a band with u unknowns."""
+
+    def linearise(
+        self,
+        band: NarrowBand,
+        hessian: sparse.csr_array,
+        gradient: FloatArray,
+        beside: BoolArray,
+    ) -> None:
+        """Prepare for steps from the present φ.
+
+        Parameters
+        ----------
+        band : NarrowBand
+        hessian : (u, u) sparse array
+            Second derivative of the energy, positive semidefinite.
+        gradient : (u,) float array
+        beside : (u,) bool array
+            Whether each unknown lies beside the curve.
+        """
+
+    def solve(self, damping: float, held: BoolArray) -> FloatArray:
+        """Solve for a step; return the change of φ at the unknowns to first order, (u,)."""
+
+    def take(self, scale: float) -> FloatArray:
+        """Change of φ at the unknowns, (u,), by a multiple of the last step."""
+
+    def keep(self) -> None:
+        """Make the last step taken permanent."""
+
+
+def minimise(
+    problem: Problem,
+    start: FloatArray,
+    steps: Steps,
+    weights: LossWeights,
+    config: SolverConfig,
+    watch: Callable[[float, FloatArray], bool] | None = None,
+) -> Solution:
+    """Minimise the energy from a level set whose zero set is isotopic to that of φ₀.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : (n,) float array
+    steps : Steps
+    weights : LossWeights
+    config : SolverConfig
+    watch : callable, optional
+        Function called in every iteration with the progress, as a fraction of the maximum number of
+        iterations, and the best φ so far. The solver stops when the function returns False.
+
+    Returns
+    -------
+    Solution
+        The best φ as a signed distance; its zero set is isotopic to that of φ₀.
+    """
+    h = problem.edge_length
+    controls = problem.loop.control_vertices
+    surface = build_distance_surface(problem.vertices, problem.working.faces, h)
+    links = VertexLinks(problem.working, problem.bundle)
+    reach = (config.half_width + 1.0) * h
+    field = redistanced(surface, start, controls, reach, problem.bundle)
+    best_field, losses, least = field, [], []
+    damping, n_held = config.damping, 0
+    status = Status.ITERATION_LIMIT
+    for iteration in range(1, config.iterations + 1):
+        band = build_narrow_band(problem, field, config.half_width * h)
+        losses.append(evaluate(band, weights, field[band.unknowns]).energy)
+        if not np.isfinite(losses[-1]):
+            status = Status.DIVERGED
+            break
+        if losses[-1] <= min(losses):
+            best_field = field
+        least.append(min(losses))
+        if watch is not None and not watch(iteration / config.iterations, best_field):
+            status = Status.CANCELLED
+            break
+        if _has_converged(least, config):
+            status = Status.CONVERGED
+            break
+        moved, damping, n = _step(problem, band, links, field, steps, weights, damping, config)
+        if moved is None:
+            status = Status.CONVERGED
+            break
+        n_held += n
+        field = redistanced(surface, moved, controls, reach, problem.bundle)
+    field = redistanced(surface, best_field, controls, bundle=problem.bundle)
+    return Solution(field, energy_of(problem, field), losses, status, n_held)
+
+
+def _has_converged(least: list[float], config: SolverConfig) -> bool:
+    """Whether the least loss so far, in every iteration, has converged."""
+    if len(least) <= config.patience:
+        return False
+    decrease = least[-1 - config.patience] - least[-1]
+    return decrease < max(config.tolerance, config.relative_tolerance * least[-1])
+
+
+def _step(
+    problem: Problem,
+    band: NarrowBand,
+    links: VertexLinks,
+    field: FloatArray,
+    steps: Steps,
+    weights: LossWeights,
+    damping: float,
+    config: SolverConfig,
+) -> tuple[FloatArray | None, float, int]:
+    """Take one step: the new φ (n,), or None if no step lowers the energy; the damping for the next
+    step; and the number of vertices that had to be held.
+    """
+    h, controls = problem.edge_length, problem.loop.control_vertices
+    values = field[band.unknowns]
+    residuals = evaluate(band, weights, values)
+    hessian, gradient = gauss_newton_system(band, weights, residuals)
+    beside = np.abs(values) < config.beside * h
+    steps.linearise(band, hessian, gradient, beside)
+    held = np.zeros(len(values), dtype=bool)
+    holds = 0
+    for _ in range(config.trials):
+        checkpoint()
+        change = steps.solve(weights.sdf * damping, held)
+        farthest = np.abs(change[beside]).max(initial=0.0)
+        scale = min(1.0, config.longest_move * h / max(farthest, 1e-300))
+        change *= scale
+        predicted = -(gradient @ change + 0.5 * (change @ (hessian @ change)))
+        if not predicted > 0.0:
+            return None, damping, 0
+        moved = field.copy()
+        moved[band.unknowns] += steps.take(scale)
+        breaking = breaking_vertices(links, field, moved, controls)
+        if len(breaking) and holds < config.holds:
+            holds += 1
+            held |= np.isin(band.unknowns, breaking)
+            continue
+        moved[breaking] = LEAST_DISTANCE * h * signs_with_zeros(field, controls)[breaking]
+        energy = evaluate(band, weights, moved[band.unknowns]).energy
+        gain = (residuals.energy - energy) / predicted
+        if not gain > LEAST_GAIN:  # also if it is NaN
+            damping *= 4.0
+            continue
+        steps.keep()
+        if gain > GOOD_GAIN:
+            damping = max(damping / 4.0, config.least_damping)
+        elif gain < POOR_GAIN:
+            damping *= 2.0
+        return moved, damping, int(held.sum())
+    return None, damping, 0
