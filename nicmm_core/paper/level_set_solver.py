@@ -58,8 +58,11 @@ class SolverConfig:
         Maximum number of iterations.
     trials : int
         Maximum number of trial steps in one iteration.
+    shortest : float
+        Length of the shortest step that is tried, relative to the first one, before vertices are
+        held.
     holds : int
-        Maximum number of these in which vertices are added to those that are held.
+        Maximum number of trial steps after which vertices are added to those that are held.
     """
 
     half_width: float = 4.0
@@ -73,6 +76,7 @@ class SolverConfig:
     iterations: int = 100
     trials: int = 25
     holds: int = 6
+    shortest: float = 0.25
 
 
 LEAST_GAIN = 1e-3
@@ -202,12 +206,12 @@ def _step(
     beside = np.abs(values) < config.beside * h
     steps.linearise(band, hessian, gradient, beside)
     held = np.zeros(len(values), dtype=bool)
-    holds = 0
+    holds, shorter = 0, 1.0
     for _ in range(config.trials):
         checkpoint()
         change = steps.solve(weights.sdf * damping, held)
         farthest = np.abs(change[beside]).max(initial=0.0)
-        scale = min(1.0, config.longest_move * h / max(farthest, 1e-300))
+        scale = shorter * min(1.0, config.longest_move * h / max(farthest, 1e-300))
         change *= scale
         predicted = -(gradient @ change + 0.5 * (change @ (hessian @ change)))
         if not predicted > 0.0:
@@ -215,8 +219,11 @@ def _step(
         moved = field.copy()
         moved[band.unknowns] += steps.take(scale)
         breaking = breaking_vertices(links, field, moved, controls)
+        if len(breaking) and shorter > config.shortest:
+            shorter *= 0.5
+            continue
         if len(breaking) and holds < config.holds:
-            holds += 1
+            holds, shorter = holds + 1, 1.0
             held |= np.isin(band.unknowns, breaking)
             continue
         moved[breaking] = LEAST_DISTANCE * h * signs_with_zeros(field, controls)[breaking]

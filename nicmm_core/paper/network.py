@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..geometry.array_types import Array, IntArray
+from ..geometry.array_types import Array
 from .features import BASE_CHANNELS
 from .problem import Problem
 
@@ -232,11 +232,21 @@ def level_set(network: Network, inputs: NetworkInput, xp: ModuleType = np) -> Ar
         ``numpy`` or ``torch``, whichever the arrays belong to.
     """
     attention = surface_attention(network, inputs.area_share, xp)
-    for values in blocks(network, inputs.features, attention, xp):
-        hidden = values.output
-    correction = head(network, hidden)  # (n,)
+    correction = corrections(network, inputs.features, attention, xp)  # (n,)
     correction = correction - inputs.response @ correction[inputs.control_vertices]
     return inputs.initial_distance + correction if network.config.distance else correction
+
+
+def corrections(
+    network: Network, features: Array, attention: Attention, xp: ModuleType = np
+) -> Array:
+    """Corrections of φ₀ at r vertices, shape (r,), not yet zero at the control points.
+
+    The parameters are those of `blocks`.
+    """
+    for values in blocks(network, features, attention, xp):
+        hidden = values.output
+    return head(network, hidden)
 
 
 def surface_attention(network: Network, area_share: Array, xp: ModuleType = np) -> Attention:
