@@ -71,9 +71,7 @@ class NetworkSteps:
         gradient: FloatArray,
         beside: BoolArray,
     ) -> None:
-        """Compute the changes of φ that the parameters can make in the band, and the energy's
-        Hessian and gradient for them.
-        """
+        """Compute the changes of φ that the parameters can make, and the energy's derivatives."""
         inputs = self._inputs
         n_unknowns, n_controls = len(band.unknowns), len(inputs.control_vertices)
         rows = np.concatenate([band.unknowns, inputs.control_vertices])

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy import sparse
 
+from ..geometry import tolerances
 from ..geometry.array_types import BoolArray, FloatArray
 from ..geometry.distances import build_distance_surface
 from ..progress import checkpoint
@@ -168,12 +169,12 @@ def minimise(
         if _has_converged(least, config):
             status = Status.CONVERGED
             break
-        moved, damping, n = _step(problem, band, links, field, steps, weights, damping, config)
-        if moved is None:
+        step = _step(problem, band, links, field, steps, weights, damping, config)
+        if step is None:
             status = Status.CONVERGED
             break
-        n_held += n
-        field = redistanced(surface, moved, controls, reach, problem.bundle)
+        damping, n_held = step.damping, n_held + step.held
+        field = redistanced(surface, step.field, controls, reach, problem.bundle)
     field = redistanced(surface, best_field, controls, bundle=problem.bundle)
     return Solution(field, energy_of(problem, field), losses, status, n_held)
 
@@ -186,6 +187,24 @@ def _has_converged(least: list[float], config: SolverConfig) -> bool:
     return decrease < max(config.tolerance, config.relative_tolerance * least[-1])
 
 
+class _Step(NamedTuple):
+    """A step that lowers the energy.
+
+    Attributes
+    ----------
+    field : (n,) float array
+        φ after the step.
+    damping : float
+        Damping for the next step.
+    held : int
+        Number of vertices that had to be held.
+    """
+
+    field: FloatArray
+    damping: float
+    held: int
+
+
 def _step(
     problem: Problem,
     band: NarrowBand,
@@ -195,10 +214,8 @@ def _step(
     weights: LossWeights,
     damping: float,
     config: SolverConfig,
-) -> tuple[FloatArray | None, float, int]:
-    """Take one step: the new φ (n,), or None if no step lowers the energy; the damping for the next
-    step; and the number of vertices that had to be held.
-    """
+) -> _Step | None:
+    """Find a step from φ (n,), or None if no step lowers the energy."""
     h, controls = problem.edge_length, problem.loop.control_vertices
     values = field[band.unknowns]
     residuals = evaluate(band, weights, values)
@@ -211,11 +228,11 @@ def _step(
         checkpoint()
         change = steps.solve(weights.sdf * damping, held)
         farthest = np.abs(change[beside]).max(initial=0.0)
-        scale = shorter * min(1.0, config.longest_move * h / max(farthest, 1e-300))
+        scale = shorter * min(1.0, config.longest_move * h / max(farthest, tolerances.TINY))
         change *= scale
         predicted = -(gradient @ change + 0.5 * (change @ (hessian @ change)))
         if not predicted > 0.0:
-            return None, damping, 0
+            return None
         moved = field.copy()
         moved[band.unknowns] += steps.take(scale)
         breaking = breaking_vertices(links, field, moved, controls)
@@ -237,5 +254,5 @@ def _step(
             damping = max(damping / 4.0, config.least_damping)
         elif gain < POOR_GAIN:
             damping *= 2.0
-        return moved, damping, int(held.sum())
-    return None, damping, 0
+        return _Step(moved, damping, int(held.sum()))
+    return None
