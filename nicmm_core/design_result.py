@@ -26,7 +26,7 @@ class Design:
         One curve, unless the status is `NOT_ONE_CURVE`. Empty if the design was cancelled before
         there was a curve.
     iterations : int
-        Number of iterations of the relaxation, the network's training or the variational solver.
+        Number of iterations of the relaxation or of the level-set solver.
     seconds : float
         Duration of the design.
     energy : dict of str to float

@@ -1,7 +1,7 @@
 """The problem of one curve design: the input of the network and of the variational solver.
 
 It is built by the paper's pipeline up to section 3.1: control points, initial loop, signed distance
-and input features. Pretraining, fine-tuning and the variational solver start from it.
+and input features. Pretraining and both solvers start from it.
 """
 
 from __future__ import annotations
