@@ -7,7 +7,16 @@ import pytest
 
 from nicmm_core import shapes
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.paper.losses import LossWeights, energy_surface, loss_terms, slope, total_loss
+from nicmm_core.paper import variational
+from nicmm_core.paper.contour import segment_ends, signs_with_zeros
+from nicmm_core.paper.losses import (
+    LossWeights,
+    balanced,
+    energy_surface,
+    loss_terms,
+    slope,
+    total_loss,
+)
 from nicmm_core.paper.narrow_band import build_narrow_band, evaluate, gauss_newton_system
 from nicmm_core.paper.problem import build_problem
 
@@ -164,3 +173,26 @@ def test_unknowns_leave_out_the_control_points(problem):
     assert not np.isin(problem.loop.control_vertices, band.unknowns).any()
     assert (np.diff(band.unknowns) > 0).all()
     assert (np.linalg.eigvalsh(band.damping.toarray())[0]) > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True, reason="outside the refined band, faces are larger than the narrow band"
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_bending_is_counted_along_the_whole_curve(body, seed):
+    """The curve that the solver finds lies in inner faces."""
+    chosen = np.random.default_rng(seed).choice(len(body.vertices), 4, replace=False)
+    points = locate_control_points(body, chosen, closed=bool(seed % 2))
+    problem = build_problem(body, points, "shortest", closed=bool(seed % 2))
+    field = variational.solve(problem, balanced(LossWeights(), problem)).field
+    half_width = variational.CONVERGENCE.half_width * problem.edge_length
+    band = build_narrow_band(problem, field, half_width)
+    faces = np.flatnonzero(np.abs(problem.elements.centroid @ field) < half_width)
+    sign = signs_with_zeros(field, problem.loop.control_vertices)
+    crossed, start, end = segment_ends(
+        problem.vertices, problem.working.faces, field, sign, problem.bundle
+    )
+    length = np.linalg.norm(end - start, axis=1)
+    counted = np.isin(crossed, faces[band.inner])
+    assert length[counted].sum() > 0.95 * length.sum()
