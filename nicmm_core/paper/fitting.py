@@ -20,7 +20,7 @@ from .narrow_band import NarrowBand
 from .network import Network, NetworkInput, held_attention, level_set, network_input
 from .problem import Problem
 from .solution import Solution
-from .tangent_kernel import Tangent, kernel, moved, tangent
+from .tangent_kernel import kernel, moved, tangent
 from .topology import keep_topology
 
 CONVERGENCE = SolverConfig(patience=6, relative_tolerance=0.01)
@@ -71,8 +71,9 @@ class NetworkSteps:
         gradient: FloatArray,
         beside: BoolArray,
     ) -> None:
-        """Compute the changes of φ that the parameters can make in the band, and the energy's
-        Hessian and gradient for them.
+        """Compute the changes of φ in the band that the parameters can make.
+
+        The energy's Hessian and gradient are computed for them.
         """
         inputs = self._inputs
         n_unknowns, n_controls = len(band.unknowns), len(inputs.control_vertices)

@@ -1,10 +1,10 @@
 """Minimises the energy by damped Gauss–Newton steps in a narrow band (Levenberg–Marquardt).
 
-Each step is looked for among the values of φ at the vertices (`vertex_steps`) or among the
-parameters of the network (`network_steps`). After a step φ is replaced by the signed distance to
-the new curve, because the ridges of the old distance would hold the curve back. If changing the
-sign of a vertex would split the curve or detach it from a control point, the step is solved again
-with this vertex held. So the zero set is always one simple curve.
+Each step is looked for among the values of φ at the vertices (`variational.VertexSteps`) or among
+the parameters of the network (`fitting.NetworkSteps`). After a step φ is replaced by the signed
+distance to the new curve, because the ridges of the old distance would hold the curve back. If
+changing the sign of a vertex would split the curve or detach it from a control point, the step is
+solved again with this vertex held. So the zero set is always one simple curve.
 """
 
 from __future__ import annotations
@@ -192,8 +192,16 @@ def _step(
     damping: float,
     config: SolverConfig,
 ) -> tuple[FloatArray | None, float, int]:
-    """Take one step: the new φ (n,), or None if no step lowers the energy; the damping for the next
-    step; and the number of vertices that had to be held.
+    """Take one step.
+
+    Returns
+    -------
+    (n,) float array or None
+        The new φ; None if no step lowers the energy.
+    float
+        Damping for the next step.
+    int
+        Number of vertices that had to be held.
     """
     h, controls = problem.edge_length, problem.loop.control_vertices
     values = field[band.unknowns]

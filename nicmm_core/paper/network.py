@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..geometry.array_types import Array, IntArray
+from ..geometry.array_types import Array
 from .features import BASE_CHANNELS
 from .problem import Problem
 

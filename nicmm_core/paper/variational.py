@@ -48,7 +48,7 @@ class VertexSteps:
         self._band, self._hessian, self._gradient = band, hessian, gradient
 
     def solve(self, damping: float, held: BoolArray) -> FloatArray:
-        """Solve the damped system for the vertices that are not held; the step is zero at others."""
+        """Solve the damped system for the vertices that are not held; others do not move."""
         system = self._hessian + damping * self._band.damping
         self._step = np.zeros(len(self._gradient))
         self._step[~held] = factorised(system[~held][:, ~held])(-self._gradient[~held])
