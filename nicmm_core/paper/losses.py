@@ -192,7 +192,7 @@ def energy_of(problem: Problem, field: FloatArray) -> dict[str, float]:
 def balanced(weights: LossWeights, problem: Problem) -> LossWeights:
     """Lower λ_smooth if bending would outweigh the level-set term at φ₀.
 
-    A flat φ costs ½ in Eq. 3 and nothing in Eq. 6. If bending costs as much, as with many points or
+    A flat φ costs ½ in Eq. 3 and nothing in Eq. 5. If bending costs as much, as with many points or
     a large smoothness, the minimum is a flat φ, which has no curve.
     """
     bending = float(smoothness_loss(energy_surface(problem), problem.initial_distance))

@@ -58,8 +58,8 @@ def load_network(path: str | Path = SHIPPED, channels: int = BASE_CHANNELS) -> N
     try:
         arrays = _read_arrays(path)
         config = NetworkConfig(**json.loads(str(arrays.pop("config"))))
-        if config.depth > len(arrays):
-            raise ValueError(f"it has no {config.depth} blocks")
+        if not 1 <= config.depth <= len(arrays):
+            raise ValueError(f"its number of blocks is {config.depth}")
         extra = channels - arrays["stem.weight"].shape[1]
         arrays["stem.weight"] = np.pad(arrays["stem.weight"], ((0, 0), (0, extra)))
         shapes = parameter_shapes(config, channels)

@@ -1,4 +1,4 @@
-"""The zero set of φ on the input mesh: one simple polyline through the control points."""
+"""The zero set of φ as a polyline on the input mesh, and whether it is one simple curve."""
 
 from __future__ import annotations
 

@@ -35,13 +35,13 @@ STAGES = {
         [3, 50, 90, 140],
         {"closed": False, "method": "nicmm"},
         "leg_search leg_graph virtual_splits band_refinement sign_bundle sparse_solver smoothing "
-        "finetuning",
+        "level_set_solver fitting",
     ),
     "variational": (
         shapes.sphere(3),
         [3, 100, 400, 500],
         {"order": "shortest", "method": "variational"},
-        "leg_search topology distances variational sparse_solver",
+        "leg_search topology distances level_set_solver variational sparse_solver",
     ),
 }
 
@@ -87,7 +87,7 @@ def test_every_stage_asks_and_fractions_only_grow(at_every_checkpoint, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in STAGES if name != "paper"])
+@pytest.mark.parametrize("name", STAGES)
 def test_wherever_it_is_stopped_the_curve_is_good_and_the_designer_goes_on(
     at_every_checkpoint, name
 ):
