@@ -1,28 +1,44 @@
-"""Tests stage 2, fine-tuning: never worse than the start, and stopped by the right rule."""
+"""Tests stage 2 by AdamW: never worse than the start, and stopped by the right rule."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
+from benchmarks.adamw import (
+    AdamWConfig,
+    fit_by_adamw,
+    loss_terms,
+    narrow_band_energy,
+    smoothness_density,
+)
+from nicmm_core import shapes
+from nicmm_core.geometry.curve import is_one_curve
 from nicmm_core.geometry.surface_points import locate_control_points
-from nicmm_core.paper.finetuning import FinetuningConfig, finetune, narrow_band_energy
-from nicmm_core.paper.losses import LossWeights, loss_terms, total_loss
-from nicmm_core.paper.network import CurveNetwork, NetworkConfig
+from nicmm_core.paper.losses import LossWeights, total_loss
+from nicmm_core.paper.network import NetworkConfig, initial_network
 from nicmm_core.paper.problem import build_problem
 from nicmm_core.paper.tensors import surface_tensors
 from nicmm_core.paper.weights_file import load_network
+from nicmm_core.paper.zero_set import zero_set
 from nicmm_core.status import Status
 
 CPU = torch.device("cpu")
 WEIGHTS = LossWeights()
 NEVER = {"fluctuation": -1.0, "threshold": -1.0}
-"""Settings with which only the cap stops fine-tuning."""
+"""Settings with which only the cap stops the training."""
 
 
 @pytest.fixture(scope="module")
-def problem(small_ball):
-    points = locate_control_points(small_ball, [3, 60, 100, 140], closed=True)
-    return build_problem(small_ball, points, "shortest")
+def ball():
+    return shapes.sphere(2)
+
+
+@pytest.fixture(scope="module")
+def problem(ball):
+    points = locate_control_points(ball, [3, 60, 100, 140], closed=True)
+    return build_problem(ball, points, "shortest")
 
 
 @pytest.fixture(scope="module")
@@ -36,33 +52,40 @@ def loss_of(problem, field):
 
 
 def run(network, problem, watch=None, weights=WEIGHTS, **settings):
-    return finetune(network, problem, weights, FinetuningConfig(**settings), watch)
+    return fit_by_adamw(network, problem, weights, AdamWConfig(**settings), watch)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("iterations", [1, 2, 5, 20])
+@pytest.mark.parametrize("iterations", [1, 2, 20])
 def test_loss_never_exceeds_that_of_the_start(network, problem, iterations):
     start = run(network, problem, iterations=1)
     result = run(network, problem, iterations=iterations, **NEVER)
+    assert min(result.losses) <= start.losses[0] * (1 + 1e-6)
     assert loss_of(problem, result.field) <= loss_of(problem, start.field) * (1 + 1e-6)
 
 
 @pytest.mark.slow
 def test_iterations_lower_the_loss_of_an_untrained_network(problem):
-    torch.manual_seed(0)
-    untrained = CurveNetwork(NetworkConfig(width=16, depth=1))
+    untrained = initial_network(NetworkConfig(width=16, depth=1))
     result = run(untrained, problem, iterations=40, **NEVER)
     assert loss_of(problem, result.field) < 0.98 * loss_of(problem, problem.initial_distance)
 
 
-@pytest.mark.slow
-def test_terms_are_those_of_the_field_returned(network, problem):
+def test_zero_set_is_one_curve_through_the_points_and_terms_are_of_its_field(
+    ball, network, problem
+):
     result = run(network, problem, iterations=10)
-    surface = surface_tensors(problem, CPU)
-    expected = loss_terms(surface, torch.as_tensor(result.field, dtype=torch.float32))
-    assert set(result.terms) == {"sdf", "int", "smooth", "fea"}
-    for name, value in expected.items():
-        assert result.terms[name] == pytest.approx(value.item(), rel=1e-5, abs=1e-9)
+    assert (result.field[problem.loop.control_vertices] == 0.0).all()
+    assert is_one_curve(zero_set(ball, problem, result.field))
+    assert total_loss(result.terms, WEIGHTS) == pytest.approx(loss_of(problem, result.field))
+
+
+def test_topology_of_a_wrong_field_is_repaired_and_counted(ball, problem):
+    """Without φ₀ the output of an untrained network has nothing to do with the initial loop."""
+    blind = initial_network(NetworkConfig(width=16, depth=1, distance=False))
+    result = run(blind, problem, iterations=1)
+    assert result.held > 0
+    assert is_one_curve(zero_set(ball, problem, result.field))
 
 
 @pytest.mark.slow
@@ -85,15 +108,6 @@ def test_stops_at_once_when_the_energy_is_low_enough(network, problem):
     assert (result.status, result.iterations) == (Status.CONVERGED, 1)
 
 
-@pytest.mark.slow
-def test_looser_fluctuation_stops_no_later(network, problem):
-    counts = [
-        run(network, problem, fluctuation=fluctuation, threshold=-1.0).iterations
-        for fluctuation in (0.3, 0.03)
-    ]
-    assert counts[0] <= counts[1]
-
-
 def test_stops_at_the_cap(network, problem):
     result = run(network, problem, iterations=4, **NEVER)
     assert (result.status, result.iterations) == (Status.ITERATION_LIMIT, 4)
@@ -110,54 +124,38 @@ def test_watch_cancels_and_sees_the_best_field(network, problem):
     assert (result.status, result.iterations) == (Status.CANCELLED, 6)
     fractions, losses = zip(*seen, strict=True)
     assert all(a < b for a, b in zip(fractions, fractions[1:], strict=False))
-    assert 0.0 <= fractions[0] and fractions[-1] <= 1.0
     assert all(b <= a * (1 + 1e-6) for a, b in zip(losses, losses[1:], strict=False))
-    assert loss_of(problem, result.field) == pytest.approx(losses[-1])
+    assert min(result.losses) == pytest.approx(losses[-1])
 
 
 def test_an_energy_without_value_diverges_to_the_initial_field(network, problem):
     result = run(network, problem, weights=LossWeights(smooth=float("nan")))
     assert result.status == Status.DIVERGED
-    np.testing.assert_array_equal(result.field, problem.initial_distance)
-    assert set(result.terms) == {"sdf", "int", "smooth", "fea"}
+    np.testing.assert_allclose(result.field, problem.initial_distance, rtol=0, atol=1e-12)
 
 
 def test_network_given_is_not_changed(network, problem):
-    before = {name: value.clone() for name, value in network.state_dict().items()}
+    before = {name: value.copy() for name, value in network.parameters.items()}
     run(network, problem, iterations=5, **NEVER)
-    for name, value in network.state_dict().items():
-        assert torch.equal(value, before[name])
+    for name, value in network.parameters.items():
+        np.testing.assert_array_equal(value, before[name])
 
 
+@pytest.mark.slow
 def test_repetition_gives_identical_numbers(network, problem):
     first, second = (run(network, problem, iterations=15) for _ in range(2))
     np.testing.assert_array_equal(first.field, second.field)
     assert (first.iterations, first.terms) == (second.iterations, second.terms)
 
 
-def test_number_of_threads_does_not_matter_and_stays(network, problem):
-    before = torch.get_num_threads()
-    try:
-        fields = []
-        for threads in (1, 2):
-            torch.set_num_threads(threads)
-            fields.append(run(network, problem, iterations=15).field)
-            assert torch.get_num_threads() == threads
-    finally:
-        torch.set_num_threads(before)
-    np.testing.assert_allclose(fields[0], fields[1], rtol=0, atol=1e-4)
-
-
-def test_random_state_of_the_caller_does_not_matter_and_stays(network, problem):
-    fields = []
-    for seed in (1, 2):
-        torch.manual_seed(seed)
-        np.random.seed(seed)
-        state = torch.get_rng_state(), np.random.get_state()[1].copy()
-        fields.append(run(network, problem, iterations=5).field)
-        assert torch.equal(torch.get_rng_state(), state[0])
-        np.testing.assert_array_equal(np.random.get_state()[1], state[1])
-    np.testing.assert_array_equal(*fields)
+def test_smoothness_of_a_scaled_distance_grows_with_the_square_of_the_scale(problem):
+    """Eq. 6 is quadratic in φ where the Gaussian does not change; Eq. 5 is not."""
+    surface = surface_tensors(problem, CPU)
+    phi = torch.as_tensor(problem.initial_distance, dtype=torch.float32)
+    wide = replace(surface, delta_width=1e3)
+    once, twice = (smoothness_density(wide, factor * phi).sum().item() for factor in (1.0, 2.0))
+    assert once > 0.0
+    assert twice == pytest.approx(4.0 * once, rel=1e-4)
 
 
 def test_band_energy_of_a_distance_sees_the_band_only(problem):
