@@ -23,7 +23,7 @@ from nicmm_core import shapes
 from nicmm_core.geometry.array_types import FloatArray, IntArray
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.io.files import MESH_FORMATS, read_mesh, write_curve, write_mesh
-from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.network import parameter_shapes
 from nicmm_core.paper.weights_file import SHIPPED, load_network
 
 from .checker import judge
@@ -266,9 +266,10 @@ def _weights_file(generator: np.random.Generator, result: Answer) -> None:
         path.write_bytes(data)
         network = load_network(path)
     result.outcome = "read"
-    if not isinstance(network, CurveNetwork) or not all(
-        tensor.isfinite().all() for tensor in network.parameters()
-    ):
+    shapes = {name: array.shape for name, array in network.parameters.items()}
+    if shapes != parameter_shapes(network.config, network.channels):
+        result.faults.append("weights of another network")
+    if not all(np.isfinite(array).all() for array in network.parameters.values()):
         result.faults.append("weights that are not finite")
 
 
