@@ -269,7 +269,7 @@ def _jumps(courses: Sequence[Results], after: int) -> str:
         )
     return (
         f"After iteration {after} the loss jumps above its initial value on {len(jumping)} of "
-        f"{len(courses)} sets ({report.listed(jumping)}), to up to {max(heights.values()):.0f} "
+        f"{len(courses)} sets ({report.listed(jumping)}), to up to {max(heights.values()):.1f} "
         "times that value. This agrees with the paper, which warns of “numerical instability” "
         "after too many iterations. The result is the field with the lowest loss."
     )
