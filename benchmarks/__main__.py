@@ -35,6 +35,7 @@ MEASUREMENTS = (
     "initial",
     "curvature",
     "variational_order",
+    "solvers",
     "runtime",
     "dragging",
     "stages",

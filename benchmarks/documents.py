@@ -297,14 +297,15 @@ def _ninth_channel(results: Results) -> str:
         ninth_channel.WITHOUT_MAPS: "`nicmm.npz`, trained without maps",
     }
     means = {
-        label: np.array(run["mean_losses"])[[0, 10, iterations]] for label, run in runs.items()
+        label: np.array(run["mean_losses"])[[0, ninth_channel.ALSO_AFTER, iterations]]
+        for label, run in runs.items()
     }
     rows = [(names[label], *(f"{mean:.3f}" for mean in means[label])) for label in runs]
     seen, neutral = means[ninth_channel.SEEN], means[ninth_channel.NEUTRAL]
     other = means[ninth_channel.WITHOUT_MAPS]
     text = (
         "Compared with a network trained without maps, the mean energy is "
-        f"{seen[0] / other[0]:.2f} times as high after the forward pass, and "
+        f"{seen[0] / other[0]:.2f} times as high at the start of the fit, and "
         f"{seen[2] / other[2]:.2f} times after {iterations} iterations. The channel itself "
         "contributes little: with the neutral value everywhere the energies are "
         f"{neutral[0] / seen[0]:.2f} and {neutral[2] / seen[2]:.2f} times as high. A network that "
@@ -312,7 +313,12 @@ def _ninth_channel(results: Results) -> str:
         "local information of φ_fea is already in φ₀, whose path runs around obstacles and along "
         "lanes."
     )
-    header = ("network", "forward pass", "after 10 iterations", f"after {iterations}")
+    header = (
+        "network",
+        "start of the fit",
+        f"after {ninth_channel.ALSO_AFTER} iterations",
+        f"after {iterations}",
+    )
     return f"{report.table(header, rows)}\n\n{_paragraph(text)}"
 
 
@@ -328,7 +334,7 @@ def _transfer(results: Results) -> str:
         (name, f"{runs[label]['mean_losses'][0]:.3f}", f"{np.mean(runs[label]['last_losses']):.3f}")
         for label, name in names.items()
     ]
-    header = ("network", "forward pass", f"after {iterations} iterations")
+    header = ("network", "start of the fit", f"after {iterations} iterations")
     return report.table(header, rows)
 
 

@@ -15,8 +15,8 @@ from nicmm_core.geometry.curve import SurfaceCurve, is_one_curve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.paper.features import BASE_CHANNELS
-from nicmm_core.paper.finetuning import FinetuningConfig, finetune
-from nicmm_core.paper.network import DISTANCE_CHANNEL, CurveNetwork
+from nicmm_core.paper.fitting import fit
+from nicmm_core.paper.network import DISTANCE_CHANNEL, Network
 from nicmm_core.paper.problem import Problem, build_problem
 from nicmm_core.paper.signed_distance import heat_distance
 from nicmm_core.paper.weights_file import load_network
@@ -29,11 +29,11 @@ from .solving import (
     PARTS_WITHOUT,
     Sample,
     designed_curve,
-    level_set,
     random_field,
     random_samples,
     relative_distances,
     significant,
+    unrepaired_curves,
 )
 
 TITLE = "Sensitivity to the initial loop (Fig. 6)"
@@ -65,14 +65,14 @@ PICTURED = 2
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of fine-tuning from one initial loop.
+    """Result of the fit from one initial loop.
 
     Attributes
     ----------
     start, curve : SurfaceCurve
         Initial loop, and the resulting curve.
     by_itself : bool
-        Whether the level set was one loop without a repair of its topology.
+        Whether every step kept one loop without holding a vertex.
     iterations : int
         Iterations up to the early stop.
     loss : float
@@ -140,8 +140,8 @@ def section(results: Results) -> str:
         "from the loop to the shortest loop, and from the curve to the curve of the shortest loop, "
         "in percent of the bounding box diagonal. Distances, iterations and losses are medians "
         f"over {len(compared)} meshes, with one set of 3–5 random vertices per mesh (seed "
-        f"{results['seed']}). Fine-tuning starts from the shipped weights and ends at the early "
-        "stop; λ is the same for all loops of a set. Meshes "
+        f"{results['seed']}). The fit starts from the shipped weights and ends at the early stop; "
+        "λ is the same for all loops of a set. Meshes "
         f"({results['collection']}): {report.listed(one['mesh'] for one in compared)}.\n\n"
         f"{_loop_table(compared, loops)}\n\n{_loop_findings(compared, loops)}\n\n"
         f"{plot}\n\n{stills}\n\n"
@@ -149,9 +149,9 @@ def section(results: Results) -> str:
         "control points alone. The paper does not say how this distance gets a sign, so the table "
         "shows two replacements for φ₀: the distance, positive everywhere, and a random smooth "
         f"field that is zero at the points (seed {results['random_seed']}). The replacement is "
-        "both an input of the network and the field that its output is added to. The level set is "
-        "evaluated as it is, because there is no loop whose topology it could be given. Distances "
-        "are to the curve of the shortest loop, in percent of the diagonal.\n\n"
+        "both an input of the network and the field that its output is added to. The fit keeps the "
+        "topology of the level set of the replacement, which need not be a loop. "
+        "Distances are to the curve of the shortest loop, in percent of the diagonal.\n\n"
         f"{_none_table(compared)}\n\n{_none_findings(compared)}"
     )
 
@@ -174,7 +174,7 @@ def draw(results: Results, folder: Path) -> None:
     plots.save(figure, folder / "initial.png")
 
 
-def _with_loops(network: CurveNetwork, sample: Sample) -> dict[str, Outcome]:
+def _with_loops(network: Network, sample: Sample) -> dict[str, Outcome]:
     """Outcome of each initial loop; loops that cannot be made are reported and left out."""
     outcomes = {SHORTEST: _outcome(network, sample)}
     for label, obstacle in _obstacles(sample).items():
@@ -187,15 +187,14 @@ def _with_loops(network: CurveNetwork, sample: Sample) -> dict[str, Outcome]:
     return outcomes
 
 
-def _outcome(network: CurveNetwork, sample: Sample) -> Outcome:
-    finetuned = finetune(network, sample.problem, sample.weights, FinetuningConfig())
-    curve, by_itself = designed_curve(sample, finetuned.field)
+def _outcome(network: Network, sample: Sample) -> Outcome:
+    fitted = fit(network, sample.problem, sample.weights)
     return Outcome(
         initial_path(sample.mesh, sample.problem),
-        curve,
-        by_itself,
-        finetuned.iterations,
-        min(finetuned.losses),
+        designed_curve(sample, fitted.field),
+        fitted.held == 0,
+        fitted.iterations,
+        min(fitted.losses),
     )
 
 
@@ -246,9 +245,7 @@ def _problem_round(sample: Sample, obstacle: FloatArray) -> Problem:
     return replace(problem, feature_map=None, features=problem.features[:, :BASE_CHANNELS])
 
 
-def _without_loops(
-    network: CurveNetwork, sample: Sample, reference: SurfaceCurve
-) -> dict[str, Results]:
+def _without_loops(network: Network, sample: Sample, reference: SurfaceCurve) -> dict[str, Results]:
     """Level sets for fields in place of φ₀ that do not come from a loop.
 
     A level set that is one closed curve through all control points is compared with the reference.
@@ -266,8 +263,7 @@ def _without_loops(
         features = problem.features.copy()
         features[:, DISTANCE_CHANNEL] = start
         blind = replace(problem, initial_distance=start, features=features)
-        found = finetune(network, blind, sample.weights, FinetuningConfig()).field
-        curves = level_set(sample, found)
+        curves = unrepaired_curves(sample, fit(network, blind, sample.weights).field)
         one = is_one_curve(curves)
         distance = relative_distances(sample, curves[0], reference) if one else None
         outcomes[label] = {
@@ -282,7 +278,7 @@ def _render(shown: Sequence[tuple[Sample, dict[str, Outcome]]], scale: Scale) ->
     """Render some meshes, with the same view for all curves on a mesh."""
     pictures: list[renders.Picture] = []
     views: list[FloatArray] = []
-    # Where the topology had to be repaired, the pictures show less of the method itself.
+    # Where vertices had to be held, the pictures show less of the method itself.
     telling = sorted(shown, key=lambda one: -sum(o.by_itself for o in one[1].values()))
     for sample, outcomes in telling[:PICTURED]:
         row = [_picture(sample, label, outcome) for label, outcome in outcomes.items()]
@@ -304,7 +300,7 @@ def _pairs(compared: Sequence[Results], label: str) -> list[list[list[float]]]:
 
 
 def _both_by_themselves(compared: Sequence[Results], label: str) -> list[bool]:
-    """For each of `_pairs`, whether both level sets were one loop without a repair."""
+    """For each of `_pairs`, whether no vertex had to be held for either curve."""
     return [
         one["with_loop"][label]["by_itself"] and one["with_loop"][SHORTEST]["by_itself"]
         for one in compared
@@ -333,7 +329,7 @@ def _loop_table(compared: Sequence[Results], labels: Sequence[str]) -> str:
         )
     header = (
         "initial loop", "meshes", "loop: mean distance, %", "loop: greatest distance, %",
-        "curve: mean distance, %", "curve: greatest distance, %", "level set one loop by itself",
+        "curve: mean distance, %", "curve: greatest distance, %", "no vertex held",
         "iterations", "loss",
     )  # fmt: skip
     return report.table(header, rows)
@@ -368,8 +364,8 @@ def _loop_findings(compared: Sequence[Results], labels: Sequence[str]) -> str:
             "their initial loops. "
         )
     text += (
-        f"On {int(whole.sum())} of the {len(whole)} pairs both level sets were one loop by "
-        "themselves, so the repair of the topology did not hold them near φ₀"
+        f"On {int(whole.sum())} of the {len(whole)} pairs no vertex had to be held to keep "
+        "the topology"
     )
     return text + (
         f"; there {100 * np.median((curves / loops)[whole]):.0f} % remains." if whole.any() else "."
@@ -398,18 +394,16 @@ def _none_table(compared: Sequence[Results]) -> str:
 
 
 def _none_findings(compared: Sequence[Results]) -> str:
-    """What the table shows, in words, and whether it agrees with the paper."""
+    """What the table shows, in words."""
     share = {
         label: float(np.mean([one["without_loop"][label]["one_loop"] for one in compared]))
         for label in (UNSIGNED, RANDOM)
     }
-    text = (
-        "With the distance to the points in place of φ₀, "
-        f"{100 * share[UNSIGNED]:.0f} % of the sets give one loop through all points, which "
-    )
-    text += "contradicts" if share[UNSIGNED] < 0.5 else "agrees with"
-    return text + (
-        " Fig. 6, where that distance alone gives a curve. With a random smooth field, "
-        f"{100 * share[RANDOM]:.0f} % do. The shipped weights were pretrained only with φ₀ from "
-        "loops."
+    return (
+        f"With the distance to the points in place of φ₀, {100 * share[UNSIGNED]:.0f} % of the "
+        "sets give one loop through all points; with a random smooth field, "
+        f"{100 * share[RANDOM]:.0f} % do. In Fig. 6 that distance alone gives a curve. The fit "
+        "here cannot repeat this: it neither joins the curves of a level set nor splits them, so "
+        "it gives one loop only where the replacement has one. The steps of the paper may change "
+        "the topology. The shipped weights were pretrained only with φ₀ from loops."
     )

@@ -1,7 +1,7 @@
 """Measures how often `nicmm` gives one closed loop through all points (section 5, Fig. 16).
 
-An outcome "by itself" means that the level set of the network, as in the paper, is already one
-loop. In all other cases some vertices had to keep the sign that they have in φ₀.
+An outcome "by itself" means that every step of the fit kept one loop. In all other cases some
+vertices had to be held, which the paper does not do.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ METHOD = "nicmm"
 
 REFUSED, SEVERAL, NOT_FINITE = "refused", "several", "not finite"
 BY_ITSELF, KEPT = "by itself", "kept"
-"""Outcomes; `KEPT` is one loop for which some vertices had to keep their sign from φ₀."""
+"""Outcomes; `KEPT` is one loop for which some vertices had to be held."""
 
 
 def measure(scale: Scale) -> Results:
@@ -56,10 +56,11 @@ def section(results: Results) -> str:
         f"The table counts how often `{results['method']}` gives exactly one closed loop through "
         f"all control points, for {results['sets_a_mesh']} sets of 3–5 random vertices per mesh "
         f"(shortest order, seed {results['seed']}). Each row is a collection of meshes. *By "
-        "itself* counts the loops for which the level set of the network, as in the paper, was "
-        "already one loop through all points; for the other loops some vertices had to keep the "
-        "sign that they have in φ₀. The remaining outcomes are failures: *refused* (no simple path "
-        "through the points was found), *several* curves, and values that are *not finite*.\n\n"
+        "itself* counts the loops for which every step kept one loop through all points; for the "
+        "other loops some vertices had to be held, because another sign of φ there would have "
+        "split the loop or detached it from a point. The remaining outcomes are failures: "
+        "*refused* (no simple path through the points was found), *several* curves, and values "
+        "that are *not finite*.\n\n"
         f"{report.table(header, rows)}\n\n{_finding(results['sets'])}"
     )
 
@@ -117,12 +118,11 @@ def _finding(sets: Sequence[Results]) -> str:
     alone = counts[BY_ITSELF]
     text = (
         "The paper names the lack of control over the topology as a limitation (section 5, "
-        f"Fig. 16). Without a repair of the topology, {alone} of {len(sets)} level sets are one "
-        "loop through all points, "
+        f"Fig. 16). On {alone} of {len(sets)} sets every step kept one loop by itself, "
     )
     text += (
         "which agrees with that limitation; "
         if alone < len(sets)
         else "so the limitation does not show on these sets; "
     )
-    return text + f"with the repair, {alone + counts[KEPT]} of {len(sets)} are."
+    return text + f"with vertices held, {alone + counts[KEPT]} of {len(sets)} curves are one loop."

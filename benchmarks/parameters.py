@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from nicmm_core.geometry.array_types import FloatArray
 from nicmm_core.geometry.curve import SurfaceCurve
-from nicmm_core.paper.finetuning import BAND_WIDTH, finetune
+from nicmm_core.paper.fitting import fit
 from nicmm_core.paper.losses import LossWeights
-from nicmm_core.paper.network import CurveNetwork
+from nicmm_core.paper.network import Network
+from nicmm_core.paper.solution import Solution
 from nicmm_core.paper.weights_file import load_network
 
 from . import collections, plots, renders, report
@@ -38,8 +38,8 @@ FACTORS = (0.01, 0.1, 1.0, 10.0, 100.0)
 
 NAMES = {"sdf": "λ_sdf", "smooth": "λ_smooth"}
 
-MEASURED = ("mean", "greatest", "bending", "slope")
-"""Values per curve: distances to the default one, bending, and the median of |∇φ| near it."""
+MEASURED = ("mean", "greatest", "bending")
+"""Values per curve: distances to the default one, and bending."""
 
 SIMILAR = 1.0
 """Mean distance, in percent of the diagonal, up to which curves count as quite similar."""
@@ -59,22 +59,22 @@ Key = tuple[str, float]
 def measure(scale: Scale) -> Results:
     """Vary one weight at a time over several decades."""
     network = load_network()
-    iterations = scale.choose(200, 40, 20)
+    iterations = scale.choose(50, 20, 5)
     meshes = collections.surfaces(scale, scale.choose(6, 1))
     varied: list[Results] = []
     pictures: list[renders.Picture] = []
     for sample in random_samples(meshes, 1, SEED):
-        fields = _fields(network, sample, iterations)
-        curves = {key: designed_curve(sample, field) for key, field in fields.items()}
+        solutions = _solutions(network, sample, iterations)
+        curves = {key: designed_curve(sample, each.field) for key, each in solutions.items()}
         varied.append(
             {
                 "mesh": sample.name,
                 "smooth": significant(sample.weights.smooth),
-                "outcomes": _outcomes(sample, fields, curves),
+                "outcomes": _outcomes(sample, solutions, curves),
             }
         )
         if not pictures:
-            pictures = _pictures(sample, {key: curve for key, (curve, _) in curves.items()})
+            pictures = _pictures(sample, curves)
         print(f"  {sample.name}", flush=True)
     if not varied:
         raise SystemExit("No set had a simple loop through its points; there is nothing to vary")
@@ -112,8 +112,8 @@ def section(results: Results) -> str:
         "would otherwise dominate the energy "
         f"({min(lowered):.2g} to {max(lowered):.2g} on these meshes). So a design never uses the "
         f"larger values of λ_smooth in the table. All runs have {results['iterations']} iterations "
-        "from the shipped weights, without early stop, because its thresholds depend on the "
-        f"weights. Meshes ({results['collection']}): "
+        "from the shipped weights, without early stop, so that they can be compared. "
+        f"Meshes ({results['collection']}): "
         f"{report.listed(of_mesh['mesh'] for of_mesh in varied)}.\n\n"
         f"{_table(results)}\n\n{_findings(results)}\n\n{plot}\n\n{stills}"
     )
@@ -126,11 +126,10 @@ def draw(results: Results, folder: Path) -> None:
         {
             "Distance to the curve with factor 1": "mean distance (% of the diagonal)",
             "Bending of the curve": "L ∮ κ_g² ds",
-            "Slope of φ": "|∇φ| near the curve",
         },
     )
     factors = results["factors"]
-    for place, name in zip(axes, ("mean", "bending", "slope"), strict=True):
+    for place, name in zip(axes, ("mean", "bending"), strict=True):
         for weight, label in NAMES.items():
             values = [_median(results, weight, factor, name) for factor in factors]
             place.plot(factors, values, "o-", label=label)
@@ -142,38 +141,36 @@ def draw(results: Results, folder: Path) -> None:
     plots.save(figure, folder / "parameters.png")
 
 
-def _fields(network: CurveNetwork, sample: Sample, iterations: int) -> dict[Key, FloatArray]:
-    """φ for each weight and factor; the run with factor 1 is the same for both weights."""
-    fields: dict[Key, FloatArray] = {}
+def _solutions(network: Network, sample: Sample, iterations: int) -> dict[Key, Solution]:
+    """Level sets for each weight and factor; that with factor 1 is the same for both weights."""
+    solutions: dict[Key, Solution] = {}
     config = without_early_stop(iterations)
-    default = finetune(network, sample.problem, sample.weights, config).field
+    default = fit(network, sample.problem, sample.weights, config)
     for weight in NAMES:
         for factor in FACTORS:
             if factor == 1.0:
-                fields[weight, factor] = default
+                solutions[weight, factor] = default
                 continue
             changed = replace(sample.weights, **{weight: factor * getattr(sample.weights, weight)})
-            fields[weight, factor] = finetune(network, sample.problem, changed, config).field
-    return fields
+            solutions[weight, factor] = fit(network, sample.problem, changed, config)
+    return solutions
 
 
 def _outcomes(
-    sample: Sample, fields: dict[Key, FloatArray], curves: dict[Key, tuple[SurfaceCurve, bool]]
+    sample: Sample, solutions: dict[Key, Solution], curves: dict[Key, SurfaceCurve]
 ) -> list[Results]:
     """Summary of the curves, with their distances to the curve of the default weights."""
     outcomes = []
-    for (weight, factor), (curve, by_itself) in curves.items():
-        reference, _ = curves[weight, 1.0]
-        mean, greatest = relative_distances(sample, curve, reference)
+    for (weight, factor), curve in curves.items():
+        mean, greatest = relative_distances(sample, curve, curves[weight, 1.0])
         outcomes.append(
             {
                 "weight": weight,
                 "factor": factor,
-                "by_itself": bool(by_itself),
+                "by_itself": solutions[weight, factor].held == 0,
                 "mean": significant(mean),
                 "greatest": significant(greatest),
                 "bending": significant(bending(sample.mesh, curve)),
-                "slope": significant(_slope(sample, fields[weight, factor])),
             }
         )
     return outcomes
@@ -188,25 +185,6 @@ def _pictures(sample: Sample, curves: dict[Key, SurfaceCurve]) -> list[renders.P
         )
         for weight, name in NAMES.items()
     ]
-
-
-def _slope(sample: Sample, field: FloatArray) -> float:
-    """Median of |∇φ| over the faces near the zero set.
-
-    The band is measured in steps along the surface, because |φ| is no measure of distance where φ
-    is flat.
-    """
-    elements = sample.problem.elements
-    slope = np.linalg.norm((elements.gradient @ field).reshape(3, -1), axis=0)
-    working = sample.problem.working
-    on_faces = field[working.faces]
-    crossed = (on_faces.min(axis=1) < 0.0) & (on_faces.max(axis=1) >= 0.0)
-    near = np.zeros(len(working.vertices), dtype=bool)
-    near[working.faces[crossed]] = True
-    for _ in range(int(0.5 * BAND_WIDTH)):
-        near[working.faces[near[working.faces].any(axis=1)]] = True
-    band = near[working.faces].all(axis=1)
-    return float(np.median(slope[band])) if band.any() else float("nan")
 
 
 def _found(results: Results, weight: str, factor: float) -> list[Results]:
@@ -237,13 +215,12 @@ def _table(results: Results) -> str:
                     "–" if factor == 1.0 else f"{medians['mean']:.2f}",
                     "–" if factor == 1.0 else f"{medians['greatest']:.2f}",
                     f"{medians['bending']:.0f}",
-                    f"{medians['slope']:.2f}",
                     f"{sum(outcome['by_itself'] for outcome in found)} of {len(found)}",
                 )
             )
     header = (
         "weight", "mean distance, %", "greatest distance, %", "L ∮ κ_g² ds",
-        "\\|∇φ\\| near the curve", "level set one loop by itself",
+        "sets without held vertices",
     )  # fmt: skip
     return report.table(header, rows)
 
@@ -271,22 +248,18 @@ def _findings(results: Results) -> str:
     ]
     text += (
         "\n\nOnly the ratio of the two weights matters, because φ is exactly zero at the points "
-        "and AdamW is invariant under a common factor: a factor of λ_sdf and its inverse as factor "
-        f"of λ_smooth give mean distances that differ by at most {max(pairs):.2f} %."
+        "and the steps are invariant under a common factor: a factor of λ_sdf and its inverse as "
+        f"factor of λ_smooth give mean distances that differ by at most {max(pairs):.2f} %."
     )
     low, high = (_median(results, "smooth", f, "bending") for f in (factors[0], factors[-1]))
-    slope = _median(results, "smooth", factors[-1], "slope")
     change = "decreases" if high < low else "does not decrease"
     text += (
         f" From {factors[0]:g} to {factors[-1]:g} times λ_smooth the bending of the curve {change} "
-        f"({low:.0f} to {high:.0f}), and |∇φ| near the curve ends at {slope:.2f} instead of 1"
+        f"({low:.0f} to {high:.0f}). φ cannot flatten instead of giving a fairer curve, since it "
+        "becomes a signed distance after every step"
     )
-    if slope < 0.5:
-        text += (
-            ": φ flattens instead of giving a fairer curve, since a smaller slope lowers (Δφ)² too"
-        )
     kept = [not outcome["by_itself"] for each in results["varied"] for outcome in each["outcomes"]]
     return text + (
-        f". In {100 * np.mean(kept):.0f} % of all runs the level set was not one loop by itself; "
-        "where it would split, the curve follows φ₀, whatever the weights are."
+        f". In {100 * np.mean(kept):.0f} % of all runs some vertices had to be held, because "
+        "the level set would have split there, whatever the weights are."
     )

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import torch
 
 import nicmm_core as nicmm
 from nicmm_core.geometry.array_types import FloatArray, IntArray
@@ -21,9 +20,10 @@ from nicmm_core.geometry.curve import SurfaceCurve
 from nicmm_core.geometry.mesh import Mesh
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.paper.contour import extract_curves
-from nicmm_core.paper.finetuning import FinetuningConfig, finetune
+from nicmm_core.paper.fitting import CONVERGENCE, fit
+from nicmm_core.paper.level_set_solver import SolverConfig
 from nicmm_core.paper.losses import LossWeights, balanced
-from nicmm_core.paper.network import CurveNetwork, NetworkConfig
+from nicmm_core.paper.network import Network, NetworkConfig
 from nicmm_core.paper.pretraining import PretrainingConfig, pretrain
 from nicmm_core.paper.problem import Problem, build_problem
 from nicmm_core.paper.weights_file import load_network
@@ -92,19 +92,13 @@ def random_samples(
         yield Sample(name, mesh, points, problem, balanced(LossWeights(), problem))
 
 
-def untrained(config: NetworkConfig | None = None, seed: int = 0) -> CurveNetwork:
-    """Network with the weights that pretraining starts from."""
-    torch.manual_seed(seed)
-    return CurveNetwork(config or NetworkConfig())
-
-
 @dataclass(frozen=True)
 class Trained:
     """A network after pretraining.
 
     Attributes
     ----------
-    network : CurveNetwork
+    network : Network
         Pretrained network.
     losses : list of float
         Mean loss of every epoch.
@@ -114,7 +108,7 @@ class Trained:
         Time for the optimiser steps.
     """
 
-    network: CurveNetwork
+    network: Network
     losses: list[float]
     preparing_seconds: float
     training_seconds: float
@@ -151,32 +145,32 @@ def train(
     return Trained(network, losses, prepared - started, finished - prepared)
 
 
-def without_early_stop(iterations: int) -> FinetuningConfig:
-    """Settings that stop after exactly the given number of optimiser steps."""
+def without_early_stop(steps: int) -> SolverConfig:
+    """Settings that stop after the given number of steps, or where no step lowers the energy."""
     # The loss is evaluated before each step, so the loss after the last step needs one more.
-    return FinetuningConfig(iterations=iterations + 1, fluctuation=-np.inf, threshold=-np.inf)
+    return replace(CONVERGENCE, iterations=steps + 1, patience=steps + 1)
 
 
 def run_networks(
-    networks: Mapping[str, CurveNetwork], samples: Iterable[Sample], iterations: int
+    networks: Mapping[str, Network], samples: Iterable[Sample], iterations: int
 ) -> Results:
-    """Fine-tune every network on every sample.
+    """Fit every network to every sample.
 
     The networks take turns on each sample, so that other load on the machine slows all alike.
 
     Parameters
     ----------
-    networks : mapping of str to CurveNetwork
+    networks : mapping of str to Network
         Networks to compare, by label.
     samples : iterable of Sample
         Problems to solve.
     iterations : int
-        Optimiser steps per sample.
+        Number of Gauss–Newton steps per sample.
 
     Returns
     -------
     Results
-        By network. For each sample: its mesh, the duration of the fine-tuning in seconds, the loss
+        By network. For each sample: its mesh, the duration of the fit in seconds, the loss
         before the first step and the lowest loss up to the last one. Over all samples: the mean
         of the lowest loss so far, by iteration.
     """
@@ -187,11 +181,10 @@ def run_networks(
         meshes.append(sample.name)
         for label, network in networks.items():
             started = time.perf_counter()
-            finetuned = finetune(
-                network, sample.problem, sample.weights, without_early_stop(iterations)
-            )
+            config = without_early_stop(iterations)
+            fitted = fit(network, sample.problem, sample.weights, config)
             seconds[label].append(time.perf_counter() - started)
-            losses[label].append(_least_so_far(finetuned.losses, iterations + 1))
+            losses[label].append(_least_so_far(fitted.losses, iterations + 1))
         last = ", ".join(
             f"{label} {of_network[-1][-1]:.3f}" for label, of_network in losses.items()
         )
@@ -220,13 +213,13 @@ def significant(value: float, digits: int = DIGITS) -> float | None:
 def _least_so_far(losses: list[float], length: int) -> FloatArray:
     """Running minimum of the losses, padded to a length.
 
-    After a divergence it is constant, as is the field that is returned.
+    After the solver has ended it is constant, as is the field that is returned.
     """
     least = np.fmin.accumulate(np.array(losses))
     return np.pad(least, (0, length - len(least)), mode="edge")
 
 
-def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
+def unrepaired_curves(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
     """Zero level set of φ, which is made zero at the control points; no topology is repaired."""
     problem = sample.problem
     return extract_curves(
@@ -238,10 +231,9 @@ def level_set(sample: Sample, field: FloatArray) -> list[SurfaceCurve]:
     )
 
 
-def designed_curve(sample: Sample, field: FloatArray) -> tuple[SurfaceCurve, bool]:
-    """Curve that a design extracts from φ, and whether its topology needed no repair."""
-    zeros = zero_set(sample.mesh, sample.problem, field)
-    return zeros.curves[0], not zeros.breaking_vertices
+def designed_curve(sample: Sample, field: FloatArray) -> SurfaceCurve:
+    """Curve that a design extracts from the φ of a solver."""
+    return zero_set(sample.mesh, sample.problem, field)[0]
 
 
 def random_field(problem: Problem, seed: int) -> FloatArray:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nicmm_core.geometry.array_types import FloatArray
-from nicmm_core.paper.variational import VariationalConfig, solve
+from nicmm_core.paper.variational import CONVERGENCE, solve
 
 from . import collections, plots, report
 from .evidence import Results
@@ -32,18 +32,17 @@ DIGITS = 10
 
 def measure(scale: Scale) -> Results:
     """Record the loss of every iteration."""
-    config = VariationalConfig()
     meshes = collections.surfaces(scale, scale.choose(40, 6))
     sets = []
     for sample in random_samples(meshes, 1, SEED):
-        losses = solve(sample.problem, sample.weights, config).losses
+        losses = solve(sample.problem, sample.weights).losses
         kept = [significant(loss, DIGITS) for loss in losses]
         sets.append({"mesh": sample.name, "losses": kept})
     return {
         "seed": SEED,
         "collection": collections.label(scale),
-        "tolerance": config.tolerance,
-        "patience": config.patience,
+        "tolerance": CONVERGENCE.tolerance,
+        "patience": CONVERGENCE.patience,
         "sets": sets,
     }
 

@@ -1,6 +1,5 @@
 """Tests that every measurement runs at the smallest scale and writes its data and section."""
 
-import dataclasses
 import importlib
 import inspect
 import pkgutil
@@ -14,27 +13,20 @@ from benchmarks import corpus, elastic_curve, evidence, report
 from benchmarks.__main__ import MEASUREMENTS, measure_one
 from benchmarks.scale import Scale
 from nicmm_core import improvement
-from nicmm_core.paper.finetuning import FinetuningConfig
 
 pytestmark = pytest.mark.slow
 
-FEW_ITERATIONS = 40
 FEW_STEPS = 4
 FEW_MESHES = 6
 
 
 @pytest.fixture(autouse=True)
 def short_computations(monkeypatch):
-    """Few attempts, meshes, and steps of fine-tuning and of reference curves; they take longest."""
+    """Few attempts, meshes, and steps of reference curves; they take longest."""
     monkeypatch.setattr(improvement, "MOST_WORK", 0)
     monkeypatch.setattr(elastic_curve, "MOST_STEPS", FEW_STEPS)
     few = list(islice(corpus.defective_meshes(), FEW_MESHES))
     monkeypatch.setattr(corpus, "defective_meshes", lambda: iter(few))
-    defaults = tuple(
-        FEW_ITERATIONS if field.name == "iterations" else field.default
-        for field in dataclasses.fields(FinetuningConfig)
-    )
-    monkeypatch.setattr(FinetuningConfig.__init__, "__defaults__", defaults)
 
 
 @pytest.fixture

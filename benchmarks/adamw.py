@@ -1,8 +1,11 @@
-"""Stage 2 (section 4.1): fine-tune the pretrained network on one problem, with early stopping."""
+"""Stage 2 by AdamW with early stopping, as section 4.1 of the paper describes it, for comparison.
+
+`nicmm_core.paper.fitting` takes Gauss–Newton steps on Eq. 5 instead. Here the smoothness term is
+Eq. 6, and φ does not become a signed distance between the steps.
+"""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,29 +13,34 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..geometry.array_types import FloatArray
-from ..status import Status
-from .losses import (
+from nicmm_core.geometry.array_types import FloatArray
+from nicmm_core.paper.losses import (
     EnergySurface,
     LossWeights,
-    loss_terms,
+    feature_loss,
+    interpolation_loss,
+    root_delta,
     sdf_density,
-    smoothness_density,
+    sdf_loss,
     total_loss,
 )
-from .network import CurveNetwork
-from .problem import Problem
-from .solution import Solution
-from .tensors import network_input, surface_tensors
-from .torch_threads import single_thread
+from nicmm_core.paper.network import Network, level_set, network_input
+from nicmm_core.paper.problem import Problem
+from nicmm_core.paper.solution import Solution
+from nicmm_core.paper.tensors import input_tensors, surface_tensors, trainable
+from nicmm_core.paper.topology import keep_topology
+from nicmm_core.paper.torch_threads import single_thread
+from nicmm_core.status import Status
 
 BAND_WIDTH = 3.0
 """Width of the narrow band around the curve, in mean edge lengths (section 4.1)."""
 
+CPU = torch.device("cpu")
+
 
 @dataclass(frozen=True)
-class FinetuningConfig:
-    """Settings of stage 2.
+class AdamWConfig:
+    """Settings of AdamW and of the early stop.
 
     Attributes
     ----------
@@ -63,56 +71,54 @@ class FinetuningConfig:
 
 
 @single_thread()
-def finetune(
-    network: CurveNetwork,
+def fit_by_adamw(
+    network: Network,
     problem: Problem,
     weights: LossWeights,
-    config: FinetuningConfig,
+    config: AdamWConfig | None = None,
     watch: Callable[[float, FloatArray], bool] | None = None,
 ) -> Solution:
-    """Optimise a copy of the network for one problem.
+    """Train a copy of a network further for one problem.
 
     Parameters
     ----------
-    network : CurveNetwork
+    network : Network
         The pretrained network, which is not changed.
     problem : Problem
     weights : LossWeights
-    config : FinetuningConfig
+    config : AdamWConfig, optional
     watch : callable, optional
         Function called in every iteration with the progress, as a fraction of the maximum number of
-        iterations, and the best φ so far. Fine-tuning stops when the function returns False.
+        iterations, and the best φ of the network so far. Training stops when it returns False.
 
     Returns
     -------
     Solution
-        The φ of least loss, or φ₀ if the first loss is not finite.
+        The φ of least loss, or φ₀ if the first loss is not finite. It is made zero at the control
+        points, and where its zero set would not be one simple curve, φ₀ replaces it; `held` is the
+        number of vertices with a sign that would break the topology.
     """
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    surface = surface_tensors(problem, device)
-    inputs = network_input(problem, device)
-    network = copy.deepcopy(network).to(device)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=config.learning_rate)
+    config = config or AdamWConfig()
+    surface = surface_tensors(problem, CPU)
+    inputs = input_tensors(network_input(problem, network.config), CPU)
+    trained = trainable(network, CPU)
+    optimiser = torch.optim.AdamW(trained.parameters.values(), lr=config.learning_rate)
 
     best_loss, best_field = np.inf, problem.initial_distance
-    best_terms = dict.fromkeys(("sdf", "int", "smooth", "fea"), np.inf)
     energies: list[float] = []
     losses: list[float] = []
     status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
         optimiser.zero_grad()
-        phi = network(inputs)  # (n,)
-        terms = loss_terms(surface, phi)
-        loss = total_loss(terms, weights)
-        value = loss.item()
-        losses.append(value)
-        if not np.isfinite(value):
+        phi = level_set(trained, inputs, torch)  # (n,)
+        loss = total_loss(loss_terms(surface, phi), weights)
+        losses.append(loss.item())
+        if not np.isfinite(losses[-1]):
             status = Status.DIVERGED
             break
-        if value < best_loss:
-            best_loss = value
-            best_terms = {name: float(term.item()) for name, term in terms.items()}
-            best_field = phi.detach().cpu().numpy().astype(np.float64)
+        if losses[-1] < best_loss:
+            best_loss = losses[-1]
+            best_field = phi.detach().numpy().astype(np.float64)
         energies.append(narrow_band_energy(surface, phi.detach(), weights, problem.edge_length))
         if watch is not None and not watch(iteration / config.iterations, best_field):
             status = Status.CANCELLED
@@ -122,7 +128,33 @@ def finetune(
             break
         loss.backward()
         optimiser.step()
-    return Solution(best_field, best_terms, losses, status)
+    field, n_breaking = keep_topology(
+        problem.working,
+        problem.loop,
+        problem.initial_distance,
+        problem.smoother.interpolating(best_field),
+        problem.bundle,
+    )
+    terms = loss_terms(surface, torch.as_tensor(field, dtype=torch.float32))
+    found = {name: term.item() for name, term in terms.items()}
+    return Solution(field, found, losses, status, n_breaking)
+
+
+def loss_terms(surface: EnergySurface, phi: Tensor) -> dict[str, Tensor]:
+    """The four terms of Eq. 2 by name, unweighted, with Eq. 6 as the smoothness term."""
+    return {
+        "sdf": sdf_loss(surface, phi),
+        "int": interpolation_loss(surface, phi),
+        "smooth": (smoothness_density(surface, phi) * surface.face_areas).sum(),
+        "fea": feature_loss(surface, phi),
+    }
+
+
+def smoothness_density(surface: EnergySurface, phi: Tensor) -> Tensor:
+    """Integrand of Eq. 6, ½ (Δφ)² G_σ(φ), in every face, shape (m,)."""
+    laplacian = surface.centroid(surface.divergence(surface.gradient(phi)))  # (m,)
+    delta = root_delta(surface.centroid(phi), surface.delta_width)
+    return 0.5 * (laplacian * delta) ** 2
 
 
 @torch.no_grad()
@@ -137,7 +169,7 @@ def narrow_band_energy(
     return ((density * area).sum() / area.sum().clamp_min(torch.finfo(area.dtype).tiny)).item()
 
 
-def _has_converged(energies: list[float], config: FinetuningConfig) -> bool:
+def _has_converged(energies: list[float], config: AdamWConfig) -> bool:
     """The paper's early stop: the energy is below the threshold or hardly fluctuates."""
     if energies[-1] < config.threshold:
         return True
