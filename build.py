@@ -53,7 +53,7 @@ KERNEL_PLATFORMS = ("linux-x64", "linux-arm64", "windows-x64", "macos-arm64", "m
 """Platforms for which the wheel of the compiled kernels is built, with a zip or without."""
 
 # NumPy is not bundled: all extensions share the NumPy that Blender includes.
-BUNDLED = ("libigl", "scipy")
+BUNDLED = ("libigl", "scipy", "threadpoolctl")
 
 EXTENSION_INIT = '''\
 # SPDX-License-Identifier: GPL-3.0-or-later

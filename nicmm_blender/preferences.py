@@ -74,11 +74,15 @@ class NICMM_AP_preferences(bpy.types.AddonPreferences):
             box.label(text=line)
 
 
+LIBRARIES = (("scipy", "SciPy"), ("igl", "libigl"), ("threadpoolctl", "threadpoolctl"))
+"""Modules from the wheels of the extension, and their names."""
+
+
 @functools.cache
 def library_report() -> tuple[str, ...]:
     """Lines that list the libraries found, without loading them."""
     lines = []
-    for module, name in (("scipy", "SciPy"), ("igl", "libigl")):
+    for module, name in LIBRARIES:
         version = _version(module, name)
         missing = f"{name} is missing. Install the zip for this platform and Blender version"
         lines.append(f"{name} {version}" if version else missing)

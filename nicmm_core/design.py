@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import check_iterations, checked_options
+from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
 from .geometry.array_types import FloatArray
@@ -138,7 +139,7 @@ class Designer:
         if progress is not None and not callable(progress):
             raise ArgumentError(f"progress is {progress!r}; pass a function or None")
         try:
-            with watched(progress), self._exclusive():
+            with watched(progress), single_blas_thread(), self._exclusive():
                 options = checked_options(self.mesh, given)
                 _check_start(start, method, max_iterations, options["alternatives"])
                 points = locate_control_points(self.mesh, control_points, closed, connected=False)

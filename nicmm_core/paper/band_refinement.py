@@ -19,14 +19,14 @@ from ..progress import checkpoint
 RESOLUTION = 64
 """Ratio of the loop's length to the longest edge near it."""
 
-BAND_SHARE = 0.05
+BAND_SHARE = 0.2
 """Half width of the refined band, relative to the length of the loop.
 
 The curve moves within this band. Outside it, an edge may be as long as twice the distance from its
 midpoint to the band.
 """
 
-MOST_SPLITS = 3_000
+MOST_SPLITS = 4_000
 """Maximum number of edges bisected; adjacent needles would need many times more.
 
 The longest edges are bisected first, so stopping at this number leaves an evenly coarser band.

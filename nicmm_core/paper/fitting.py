@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import linalg, sparse
 
+from ..blas_threads import single_blas_thread
 from ..geometry.array_types import BoolArray, FloatArray, IntArray
 from .level_set_solver import SolverConfig, minimise
 from .losses import LossWeights
@@ -48,12 +49,13 @@ def fit(
     watch: Callable[[float, FloatArray], bool] | None = None,
 ) -> Solution:
     """Fit a network to a problem, see `level_set_solver.minimise`; the network is not changed."""
-    inputs = network_input(problem, network.config)
-    wanted = level_set(network, inputs).astype(float)
-    start, _ = keep_topology(
-        problem.working, problem.loop, problem.initial_distance, wanted, problem.bundle
-    )
-    return minimise(problem, start, NetworkSteps(network, inputs), weights, config, watch)
+    with single_blas_thread():
+        inputs = network_input(problem, network.config)
+        wanted = level_set(network, inputs).astype(float)
+        start, _ = keep_topology(
+            problem.working, problem.loop, problem.initial_distance, wanted, problem.bundle
+        )
+        return minimise(problem, start, NetworkSteps(network, inputs), weights, config, watch)
 
 
 class NetworkSteps:

@@ -10,7 +10,7 @@ import pytest
 from nicmm_core.geometry.distances import build_distance_surface
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.paper import fitting
-from nicmm_core.paper.fitting import NetworkSteps, fit
+from nicmm_core.paper.fitting import CONVERGENCE, NetworkSteps, fit
 from nicmm_core.paper.level_set_solver import SolverConfig
 from nicmm_core.paper.losses import LossWeights, balanced, energy_of, total_loss
 from nicmm_core.paper.narrow_band import build_narrow_band, evaluate, gauss_newton_system
@@ -134,10 +134,10 @@ def test_stops_at_the_limit(network, problem):
 
 @pytest.mark.slow
 def test_stops_when_the_loss_falls_by_less_than_a_hundredth(network, problem):
-    losses = fit(network, problem, WEIGHTS).losses
-    assert 6 < len(losses) < 100
-    assert min(losses[:-6]) - min(losses) < 0.01 * min(losses)
-    assert min(losses[:-7]) - min(losses[:-1]) >= 0.01 * min(losses[:-1])
+    losses, patience = fit(network, problem, WEIGHTS).losses, CONVERGENCE.patience
+    assert patience < len(losses) < 100
+    assert min(losses[:-patience]) - min(losses) < 0.01 * min(losses)
+    assert min(losses[: -patience - 1]) - min(losses[:-1]) >= 0.01 * min(losses[:-1])
 
 
 def test_an_energy_that_is_nan_diverges(network, problem):

@@ -176,9 +176,7 @@ def test_unknowns_leave_out_the_control_points(problem):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="outside the refined band, faces are larger than the narrow band"
-)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_bending_is_counted_along_the_whole_curve(body, seed):
     """The curve that the solver finds lies in inner faces."""
