@@ -19,11 +19,12 @@ from ..progress import checkpoint
 RESOLUTION = 64
 """Ratio of the loop's length to the longest edge near it."""
 
-BAND_SHARE = 0.2
-"""Half width of the refined band, relative to the length of the loop.
+FINE_BAND, COARSE_BAND = 0.05, 0.2
+"""Half widths of the refined bands, relative to the length of the loop.
 
-The curve moves within this band. Outside it, an edge may be as long as twice the distance from its
-midpoint to the band.
+Edges in the outer band, within which the curve moves, may be twice as long as in the inner one:
+faces that are much larger than the solver's narrow band would not count as parts of it. Outside, an
+edge may be as long as twice the distance from its midpoint to the band.
 """
 
 MOST_SPLITS = 4_000
@@ -62,7 +63,7 @@ def refine_along(
         points = np.concatenate([points, points[:1]])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(lengths.sum())
-    longest, half_width = length / RESOLUTION, BAND_SHARE * length
+    longest = length / RESOLUTION
     tree = cKDTree(_samples(points, longest))
 
     def too_long(start: FloatArray, end: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -70,7 +71,8 @@ def refine_along(
         # Rounded, so that edges of equal length remain equal when the model is rotated.
         size = np.round(np.linalg.norm(start - end, axis=1) / longest, 6) * longest
         distance, _ = tree.query(0.5 * (start + end))
-        return size, (size > longest) & (distance < half_width + 0.5 * size)
+        band = np.where(size > 2.0 * longest, COARSE_BAND, FINE_BAND) * length
+        return size, (size > longest) & (distance < band + 0.5 * size)
 
     working, renumbered = split.assemble(component)
     checkpoint()

@@ -667,6 +667,36 @@ def large(blender: Blender) -> None:
     blender.wait("not helper.is_modal()", "the end of the preparation")
 
 
+def methods(blender: Blender) -> None:
+    """The network of the paper without PyTorch: the curve is shown as it develops; Esc stops."""
+    step("NICMM (Neural) without PyTorch")
+    blender.do("helper.suzanne(levels=3)")
+    blender.do("helper.look()")
+    blender.do("import sys; sys.modules['torch'] = None")  # every import of it fails
+    points = ", ".join(
+        " ".join(f"{value:.5f}" for value in place)
+        for place in blender.do(f"value = helper.in_front({PLACES})")
+    )
+    for stopped in (True, False):
+        blender.do(
+            "with helper.in_view():\n"
+            '    bpy.ops.nicmm.design_curve("INVOKE_DEFAULT", method="NICMM", '
+            f'order="SHORTEST", points={points!r})'
+        )
+        blender.wait("helper.is_in_time_slices()", "work in time slices")
+        if stopped:
+            time.sleep(3.0)
+            blender.shot("12-neural-developing")
+            check(blender.do("value = helper.is_modal()"), "the network is still fitted")
+            blender.key("Escape")
+        blender.wait("not helper.is_in_time_slices()", "the end")
+        if stopped:
+            check(not blender.do("value = len(bpy.data.curves)"), "Esc leaves no curve")
+    blender.wait("len(bpy.data.curves) == 1", "the curve of the network")
+    check(blender.do("value = len(helper.line())") > 20, "a curve with many points")
+    blender.shot("13-neural")
+
+
 def convert(blender: Blender) -> None:
     """Save, open again, edit again; every output."""
     step("Save, open again, and edit again")
@@ -736,6 +766,7 @@ PARTS = {
     "ridge": ridge,
     "bodies": other_bodies,
     "modes": other_modes,
+    "methods": methods,
     "convert": convert,
     "keys": keys,
     "large": large,
