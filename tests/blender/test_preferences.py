@@ -94,14 +94,15 @@ def test_number_of_meshes_in_memory(empty_scene, preferences):
 
 
 def test_libraries_are_reported(preferences, monkeypatch):
-    (scipy, igl, network) = preferences.library_report()
+    (scipy, igl, pools, network) = preferences.library_report()
     assert scipy == f"SciPy {importlib.metadata.version('scipy')}"
     assert igl == f"libigl {importlib.metadata.version('libigl')}"
+    assert pools == f"threadpoolctl {importlib.metadata.version('threadpoolctl')}"
     assert "internet" in network
     preferences.library_report.cache_clear()
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "igl" else found(name)
     )
-    (_, igl, _) = preferences.library_report()
+    (_, igl, _, _) = preferences.library_report()
     assert igl.startswith("libigl is missing. Install the zip")
