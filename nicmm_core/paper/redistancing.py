@@ -1,4 +1,4 @@
-"""Signed distance to the zero set of a field, near that zero set, for the variational method.
+"""Signed distance to the zero set of a field, near that zero set, for the level-set solver.
 
 The heat method gives distances to vertices. A solver that moves the curve repeatedly needs
 distances to the curve itself, but only near it. Vertices of faces that the curve crosses get their
