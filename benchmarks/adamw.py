@@ -110,7 +110,7 @@ def fit_by_adamw(
     status = Status.ITERATION_LIMIT
     for iteration in range(1, config.iterations + 1):
         optimiser.zero_grad()
-        phi = level_set(trained, inputs, torch)  # (n,)
+        phi = level_set(trained, inputs, xp=torch)  # (n,)
         loss = total_loss(loss_terms(surface, phi), weights)
         losses.append(loss.item())
         if not np.isfinite(losses[-1]):

@@ -35,7 +35,7 @@ class Design:
     breaking_vertices : int
         Number of vertices that the methods "nicmm" and "variational" had to hold, over all steps,
         because another sign of φ there would have split the curve or detached it from a control
-        point. 0 if every step gave one curve by itself, and with the method "elastic".
+        point. Always 0 with the method "elastic".
     find_field : callable
         Computes `field` on first access.
     resumable : Resumable or None

@@ -32,10 +32,10 @@ MARKS = 200
 """Number of vertices along whose derivatives the parameters are moved (Nyström's method)."""
 
 NEAR_SHARE = 0.6
-"""Fraction of these vertices that lies beside the curve."""
+"""Least fraction of these vertices that lies beside the curve."""
 
 ROUNDING = 1e-6
-"""Rounding error of the kernel in single precision, relative to its trace."""
+"""Added to the diagonal of the kernel at the marks, relative to its trace, against rounding."""
 
 STIFFNESS = 100.0
 """Weight that holds a vertex, relative to the median diagonal entry of the Hessian."""
@@ -48,14 +48,36 @@ def fit(
     config: SolverConfig = CONVERGENCE,
     watch: Callable[[float, FloatArray], bool] | None = None,
 ) -> Solution:
-    """Fit a network to a problem, see `level_set_solver.minimise`; the network is not changed."""
+    """Fit a network to a problem, see `level_set_solver.minimise`; the network is not changed.
+
+    Single precision suffices, unless the smooth fields of the control points are so broad that
+    almost all of the kernel cancels, as with a very large smoothness. Then all is repeated in
+    double precision.
+    """
     with single_blas_thread():
-        inputs = network_input(problem, network.config)
-        wanted = level_set(network, inputs).astype(float)
-        start, _ = keep_topology(
-            problem.working, problem.loop, problem.initial_distance, wanted, problem.bundle
-        )
-        return minimise(problem, start, NetworkSteps(network, inputs), weights, config, watch)
+        try:
+            return _fit(network, problem, weights, config, watch, np.float32)
+        except linalg.LinAlgError:
+            return _fit(network, problem, weights, config, watch, np.float64)
+
+
+def _fit(
+    network: Network,
+    problem: Problem,
+    weights: LossWeights,
+    config: SolverConfig,
+    watch: Callable[[float, FloatArray], bool] | None,
+    precision: type[np.floating],
+) -> Solution:
+    """Fit a network in a given precision."""
+    parameters = {name: array.astype(precision) for name, array in network.parameters.items()}
+    network = Network(network.config, parameters)
+    inputs = network_input(problem, network.config, precision)
+    steps = NetworkSteps(network, inputs)
+    start, _ = keep_topology(
+        problem.working, problem.loop, problem.initial_distance, steps.level_set(), problem.bundle
+    )
+    return minimise(problem, start, steps, weights, config, watch)
 
 
 class NetworkSteps:
@@ -65,6 +87,10 @@ class NetworkSteps:
         self._network, self._inputs = network, inputs
         self._attention = held_attention(network, inputs)
         self._generator = np.random.default_rng(0)
+
+    def level_set(self) -> FloatArray:
+        """φ of the network at all vertices, (n,)."""
+        return level_set(self._network, self._inputs, self._attention).astype(float)
 
     def linearise(
         self,

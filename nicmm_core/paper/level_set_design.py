@@ -11,10 +11,11 @@ from ..design_result import Design
 from ..geometry.array_types import FloatArray
 from ..geometry.curve import SurfaceCurve
 from ..geometry.mesh import Mesh
-from ..progress import CancelledError, checkpoint, subrange
+from ..progress import CancelledError, checkpoint, subrange, watched
 from ..request import Request
 from ..status import Status
 from . import fitting, variational
+from .level_set_solver import signed_distance_of
 from .losses import LossWeights, balanced, energy_of
 from .problem import Problem, requested_problem
 from .solution import Solution
@@ -49,7 +50,9 @@ def level_set_design(mesh: Mesh, request: Request, started: float) -> Design:
     except CancelledError:
         if watch.shown is None:
             raise
-        field, curves, iterations = watch.shown
+        shown, curves, iterations = watch.shown
+        with watched(None):  # the progress function has already cancelled
+            field = signed_distance_of(problem, shown)
         solution = Solution(field, energy_of(problem, field), [], Status.CANCELLED)
     one = is_simple_curve(mesh, curves, problem.loop.closed)
     return Design(

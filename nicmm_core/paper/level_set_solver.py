@@ -1,7 +1,7 @@
 """Minimises the energy by damped Gauss–Newton steps in a narrow band (Levenberg–Marquardt).
 
-Each step is looked for among the values of φ at the vertices (`vertex_steps`) or among the
-parameters of the network (`network_steps`). After a step φ is replaced by the signed distance to
+Each step is looked for among the values of φ at the vertices (`variational`) or among the
+parameters of the network (`fitting`). After a step φ is replaced by the signed distance to
 the new curve, because the ridges of the old distance would hold the curve back. If changing the
 sign of a vertex would split the curve or detach it from a control point, the step is solved again
 with this vertex held. So the zero set is always one simple curve.
@@ -34,7 +34,7 @@ from .vertex_links import VertexLinks
 
 @dataclass(frozen=True)
 class SolverConfig:
-    """Settings of the solver; lengths are in mean edge lengths at the curve.
+    """Settings of the solver; lengths are in mean edge lengths at the initial path.
 
     Attributes
     ----------
@@ -59,11 +59,10 @@ class SolverConfig:
         Maximum number of iterations.
     trials : int
         Maximum number of trial steps in one iteration.
-    shortest : float
-        Length of the shortest step that is tried, relative to the first one, before vertices are
-        held.
+    halvings : int
+        Number of times that a step is halved, if it breaks the topology, before vertices are held.
     holds : int
-        Maximum number of trial steps after which vertices are added to those that are held.
+        Maximum number of times that vertices are added to those that are held in one iteration.
     """
 
     half_width: float = 4.0
@@ -76,8 +75,8 @@ class SolverConfig:
     relative_tolerance: float = 0.0
     iterations: int = 100
     trials: int = 25
+    halvings: int = 2
     holds: int = 6
-    shortest: float = 0.25
 
 
 LEAST_GAIN = 1e-3
@@ -169,14 +168,22 @@ def minimise(
         if _has_converged(least, config):
             status = Status.CONVERGED
             break
+        if iteration == config.iterations:
+            break
         step = _step(problem, band, links, field, steps, weights, damping, config)
         if step is None:
             status = Status.CONVERGED
             break
         damping, n_held = step.damping, n_held + step.held
         field = redistanced(surface, step.field, controls, reach, problem.bundle)
-    field = redistanced(surface, best_field, controls, bundle=problem.bundle)
+    field = signed_distance_of(problem, best_field)
     return Solution(field, energy_of(problem, field), losses, status, n_held)
+
+
+def signed_distance_of(problem: Problem, field: FloatArray) -> FloatArray:
+    """Signed distance to the zero set of a field, at all vertices, (n,)."""
+    surface = build_distance_surface(problem.vertices, problem.working.faces, problem.edge_length)
+    return redistanced(surface, field, problem.loop.control_vertices, bundle=problem.bundle)
 
 
 def _has_converged(least: list[float], config: SolverConfig) -> bool:
@@ -197,7 +204,7 @@ class _Step(NamedTuple):
     damping : float
         Damping for the next step.
     held : int
-        Number of vertices that had to be held.
+        Number of vertices that had to keep their signs.
     """
 
     field: FloatArray
@@ -223,26 +230,26 @@ def _step(
     beside = np.abs(values) < config.beside * h
     steps.linearise(band, hessian, gradient, beside)
     held = np.zeros(len(values), dtype=bool)
-    holds, shorter = 0, 1.0
+    holds = 0
     for _ in range(config.trials):
         checkpoint()
         change = steps.solve(weights.sdf * damping, held)
         farthest = np.abs(change[beside]).max(initial=0.0)
-        scale = shorter * min(1.0, config.longest_move * h / max(farthest, tolerances.TINY))
-        change *= scale
+        scale = min(1.0, config.longest_move * h / max(farthest, tolerances.TINY))
+        for halvings in range(config.halvings + 1):
+            moved = field.copy()
+            moved[band.unknowns] += steps.take(0.5**halvings * scale)
+            breaking = breaking_vertices(links, field, moved, controls)
+            if not len(breaking):
+                break
+        if len(breaking) and holds < config.holds:
+            holds += 1
+            held |= np.isin(band.unknowns, breaking)
+            continue
+        change *= 0.5**halvings * scale
         predicted = -(gradient @ change + 0.5 * (change @ (hessian @ change)))
         if not predicted > 0.0:
             return None
-        moved = field.copy()
-        moved[band.unknowns] += steps.take(scale)
-        breaking = breaking_vertices(links, field, moved, controls)
-        if len(breaking) and shorter > config.shortest:
-            shorter *= 0.5
-            continue
-        if len(breaking) and holds < config.holds:
-            holds, shorter = holds + 1, 1.0
-            held |= np.isin(band.unknowns, breaking)
-            continue
         moved[breaking] = LEAST_DISTANCE * h * signs_with_zeros(field, controls)[breaking]
         energy = evaluate(band, weights, moved[band.unknowns]).energy
         gain = (residuals.energy - energy) / predicted
@@ -254,5 +261,5 @@ def _step(
             damping = max(damping / 4.0, config.least_damping)
         elif gain < POOR_GAIN:
             damping *= 2.0
-        return _Step(moved, damping, int(held.sum()))
+        return _Step(moved, damping, len(np.union1d(band.unknowns[held], breaking)))
     return None

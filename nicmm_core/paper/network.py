@@ -95,21 +95,24 @@ class NetworkInput(NamedTuple):
     control_vertices: Array
 
 
-def network_input(problem: Problem, config: NetworkConfig) -> NetworkInput:
-    """The input of a network for a problem, in single precision.
+def network_input(
+    problem: Problem, config: NetworkConfig, precision: type[np.floating] = np.float32
+) -> NetworkInput:
+    """The input of a network for a problem.
 
-    φ then differs by about 1e-7, in units of the problem, from φ in double precision.
+    In single precision φ differs by about 1e-7, in units of the problem, from φ in double
+    precision.
     """
-    features = problem.features.astype(np.float32)
+    features = problem.features.astype(precision)
     features[:, NORMAL_CHANNELS] *= config.normals
     features[:, INDICATOR_CHANNEL] *= config.control_indicator
     features[:, DISTANCE_CHANNEL] *= config.distance
     areas = problem.elements.vertex_areas
     return NetworkInput(
         features=features,
-        initial_distance=problem.initial_distance.astype(np.float32),
-        area_share=(areas / areas.sum()).astype(np.float32),
-        response=problem.smoother.response.astype(np.float32),
+        initial_distance=problem.initial_distance.astype(precision),
+        area_share=(areas / areas.sum()).astype(precision),
+        response=problem.smoother.response.astype(precision),
         control_vertices=problem.loop.control_vertices,
     )
 
@@ -217,21 +220,27 @@ def initial_network(
     return Network(config, parameters)
 
 
-def level_set(network: Network, inputs: NetworkInput, xp: ModuleType = np) -> Array:
+def level_set(
+    network: Network,
+    inputs: NetworkInput,
+    attention: Attention | None = None,
+    xp: ModuleType = np,
+) -> Array:
     """Level-set values φ, shape (n,): φ₀ plus a correction that is zero at the control points.
 
     Smooth fields cancel the correction at the control points. The paper relies on a large λ_int
-    instead, but then AdamW spends its steps on the interpolation term: in 200 steps, a curve that
-    reached a great circle with exact zeros hardly moved.
+    instead.
 
     Parameters
     ----------
     network : Network
     inputs : NetworkInput
+    attention : callable, optional
+        Weights of the channels, if they are not those of `surface_attention`.
     xp : module, optional
         ``numpy`` or ``torch``, whichever the arrays belong to.
     """
-    attention = surface_attention(network, inputs.area_share, xp)
+    attention = attention or surface_attention(network, inputs.area_share, xp)
     correction = corrections(network, inputs.features, attention, xp)  # (n,)
     correction = correction - inputs.response @ correction[inputs.control_vertices]
     return inputs.initial_distance + correction if network.config.distance else correction
@@ -273,6 +282,8 @@ def surface_attention(network: Network, area_share: Array, xp: ModuleType = np) 
 def held_attention(network: Network, inputs: NetworkInput) -> Attention:
     """The weights that `surface_attention` gives with the present parameters, kept for later."""
     weigh = surface_attention(network, inputs.area_share)
+    if not network.config.attention:
+        return weigh
     kept = [values.attention for values in blocks(network, inputs.features, weigh)]
     return lambda block, activated: kept[block]
 

@@ -174,6 +174,11 @@ def _check(meshes: Sequence[Mesh], output: str | Path, config: PretrainingConfig
     for name in ("sets", "batch", "epochs"):
         if getattr(config, name) < 1:
             raise ArgumentError(f"{name} is {getattr(config, name)}; at least 1 is needed")
+    if not 3 <= config.fewest_points <= config.most_points:
+        raise ArgumentError(
+            f"fewest_points and most_points are {config.fewest_points} and {config.most_points}; "
+            "a set needs at least 3 points, and at most as many as most_points"
+        )
     shares = (config.open_share, config.given_share)
     if min(shares) < 0.0 or sum(shares) > 1.0:
         raise ArgumentError(
@@ -203,7 +208,7 @@ def _train_epoch(
         optimiser.zero_grad()
         for index in chosen:
             each = prepared[index]
-            phi = level_set(network, randomly_reoriented(each.inputs, generator), torch)
+            phi = level_set(network, randomly_reoriented(each.inputs, generator), xp=torch)
             loss = total_loss(loss_terms(each.surface, phi), each.weights)
             (loss / len(chosen)).backward()
             total += loss.item()

@@ -23,7 +23,7 @@ class Solution:
     status : Status
         How the computation ended.
     held : int
-        Number of vertices that had to be held, over all iterations, to keep the topology.
+        Number of vertices, over all iterations, that had to keep their signs for the topology.
     """
 
     field: FloatArray

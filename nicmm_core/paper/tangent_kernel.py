@@ -4,7 +4,8 @@ To first order, a step Δθ of the parameters changes the output by J Δθ, with
 K = J Jᵀ then tells how a step along the derivatives at some vertices changes φ at others. In a
 linear layer, the derivative with respect to the weight (i, j) is δᵢ aⱼ, where a is the input of the
 layer and δ the derivative of the output of the network with respect to the output of the layer. So
-K is the sum over the layers of (δ δᵀ) ∘ (a aᵀ + 1), and J is never formed. The weights of the
+K is the sum over the layers of (δ δᵀ) ∘ (a aᵀ), with 1 added to a aᵀ if there is a bias, and J is
+never formed. The weights of the
 attention are held.
 """
 

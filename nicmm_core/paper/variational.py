@@ -20,7 +20,7 @@ from .problem import Problem
 from .solution import Solution
 from .sparse_solver import factorised
 
-CONVERGENCE = SolverConfig(patience=10, tolerance=1e-5)
+CONVERGENCE = SolverConfig()
 """The solver has converged if the loss falls by less than 1e-5 in ten iterations (section 4.5)."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import nicmm_core as nicmm
 from nicmm_core.geometry.distances import build_distance_surface
 from nicmm_core.geometry.surface_points import locate_control_points
 from nicmm_core.paper import fitting
@@ -138,6 +139,15 @@ def test_stops_when_the_loss_falls_by_less_than_a_hundredth(network, problem):
     assert patience < len(losses) < 100
     assert min(losses[:-patience]) - min(losses) < 0.01 * min(losses)
     assert min(losses[: -patience - 1]) - min(losses[:-1]) >= 0.01 * min(losses[:-1])
+
+
+def test_a_large_smoothness_is_fitted_in_double_precision(small_ball):
+    """The kernel at the marks cancels almost entirely, so that single precision is not enough."""
+    design = nicmm.design_curve(
+        small_ball, [3, 60, 100, 140], order="shortest", method="nicmm", smoothness=1000.0
+    )
+    assert len(design.curves) == 1
+    assert np.isfinite(design.curves[0].points).all()
 
 
 def test_an_energy_that_is_nan_diverges(network, problem):

@@ -96,7 +96,7 @@ def test_vertex_that_would_break_the_curve_is_held(problem):
     steps = BreakingSteps(problem)
     result = run(problem, steps, SolverConfig(iterations=3))
     kept = steps.calls.count("keep")
-    assert kept == 3
+    assert kept == 2  # the loss after the last iteration needs no further step
     assert steps.held[steps.place] and steps.held.sum() == 1
     assert result.losses[-1] < result.losses[0]
     assert problem.initial_distance[steps.vertex] > 0.0 and result.field[steps.vertex] > 0.0
@@ -115,9 +115,9 @@ def test_vertex_that_is_held_no_more_keeps_its_sign(problem, monkeypatch):
         level_set_solver, "redistanced", recorded(level_set_solver.redistanced, fields)
     )
     result = run(problem, steps, config)
-    assert steps.calls.count("keep") == 2 and not steps.held.any()
-    assert result.held == 0
-    assert len(fields) == 4
+    assert steps.calls.count("keep") == 1 and not steps.held.any()
+    assert result.held == 1
+    assert len(fields) == 3
     for field in fields:
         assert_isotopic_to_the_start(problem, field)
 
@@ -136,7 +136,7 @@ def test_no_vertex_is_held_where_none_would_break_the_curve(problem):
     steps = OtherSteps()
     result = run(problem, steps)
     assert result.held == 0
-    assert steps.calls.count("keep") == steps.calls.count("linearise") == FEW.iterations
+    assert steps.calls.count("keep") == steps.calls.count("linearise") == FEW.iterations - 1
 
 
 @pytest.mark.parametrize("change", [np.zeros_like, np.negative], ids=["no step", "uphill"])
@@ -144,7 +144,7 @@ def test_without_a_step_downhill_the_start_is_returned(problem, change):
     steps = OtherSteps(change)
     result = run(problem, steps)
     assert (result.status, result.iterations) == (Status.CONVERGED, 1)
-    assert not {"take", "keep"} & set(steps.calls)
+    assert "keep" not in steps.calls
     near = np.abs(problem.distance) < problem.edge_length
     np.testing.assert_array_equal(
         np.sign(result.field[near]), np.sign(problem.initial_distance[near])
@@ -174,7 +174,7 @@ def test_rejected_steps_are_not_kept_and_are_damped_more(problem):
 @pytest.mark.parametrize("limit", [0.5, 1.5])
 def test_long_steps_are_shortened_to_the_limit(problem, limit):
     """Beside the curve; short steps are taken as they are."""
-    config = SolverConfig(iterations=1, trials=1, longest_move=limit)
+    config = SolverConfig(iterations=2, trials=1, halvings=0, longest_move=limit)
     for factor, expected in ((100.0, limit * problem.edge_length), (1e-4, None)):
         steps = OtherSteps(lambda step, factor=factor: factor * step)
         run(problem, steps, config)

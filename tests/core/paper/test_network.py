@@ -114,7 +114,7 @@ def test_single_precision_is_enough(inputs):
 @pytest.mark.parametrize("config", [SMALL] + [replace(SMALL, **{s: False}) for s in SWITCHES])
 def test_numpy_and_torch_agree(inputs, config):
     network, inputs = in_double(random_network(config)), inputs_in_double(inputs)
-    tensors = level_set(trainable(network, CPU), input_tensors(inputs, CPU), torch)
+    tensors = level_set(trainable(network, CPU), input_tensors(inputs, CPU), xp=torch)
     assert tensors.dtype == torch.float64
     phi = level_set(network, inputs)
     np.testing.assert_allclose(tensors.detach(), phi, rtol=0, atol=1e-12)
@@ -134,7 +134,7 @@ def test_tensors_are_copies_that_come_back(inputs):
 
 def test_every_parameter_takes_part(inputs):
     network = trainable(random_network(), CPU)
-    (level_set(network, input_tensors(inputs, CPU), torch) ** 2).sum().backward()
+    (level_set(network, input_tensors(inputs, CPU), xp=torch) ** 2).sum().backward()
     idle = [
         name
         for name, parameter in network.parameters.items()
@@ -323,7 +323,7 @@ def test_ninth_channel_starts_without_effect(inputs, tmp_path):
     np.testing.assert_allclose(first, level_set(network, inputs), rtol=1e-4, atol=1e-5)
     # Its weights have a gradient, so training can give it an effect.
     tensors = trainable(loaded, CPU)
-    (level_set(tensors, input_tensors(with_ninth(inputs), CPU), torch) ** 2).sum().backward()
+    (level_set(tensors, input_tensors(with_ninth(inputs), CPU), xp=torch) ** 2).sum().backward()
     assert tensors.parameters["stem.weight"].grad[:, 8].abs().max() > 0.0
 
 
