@@ -75,7 +75,7 @@ def test_zip_holds_the_wheels_of_every_blender(archive):
     assert sorted(manifest["wheels"]) == sorted(f"./{wheel}" for wheel in wheels)
     assert manifest["platforms"] == [build.this_platform()]
     packages = {wheel.split("/")[1].split("-")[0] for wheel in wheels}
-    assert packages == {"libigl", "nicmm_kernels", "scipy"}
+    assert packages == {"libigl", "nicmm_kernels", "scipy", "threadpoolctl"}
     assert [wheel for wheel in wheels if "nicmm_kernels" in wheel and "-py3-none-" in wheel]
     assert not [name for name in names if name.endswith((".so", ".dll", ".dylib"))]
     for python in build.BLENDER_PYTHONS:
