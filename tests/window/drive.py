@@ -673,6 +673,7 @@ def methods(blender: Blender) -> None:
     blender.do("helper.suzanne(levels=3)")
     blender.do("helper.look()")
     blender.do("import sys; sys.modules['torch'] = None")  # every import of it fails
+    before = blender.do("value = len(bpy.data.curves)")
     points = ", ".join(
         " ".join(f"{value:.5f}" for value in place)
         for place in blender.do(f"value = helper.in_front({PLACES})")
@@ -691,8 +692,9 @@ def methods(blender: Blender) -> None:
             blender.key("Escape")
         blender.wait("not helper.is_in_time_slices()", "the end")
         if stopped:
-            check(not blender.do("value = len(bpy.data.curves)"), "Esc leaves no curve")
-    blender.wait("len(bpy.data.curves) == 1", "the curve of the network")
+            after = blender.do("value = len(bpy.data.curves)")
+            check(after == before, "Esc leaves no curve")
+    blender.wait(f"len(bpy.data.curves) == {before + 1}", "the curve of the network")
     check(blender.do("value = len(helper.line())") > 20, "a curve with many points")
     blender.shot("13-neural")
 
