@@ -1,10 +1,10 @@
 """Minimises the energy by damped Gauss–Newton steps in a narrow band (Levenberg–Marquardt).
 
 Each step is looked for among the values of φ at the vertices (`variational`) or among the
-parameters of the network (`fitting`). After a step φ is replaced by the signed distance to
-the new curve, because the ridges of the old distance would hold the curve back. If changing the
-sign of a vertex would split the curve or detach it from a control point, the step is solved again
-with this vertex held. So the zero set is always one simple curve.
+parameters of the network (`fitting`). After a step φ is replaced by the signed distance to the new
+curve, because the ridges of the old distance would hold the curve back. If changing the sign of a
+vertex would split the curve or detach it from a control point, the step is halved; if that does not
+help, it is solved again with this vertex held. So the zero set is always one simple curve.
 """
 
 from __future__ import annotations

@@ -107,10 +107,9 @@ def moved(
 ) -> Network:
     """The network after the step Δθ = Jᵀ α, with coefficients α (s,) at s of the r vertices."""
     parameters = dict(network.parameters)
+    alpha = coefficients.astype(tangent.correction.dtype)
     for name, inputs, derivatives in tangent.layers:
-        weighted = (
-            derivatives[columns] * coefficients.astype(derivatives.dtype)[:, None]
-        )  # (s, out)
+        weighted = derivatives[columns] * alpha[:, None]  # (s, out)
         parameters[f"{name}.weight"] = parameters[f"{name}.weight"] + weighted.T @ inputs[columns]
         if f"{name}.bias" in parameters:
             parameters[f"{name}.bias"] = parameters[f"{name}.bias"] + weighted.sum(axis=0)
