@@ -36,7 +36,8 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ArgumentError
-        If a value is invalid, or if an option is set without the option that it needs.
+        If a value is invalid, or if an option is set without the option or the method that it
+        needs.
     """
     checked = {each.name: _checked(mesh, each, given[each.name]) for each in options.OPTIONS}
     for each in options.OPTIONS:
@@ -45,6 +46,10 @@ def checked_options(mesh: Mesh, given: Mapping[str, Any]) -> dict[str, Any]:
             raise ArgumentError(
                 f"{each.name} has no effect without {each.needs}; pass both, or leave {each.name} "
                 "out"
+            )
+        if each.elastic_only and value != each.default and checked["method"] != "elastic":
+            raise ArgumentError(
+                f'{each.name} needs the method "elastic", not {checked["method"]!r}; leave one out'
             )
     return checked
 

@@ -216,10 +216,10 @@ def _answers(design: Design, manifold: Manifold, request: Request) -> bool:
 def _check_start(start: object, method: str, max_iterations: int | None, alternatives: int) -> None:
     """Raise ArgumentError unless the arguments fit the method and each other."""
     check_iterations(max_iterations)
-    if alternatives and (method != "elastic" or start is not None or max_iterations is not None):
+    if alternatives and (start is not None or max_iterations is not None):
         raise ArgumentError(
-            f'alternatives is {alternatives}, which needs the method "elastic" and neither start '
-            "nor max_iterations; leave it out"
+            f"alternatives is {alternatives}, which cannot be combined with start or "
+            "max_iterations; leave one out"
         )
     if start is not None and not isinstance(start, Design | SurfaceCurve):
         raise ArgumentError(

@@ -58,6 +58,8 @@ class Option:
         Range of a slider, inside the limits.
     needs : str
         Name of the option without which this one has no effect, or "".
+    elastic_only : bool
+        Whether only the method "elastic" accepts another value than the default.
     flag : str
         Command-line flag, if it differs from the name. The flag of a switch inverts its default.
     """
@@ -71,6 +73,7 @@ class Option:
     limits: tuple[float, float] = (0.0, float("inf"))
     usual: tuple[float, float] = (0.0, float("inf"))
     needs: str = ""
+    elastic_only: bool = False
     flag: str = ""
 
     @property
@@ -142,7 +145,6 @@ OPTIONS: tuple[Option, ...] = (
         None,
         "Obstacles",
         "Weights that keep the curve away. It never enters faces whose vertices all have weight 1",
-        flag="avoid",
     ),
     Option(
         "clearance",
@@ -158,7 +160,6 @@ OPTIONS: tuple[Option, ...] = (
         None,
         "Alignment",
         "Weights that attract the curve",
-        flag="align",
     ),
     Option(
         "alternatives",
@@ -167,6 +168,7 @@ OPTIONS: tuple[Option, ...] = (
         "Alternatives",
         "Maximum number of additional curves along other courses, the lowest energy first",
         usual=(0.0, 5.0),
+        elastic_only=True,
     ),
 )
 """All options, in the order in which user interfaces show them."""

@@ -202,8 +202,8 @@ def test_pretrain_says_which_package_is_missing(mesh_file, tmp_path, capsys, mon
 @pytest.mark.parametrize(
     ("options", "arguments"),
     [
-        (["--align", "sharp", "--angle", "12"], {"alignment": True}),
-        (["--avoid", "sharp", "--angle", "12"], {"obstacles": True}),
+        (["--alignment", "sharp", "--angle", "12"], {"alignment": True}),
+        (["--obstacles", "sharp", "--angle", "12"], {"obstacles": True}),
     ],
 )
 def test_automatic_maps_are_those_of_the_functions(mesh_file, tmp_path, options, arguments):
