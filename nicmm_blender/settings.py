@@ -13,7 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..nicmm_core.options import OPTIONS, Kind, Option
+from ..nicmm_core.options import OF_POINTS, OPTIONS, Kind, Option
 from .outputs import sticky_curves, writing
 from .scene import curve_record
 
@@ -36,11 +36,11 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name; options for points are left out."""
+    """Blender properties for core options, by property name; those of single points are left out."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
-        if option.kind is not Kind.POINTS
+        if option.kind not in OF_POINTS
     }
 
 
@@ -328,9 +328,10 @@ def draw_design(
     layout.use_property_decorate = False
     for name in ("closed", "order", "method", "smoothness"):
         layout.prop(properties, name)
-    row = layout.row()
-    row.active = properties.method == "ELASTIC"
-    row.prop(properties, "alternatives")
+    column = layout.column()
+    column.active = properties.method == "ELASTIC"
+    column.prop(properties, "normal_bending")
+    column.prop(properties, "alternatives")
     layout.prop(properties, "use_modifiers")
 
 

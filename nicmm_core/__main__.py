@@ -74,13 +74,7 @@ def _parser() -> argparse.ArgumentParser:
 def _design(given: argparse.Namespace) -> None:
     check_curve_path(given.output)
     mesh = read_mesh(given.mesh)
-    try:
-        points = [int(index) for index in given.points.split(",")]
-    except ValueError as error:
-        raise ArgumentError(
-            f"--points is {given.points!r}; give vertex indices separated by commas, such as "
-            "12,80,41"
-        ) from error
+    points = _indices("points", given.points, "vertex indices", "12,80,41")
     design = design_curve(
         mesh,
         points,
@@ -125,6 +119,8 @@ def _flag(option: Option) -> dict[str, Any]:
             "help": "vertices near which the curve runs after the I-th of the points, from 0; "
             "repeatable",
         }
+    if option.kind is Kind.INDICES:
+        return {"metavar": "I,J", "help": f"{words}, by their places in --points, from 0"}
     number = int if option.kind is Kind.COUNT else float
     return {"type": number, "default": option.default, "help": words}
 
@@ -134,9 +130,22 @@ def _value(option: Option, given: argparse.Namespace, mesh: Mesh) -> Any:
     value = getattr(given, option.name)
     if option.kind is Kind.POINTS:
         return parse_via_points(value) or None
+    if option.kind is Kind.INDICES:
+        what = "indices of control points"
+        return None if value is None else _indices(option.name, value, what, "0,2")
     if option.kind is Kind.WEIGHTS:
         return _automatic_map(mesh, value, given.angle)
     return value
+
+
+def _indices(flag: str, text: str, what: str, example: str) -> list[int]:
+    """Parse indices separated by commas."""
+    try:
+        return [int(index) for index in text.split(",")]
+    except ValueError as error:
+        raise ArgumentError(
+            f"--{flag} is {text!r}; give {what} separated by commas, such as {example}"
+        ) from error
 
 
 def _automatic_map(mesh: Mesh, kind: str | None, degrees: float | None) -> FloatArray | None:

@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import check_iterations, checked_options
+from .arguments import check_iterations, checked_corners, checked_options
 from .blas_threads import single_blas_thread
 from .design_result import Design, cancelled_design
 from .errors import ArgumentError, UnreachableError
@@ -94,6 +94,8 @@ class Designer:
         alignment: ArrayLike | None = None,
         clearance: float = 0.0,
         smoothness: float = 1.0,
+        corners: ArrayLike | None = None,
+        normal_bending: float = 0.0,
         alternatives: int = 0,
         start: Design | SurfaceCurve | None = None,
         max_iterations: int | None = None,
@@ -131,6 +133,8 @@ class Designer:
             "via_points": via_points,
             "method": method,
             "smoothness": smoothness,
+            "corners": corners,
+            "normal_bending": normal_bending,
             "obstacles": obstacles,
             "clearance": clearance,
             "alignment": alignment,
@@ -146,6 +150,7 @@ class Designer:
                 options["via_points"] = located_via_points(
                     self.mesh, points, options["via_points"], order, closed
                 )
+                options["corners"] = checked_corners(options["corners"], len(points))
                 request = Request(points=points, **options)
                 manifold, there = self._on_manifold(request)
                 if isinstance(start, Design) and _answers(start, manifold, there):
@@ -242,6 +247,8 @@ def design_curve(
     alignment: ArrayLike | None = None,
     clearance: float = 0.0,
     smoothness: float = 1.0,
+    corners: ArrayLike | None = None,
+    normal_bending: float = 0.0,
     alternatives: int = 0,
     progress: Progress | None = None,
 ) -> Design:
@@ -275,6 +282,13 @@ def design_curve(
         Distance along the surface, in mesh units, that the curve keeps from obstacles of weight 1.
     smoothness : float, default 1
         Larger values give a fairer curve that follows the shortest path less closely.
+    corners : (c,) int array_like, optional
+        Indices of control points at which the curve may turn freely. No bending is counted there.
+        Only with the method "elastic".
+    normal_bending : float, default 0
+        Weight w of the normal curvature: the bending energy is ∮ (κ_g² + w κ_n²) ds in place of
+        ∮ κ_g² ds, so the curve avoids ridges and valleys. With 1, the whole curvature in space
+        counts. Only with the method "elastic".
     alternatives : int, default 0
         Largest number of further curves, along other courses, to return in `Design.alternatives`.
         Only with the method "elastic".
@@ -316,6 +330,8 @@ def design_curve(
         alignment=alignment,
         clearance=clearance,
         smoothness=smoothness,
+        corners=corners,
+        normal_bending=normal_bending,
         alternatives=alternatives,
         progress=progress,
     )

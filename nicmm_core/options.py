@@ -25,6 +25,11 @@ class Kind(Enum):
     LENGTH = "a length in mesh units"
     WEIGHTS = "a weight for each vertex, or None"
     POINTS = "a mapping from indices of control points to points, or None"
+    INDICES = "indices of control points, or None"
+
+
+OF_POINTS = (Kind.POINTS, Kind.INDICES)
+"""Kinds of options that refer to single control points."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,25 @@ OPTIONS: tuple[Option, ...] = (
         "Weight of fairness relative to length; larger values give fairer, longer curves",
         limits=(1e-3, 1e3),
         usual=(0.1, 10.0),
+    ),
+    Option(
+        "corners",
+        Kind.INDICES,
+        None,
+        "Corners",
+        "Control points at which the curve may turn freely",
+        elastic_only=True,
+    ),
+    Option(
+        "normal_bending",
+        Kind.NUMBER,
+        0.0,
+        "Normal Bending",
+        "Weight of the bending of the surface itself under the curve. 0 ignores it; larger values "
+        "give a curve that avoids ridges and valleys; 1 counts the whole curvature in space",
+        limits=(0.0, 10.0),
+        usual=(0.0, 1.0),
+        elastic_only=True,
     ),
     Option(
         "obstacles",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .geometry.array_types import FloatArray
+from .geometry.array_types import BoolArray, FloatArray, IntArray
 from .geometry.surface_points import SurfacePoints
 from .path.via_points import LocatedViaPoints
 
@@ -27,6 +27,10 @@ class Request:
         Points on the path to the next control point, by the index of the control point before.
     method : {"elastic", "nicmm", "variational"}
     smoothness : float
+    corners : (c,) int array
+        Indices of the control points at which the curve may turn freely, ascending.
+    normal_bending : float
+        Weight of the normal curvature, squared, in the bending energy.
     obstacles : (V,) float array or None
     clearance : float
         Least distance from obstacles of weight 1, in mesh units.
@@ -41,6 +45,8 @@ class Request:
     via_points: LocatedViaPoints
     method: str
     smoothness: float
+    corners: IntArray
+    normal_bending: float
     obstacles: FloatArray | None
     clearance: float
     alignment: FloatArray | None
@@ -50,6 +56,10 @@ class Request:
     def has_maps(self) -> bool:
         """Whether there are obstacles or an alignment map."""
         return self.obstacles is not None or self.alignment is not None
+
+    def are_corners(self, visited: IntArray) -> BoolArray:
+        """Whether the curve may turn freely at control points, given by their indices, (n,)."""
+        return np.isin(visited, self.corners)
 
     @property
     def named_points(self) -> dict[str, SurfacePoints]:

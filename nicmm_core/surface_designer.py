@@ -190,7 +190,15 @@ def _relaxed(
     movable = None
     if start.unsettled is not None:
         movable = movable_near(start.surface.mesh, start.unsettled, start.unit)
-    return relax(start.surface, start.curve, request.smoothness, config, watch, movable)
+    return relax(
+        start.surface,
+        start.curve,
+        request.smoothness,
+        config,
+        watch,
+        movable,
+        request.are_corners(start.visited),
+    )
 
 
 def _relaxed_unless_cancelled(

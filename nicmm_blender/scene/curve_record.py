@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import bpy
 import numpy as np
 
-from ...nicmm_core.options import OPTIONS, Kind
+from ...nicmm_core.options import OF_POINTS, OPTIONS, Kind
 from . import mesh_data, record_check, surface_cache
 from .cage_trace import CagePoints, identity_trace, to_cage_points, to_surface_points
 from .lookup import is_in
@@ -67,7 +67,8 @@ def property_name(option: Option) -> str:
     return f"{option.name.removesuffix('s')}_group" if option.kind is Kind.WEIGHTS else option.name
 
 
-WITHOUT_MODIFIERS = ", use_modifiers=False"
+UNCHANGED = (", use_modifiers=False", ", normal_bending=0.0")
+"""Settings whose values were the only ones before there were these settings."""
 
 NEW_CURVE_OPTIONS = ("order", "alternatives")
 """Options that matter only once, since control points are stored in the order visited."""
@@ -75,7 +76,7 @@ NEW_CURVE_OPTIONS = ("order", "alternatives")
 RECORDED = tuple(
     option
     for option in OPTIONS
-    if option.kind is not Kind.POINTS and option.name not in NEW_CURVE_OPTIONS
+    if option.kind not in OF_POINTS and option.name not in NEW_CURVE_OPTIONS
 )
 """Options that a record stores."""
 
@@ -90,6 +91,7 @@ class CurveSettings:
     obstacle_group: str = ""
     clearance: float = 0.0
     alignment_group: str = ""
+    normal_bending: float = 0.0
     use_modifiers: bool = True
 
     def __post_init__(self) -> None:
@@ -125,7 +127,8 @@ def arguments_of(
             value = value.lower().replace("_", "-")
         values[option.name] = value
     for option in RECORDED:
-        if option.needs and values[option.needs] is None:
+        is_of_no_use = option.elastic_only and settings.method != "ELASTIC"
+        if is_of_no_use or (option.needs and values[option.needs] is None):
             values[option.name] = option.default
     return values
 
@@ -214,7 +217,8 @@ def digest(mesh_object: bpy.types.Object, surface: Surface, settings: CurveSetti
     former = {now: before for before, now in FORMER_METHODS.items()}
     settings = settings.with_value("method", former.get(settings.method, settings.method))
     words = "Asked" + repr(settings).removeprefix(CurveSettings.__name__)
-    words = words.replace(WITHOUT_MODIFIERS, "")
+    for setting in UNCHANGED:
+        words = words.replace(setting, "")
     found = hashlib.blake2b(words.encode(), digest_size=16)
     found.update(surface.core_positions.tobytes())
     found.update(surface.faces.tobytes())
