@@ -36,7 +36,7 @@ CURVE = StringProperty(
 
 # The type of an unregistered property is private, so its name is not evaluated at run time.
 def properties_of(options: Iterable[Option]) -> dict[str, "bpy.props._PropertyDeferred"]:
-    """Blender properties for core options, by property name; those of single points are left out."""
+    """Blender properties for core options, without those of single points."""
     return {
         curve_record.property_name(option): _property(option)
         for option in options
