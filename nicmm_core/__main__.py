@@ -43,7 +43,9 @@ def _parser() -> argparse.ArgumentParser:
     design.add_argument("--points", required=True, metavar="A,B,C", help="vertex indices, from 0")
     design.add_argument("-o", "--output", required=True, help="curve.obj, .json or .csv")
     for option in options.OPTIONS:
-        design.add_argument(f"--{option.flag or option.name}", dest=option.name, **_flag(option))
+        name = option.flag or option.name
+        flags = dict.fromkeys((f"--{name.replace('_', '-')}", f"--{name}"))
+        design.add_argument(*flags, dest=option.name, **_flag(option))
     design.add_argument(
         "--angle",
         type=float,
