@@ -31,6 +31,7 @@ from ..geometry.surface_points import SurfacePoints
 from ..geometry.vectors import dot
 from ..progress import checkpoint
 from ..relaxation.curve_nodes import CurveSurface, nodes_at
+from ..relaxation.elastic_energy import normal_bending_of_steps
 
 SEARCH_CELLS = 700
 """Number of cells per component. More cells would refine a course, which relaxation does better."""
@@ -264,20 +265,12 @@ def with_control_points(
         weighted = weighted * 0.5 * (at_cells[hops.start] + at_cells[hops.end])
     weights = tension / max(float(length), tolerances.TINY) ** 2 * weighted
     if normal_bending:
-        weights = weights + normal_bending * _normal_bending(hops, positions, normals)
+        start, end = hops.start, hops.end
+        weights = weights + normal_bending * normal_bending_of_steps(
+            normals[start], normals[end], positions[end] - positions[start], hops.length
+        )
     paths = _best_paths(graph, hops, departures, control, weights, k)
     return CourseGraph(graph, points, corners, positions, normals, hops, reverse, weights, *paths)
-
-
-def _normal_bending(hops: Hops, positions: FloatArray, normals: FloatArray) -> FloatArray:
-    """∫ κ_n² ds along hops between cells with given positions and normals, in 1/length."""
-    one, other = normals[hops.start], normals[hops.end]
-    opposite = np.einsum("md,md->m", one, other) < 0.0
-    change = np.where(opposite[:, None], -other, other) - one
-    length = np.maximum(hops.length, tolerances.TINY)
-    along = np.einsum("md,md->m", change, positions[hops.end] - positions[hops.start]) / length
-    result: FloatArray = along**2 / length
-    return result
 
 
 def _best_paths(

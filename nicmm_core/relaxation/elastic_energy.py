@@ -55,17 +55,32 @@ def node_bending(nodes: Nodes, normal_bending: float = 0.0) -> FloatArray:
 
     The first term is zero at the ends of open curves and at corners.
     """
-    bending = nodes.angles**2 / nodes.ds
-    return bending + normal_bending * _normal_bending(nodes) if normal_bending else bending
+    bending: FloatArray = nodes.angles**2 / nodes.ds
+    if normal_bending:
+        following = nodes.normals[nodes.following]
+        bending += normal_bending * normal_bending_of_steps(
+            nodes.normals, following, nodes.steps, nodes.step_lengths
+        )
+    return bending
 
 
-def _normal_bending(nodes: Nodes) -> FloatArray:
-    """κ_n² ds along the step from each node to the next, (n,)."""
-    steps, length = nodes.steps, np.maximum(nodes.step_lengths, tolerances.TINY)
-    following = nodes.normals[nodes.following]
-    opposite = np.einsum("nd,nd->n", nodes.normals, following) < 0.0
-    change = np.where(opposite[:, None], -following, following) - nodes.normals
-    result: FloatArray = (np.einsum("nd,nd->n", change, steps) / length) ** 2 / length
+def normal_bending_of_steps(
+    starts: FloatArray, ends: FloatArray, steps: FloatArray, lengths: FloatArray
+) -> FloatArray:
+    """∫ κ_n² ds along steps, (n,), in 1/length.
+
+    Parameters
+    ----------
+    starts, ends : (n, 3) float array
+        Unit normals at both ends of each step, of arbitrary sign.
+    steps : (n, 3) float array
+    lengths : (n,) float array
+        Lengths of the steps along the surface.
+    """
+    opposite = np.einsum("nd,nd->n", starts, ends) < 0.0
+    change = np.where(opposite[:, None], -ends, ends) - starts
+    lengths = np.maximum(lengths, tolerances.TINY)
+    result: FloatArray = (np.einsum("nd,nd->n", change, steps) / lengths) ** 2 / lengths
     return result
 
 
